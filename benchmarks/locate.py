@@ -21,7 +21,7 @@ from avlmaps.perception.embedded.keypoints import RATIO, match_mutual  # noqa: E
 from avlmaps.perception.encoders import Encoders  # noqa: E402
 from avlmaps.perception.pose import estimate_pose  # noqa: E402
 from avlmaps.query.locate import alike, locate  # noqa: E402
-from avlmaps_sim.bench.locate import MapOfPictures  # noqa: E402
+from avlmaps_sim.bench.locate import LocatableMap  # noqa: E402
 
 T = TypeVar("T")
 CAMERA = Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480)
@@ -45,7 +45,7 @@ def picture(wall: np.ndarray, shift_px: int, rng: np.random.Generator) -> np.nda
     return (seen + rng.normal(scale=3.0, size=seen.shape)).clip(0, 255).astype(np.uint8)
 
 
-def made_map(walls: list[np.ndarray], rng: np.random.Generator) -> MapOfPictures:
+def made_map(walls: list[np.ndarray], rng: np.random.Generator) -> LocatableMap:
     """Return a map with one keyframe in front of each wall."""
     used = Encoders.named("embedded")
     pictures = [picture(wall, 0, rng) for wall in walls]
@@ -60,7 +60,7 @@ def made_map(walls: list[np.ndarray], rng: np.random.Generator) -> MapOfPictures
         place = used.place.encode(rgb, one, state)
         none = np.zeros(0, np.float32)
         seen.append(DescribedKeyframe(float(number), pose, points.mean(axis=0), none, place, one, points, b""))
-    return MapOfPictures(stack_keyframes(seen), state, used, Rig(CAMERA, CAMERA))
+    return LocatableMap(stack_keyframes(seen), state, used, Rig(CAMERA, CAMERA))
 
 
 def by_opencv(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -90,7 +90,7 @@ def by_opencv_pnp(xy: np.ndarray, points: np.ndarray) -> np.ndarray:
     return shift
 
 
-def measure(stored: MapOfPictures, photos: list[np.ndarray]) -> dict[str, float]:
+def measure(stored: LocatableMap, photos: list[np.ndarray]) -> dict[str, float]:
     """Return milliseconds of processor time a photo, the median, for each stage and each other way."""
     taken: dict[str, list[float]] = {}
 

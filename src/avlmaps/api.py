@@ -1,6 +1,5 @@
 """The functions of the package's face that join several rooms: from a recording to a map that answers queries."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from avlmaps.maps.settings import BuildSettings
-    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.maps.store.map_data import MapData
     from avlmaps.perception.encoders import Encoders
     from avlmaps.perception.profiles import Profile
     from avlmaps.query.avlmap import AVLMap
@@ -65,9 +64,10 @@ def build_map(
             f"A map is built of the path of a recording or of one from open_recording, not of {type(opened).__name__}; "
             "add frames of your own to a VoxelMap."
         )
-    stored = build(
+    folder = lasting_path(path)
+    data = build(
         opened,
-        lasting_path(path),
+        folder,
         encoders or profile,
         settings or DEFAULTS,
         allow=[allow] if isinstance(allow, str) else allow,
@@ -75,7 +75,7 @@ def build_map(
         overwrite=overwrite,
         progress=progress,
     )
-    return with_findings(AVLMap(_asked_with(stored, encoders)))
+    return with_findings(AVLMap(data, _asked_with(data, encoders), path=folder))
 
 
 def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap":
@@ -89,12 +89,17 @@ def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap
     Raises:
         MapError: it is not a map, or damaged, or of another schema.
     """
-    from avlmaps.maps.store.reader import open_stored
+    from avlmaps.maps.store.folder import read
     from avlmaps.query.avlmap import AVLMap
 
-    return AVLMap(_asked_with(open_stored(lasting_path(path)), encoders))
+    folder = lasting_path(path)
+    data = read(folder)
+    return AVLMap(data, _asked_with(data, encoders), path=folder)
 
 
-def _asked_with(stored: "StoredMap", encoders: "Encoders | None") -> "StoredMap":
-    """Return a map with encoders in the place of those that it names."""
-    return stored if encoders is None else replace(stored, encoders=encoders.over(stored.encoders))
+def _asked_with(data: "MapData", encoders: "Encoders | None") -> "Encoders":
+    """Return the encoders that a map names, with others in their places."""
+    from avlmaps.maps.store.reader import encoders_of_map
+
+    named = encoders_of_map(data.info)
+    return named if encoders is None else encoders.over(named)

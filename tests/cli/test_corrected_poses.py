@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from avlmaps.cli import main
 from avlmaps.core.camera import Rig
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
@@ -145,7 +145,7 @@ def test_a_drive_that_comes_back_is_put_right_by_its_own_pictures(answer, tmp_pa
     loops = made["corrected"]["loops"]
     assert loops["agreeing"] == loops["closures"] >= 4
     assert loops["apart_before_m"] > 0.1 > 0.03 > loops["apart_m"]
-    keyframes = open_stored(tmp_path / "map").keyframes
+    keyframes = read(tmp_path / "map").keyframes
     number = np.rint(2.0 * np.asarray(keyframes.stamp_s)).astype(int)
     apart = np.linalg.norm(np.asarray(keyframes.world_from_camera)[:, :3, 3] - true[number][:, :3, 3], axis=1)
     assert apart[0] == pytest.approx(0.0, abs=1e-6) and apart[-1] < 0.05

@@ -8,7 +8,7 @@ import pytest
 from avlmaps.core.errors import MapError
 from avlmaps.days.find import visits_of
 from avlmaps.live.live_map import LiveMap
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.recordings.layout import DESCRIPTION, UNFINISHED
 
 
@@ -41,7 +41,7 @@ def test_a_drive_updates_the_map_of_the_days_before(answer, dated: Path, built: 
     assert made["into"]["checks"]["agreeing"] >= 5
     assert made["into"]["days"][-1]["day"] == "2023-11-14", "by its clock"
     assert made["into"]["path"] == str(home)
-    (today,) = visits_of(open_stored(tmp_path / "today.avlmap"))
+    (today,) = visits_of(read(tmp_path / "today.avlmap"))
     assert today.day == "2023-11-14", "a live map keeps its clock"
     whole = answer("info", home, "--verify")
     assert whole["frames"] == 2 * answer("info", built)["frames"] - 1

@@ -11,7 +11,7 @@ import pytest
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.registry import forget_loaded
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, Notes, checksum_of
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
@@ -59,7 +59,7 @@ def test_a_map_is_built_with_them_and_queried(walk: Path, models: Path, run, ans
     assert [b["state"] for b in listed["trained"]["backends"][:2]] == ["ready", "ready"]
     home = tmp_path / "m.avlmap"
     answer("build", walk, "--out", home, "--profile", "trained", "--voxel-size-m", "0.1", "--models", models)
-    made_by = open_stored(home).info.models
+    made_by = read(home).info.models
     assert (made_by["pixels"].id, made_by["pixels"].backend) == ("own/pixels-1", "trained@eyes")
     assert (made_by["views"].id, made_by["views"].licence) == ("own/views-1", "your own")
     assert 0.0 <= answer("query", home, "--object", "wall", "--models", models)["parts"][0]["peak"] <= 1.0

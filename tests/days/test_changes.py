@@ -231,7 +231,10 @@ def test_what_is_usual_is_said_with_its_days() -> None:
     )
     assert usual_place_text(known, "ski", [], lambda _: None) == "No ski was seen on any day."
     with pytest.raises(QueryError, match="on one day alone, so that nobody knows what is usual"):
-        days_of(SimpleNamespace(info=SimpleNamespace(visits=()), path=Path("home.avlmap")), lambda life: life)  # pyright: ignore[reportArgumentType]
+        days_of(
+            SimpleNamespace(data=SimpleNamespace(info=SimpleNamespace(visits=())), path=Path("home.avlmap")),
+            lambda life: life,
+        )  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize(

@@ -50,12 +50,9 @@ def stored(poses: np.ndarray) -> SimpleNamespace:
     )  # fmt: skip
     return SimpleNamespace(
         path="home.avlmap",
-        keyframes=keyframes,
-        rig=RIG,
-        place_state={},
+        data=SimpleNamespace(keyframes=keyframes, rig=RIG, place_state={}, up_in_world=np.array([0.0, 0.0, 1.0])),
         encoders=None,
         require_model=lambda kind: None,
-        up_in_world=np.array([0.0, 0.0, 1.0]),
     )
 
 
@@ -64,7 +61,7 @@ def located(monkeypatch: pytest.MonkeyPatch):
     """Let a keyframe be located where it truly is, off by what a function says."""
 
     def install(map_: SimpleNamespace, true: np.ndarray, off=lambda row: np.eye(4), score: float = 0.8) -> None:
-        stamps, places = map_.keyframes.stamp_s, map_.keyframes.place
+        stamps, places = map_.data.keyframes.stamp_s, map_.data.keyframes.place
 
         def fake(there, local, place, camera, rng, settings) -> Located:
             other = int(np.flatnonzero(stamps == there.keyframes.stamp_s[0])[0])
@@ -85,7 +82,8 @@ def test_a_drive_that_came_back_is_put_right(located) -> None:
     located(map_, true)
     found = find_loops(map_)
     before, after = (
-        np.linalg.norm(of[:, :3, 3] - true[:, :3, 3], axis=1) for of in (map_.keyframes.world_from_camera, found.poses)
+        np.linalg.norm(of[:, :3, 3] - true[:, :3, 3], axis=1)
+        for of in (map_.data.keyframes.world_from_camera, found.poses)
     )
     assert found.agreeing == found.closures >= 10
     assert found.apart_before_m > 0.1 > 10 * found.apart_m / 2
@@ -99,7 +97,7 @@ def test_what_is_up_stays_up(located) -> None:
     map_ = stored(strayed(true))
     located(map_, true, lambda row: tipped)  # each place is seen a little tipped
     found = find_loops(map_)
-    turned = (found.poses @ inverse(map_.keyframes.world_from_camera))[:, :3, :3].sum(axis=0)
+    turned = (found.poses @ inverse(map_.data.keyframes.world_from_camera))[:, :3, :3].sum(axis=0)
     left, _, right = np.linalg.svd(turned)
     np.testing.assert_allclose((left @ right)[:, 2], [0.0, 0.0, 1.0], atol=1e-7)
 
@@ -154,7 +152,7 @@ def test_some_keyframes_have_their_own_keypoints_and_pictures() -> None:
     offsets = np.concatenate([[0], np.cumsum(size)])
     pictures = np.concatenate([[0], np.cumsum(10 * size)])
     keyframes = replace(
-        stored(np.tile(np.eye(4), (COUNT, 1, 1))).keyframes.take(np.arange(4)),
+        stored(np.tile(np.eye(4), (COUNT, 1, 1))).data.keyframes.take(np.arange(4)),
         offsets=offsets, xy=np.arange(18, dtype=np.float32).reshape(9, 2),
         descriptors=rng.standard_normal((9, 4)).astype(np.float16),
         points_world=rng.standard_normal((9, 3)).astype(np.float32),

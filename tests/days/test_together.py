@@ -13,8 +13,8 @@ from avlmaps.days import together
 from avlmaps.days.find import NotTheSamePlaceError
 from avlmaps.days.merge import merged_key
 from avlmaps.days.together import build_together
-from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.perception.encoders import encoders_of
+from avlmaps.query.avlmap import AVLMap
 from helpers.pool_here import Here
 from maps.build_fakes import SETTINGS, content_of, open_walk, register_fakes
 
@@ -38,16 +38,16 @@ def out(built: Path, tmp_path: Path) -> Path:
     return tmp_path / "all.avlmap"
 
 
-def copied(stored: StoredMap, other: StoredMap, out: Path, *, overwrite: bool) -> StoredMap:
+def copied(stored: AVLMap, other: AVLMap, out: Path, *, overwrite: bool) -> AVLMap:
     """Write what stands for a merged map: the first one, by the key of both."""
     assert overwrite or not out.exists()
     shutil.rmtree(out, ignore_errors=True)
     shutil.copytree(stored.path, out)
     manifest = json.loads((out / "map.json").read_text())
     manifest["checksum"] = ""
-    manifest["build_key"] = merged_key(stored.info.build_key, other.info.build_key)
+    manifest["build_key"] = merged_key(stored.data.info.build_key, other.data.info.build_key)
     (out / "map.json").write_text(json.dumps(manifest))
-    return open_stored(out)
+    return AVLMap.open(out)
 
 
 class Merges:
@@ -57,14 +57,14 @@ class Merges:
         self.made: list[tuple[str, str, str]] = []
         self.stop_at, self.fault = stop_at, fault or KeyboardInterrupt()
 
-    def __call__(self, stored: StoredMap, other: StoredMap, out: Path, *, overwrite: bool) -> StoredMap:
+    def __call__(self, stored: AVLMap, other: AVLMap, out: Path, *, overwrite: bool) -> AVLMap:
         if len(self.made) == self.stop_at:
             raise self.fault
         self.made.append((stored.path.name, other.path.name, out.name))
         return copied(stored, other, out, overwrite=overwrite)
 
 
-def build(out: Path, cores: int = 2, **how: Any) -> StoredMap:
+def build(out: Path, cores: int = 2, **how: Any) -> AVLMap:
     return build_together(WALKS, out, ENCODERS, Here(cores), SETTINGS, **how)
 
 

@@ -158,11 +158,11 @@ def look_into_map(path: Path) -> int:
 
     if status := _run(Info(path=path, json=True)):
         return status
-    from avlmaps.maps.store.reader import open_stored
+    from avlmaps.maps.store.folder import read
     from avlmaps.query.plots import TopDown
     from avlmaps.query.voxel_space import Space
 
-    stored = open_stored(path)
+    stored = read(path)
     raster = TopDown.of(Space(stored.grid, stored.voxels.index, stored.up_in_world, stored))
     assert raster.rgb.nbytes < 100_000_000
     assert np.isfinite(stored.keyframes.world_from_camera).all() and np.isfinite(stored.voxels.feature).all()

@@ -17,7 +17,8 @@ import numpy as np
 from campaign import build, in_child, verdict_of
 
 from avlmaps.core import poses
-from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.maps.store.folder import read
+from avlmaps.maps.store.map_data import MapData
 from avlmaps.recordings.open import open_recording
 from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
 from avlmaps_sim.bench.recordings.outcomes import FOLDER, FORMATS, TUM_CAMERA, Format, Judge
@@ -57,7 +58,7 @@ def right(walk: RoomWalk, form: Format) -> Right:
         out = Path(folder) / "out.avlmap"
         judge = Judge(_draft(walk), form)
         assert in_child(lambda: build(case, out, ()))[0] == 0
-        stored = open_stored(out)
+        stored = read(out)
         assert not stored.info.doubts and is_right(stored, case, judge), f"{walk.name} as {form.name}"
         return Right(judge, frozenset(map(_plain, stored.info.notices)))
 
@@ -67,7 +68,7 @@ def _plain(notice: str) -> str:
     return re.sub(r"\S*/\S*|[\d.,]+", "#", notice)
 
 
-def is_right(stored: StoredMap, case: Path, judge: Judge) -> bool:
+def is_right(stored: MapData, case: Path, judge: Judge) -> bool:
     """Return whether a map is right, up to a motion of the world; its recording is compared for the colours."""
     opened = open_recording(case)
     if not judge.is_right(opened):
@@ -110,6 +111,6 @@ def _told(out: Path, known: Right) -> bool:
 
 def look(out: Path, case: Path, known: Right) -> int:
     """Raise where a map is wrong and nothing was said."""
-    if not _told(out, known) and not is_right(open_stored(out), case, known.judge):
+    if not _told(out, known) and not is_right(read(out), case, known.judge):
         raise AssertionError("The map is wrong, and nothing is said of it.")
     return 0

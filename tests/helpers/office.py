@@ -10,9 +10,9 @@ import pytest
 
 from avlmaps.maps.build import build_map
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.folder import write
+from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.reader import encoders_of_map
 from avlmaps.maps.types import Keyframes, Voxels
 from avlmaps.perception.embedded.closed_set import features_of
 from avlmaps.recordings.open import open_recording
@@ -49,7 +49,8 @@ def _write_office(folder: Path) -> None:
     path = folder / "office.avlmap"
     recording = open_recording(write_walk(folder / "rec"))
     stored = build_map(recording, path, "embedded", BuildSettings(VOXEL_M), progress=False)
-    pixels: Any = stored.encoders.pixels
+    encoders = encoders_of_map(stored.info)
+    pixels: Any = encoders.pixels
     index, which = _voxels()
     kinds = sorted({*names(), "floor", "wall"})
     likely = np.full((len(kinds), len(pixels.names)), 0.02 / len(pixels.names), np.float32)
@@ -74,9 +75,9 @@ def _write_office(folder: Path) -> None:
         ground=None,
         build_key="0" * 64,
     )
-    keyframes = _keyframes(stored.keyframes, stored.encoders.views)
+    keyframes = _keyframes(stored.keyframes, encoders.views)
     write(path, MapData(info, voxels, keyframes, stored.sounds, stored.place_state))
-    open_stored(path)
+    read(path)
 
 
 def _voxels() -> tuple[np.ndarray, np.ndarray]:

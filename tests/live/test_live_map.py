@@ -26,7 +26,8 @@ from avlmaps.maps.build import build_map
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.settings import BuildSettings, FrameSettings, GravitySettings
 from avlmaps.maps.sources.growing import GrowingSources
-from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.maps.store.folder import read
+from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.avlmap import AVLMap
 
@@ -38,7 +39,7 @@ def test_without_gates_the_end_is_the_build_of_the_same_frames(tmp_path: Path) -
     with LiveMap(tmp_path / "live", ENCODERS, up_in_world=UP, settings=settings, live=EVERY) as live:
         for one in recording:
             add(live, one)
-    made = open_stored(tmp_path / "live")
+    made = read(tmp_path / "live")
     for field in fields(made.voxels):
         ours, theirs = getattr(made.voxels, field.name), getattr(built.voxels, field.name)
         np.testing.assert_allclose(ours, theirs, rtol=1e-3, atol=2e-3)
@@ -170,7 +171,7 @@ def test_a_frame_that_an_encoder_fails_on_costs_no_other(tmp_path: Path) -> None
             except BackendError as fault:
                 faults.append(str(fault))
             wait_for(lambda: live.status().waiting == 0)
-    info = open_stored(tmp_path / "m").info
+    info = read(tmp_path / "m").info
     assert len(faults) == 1 and "out of memory" in faults[0]
     assert info.counts.frames == 7
     assert [(bad.index, bad.why) for bad in info.bad_frames] == [(2, faults[0])]
@@ -189,7 +190,7 @@ def test_a_fault_of_ours_ends_the_waiting_and_is_raised(tmp_path: Path) -> None:
                 add(live, frame(number))
         with pytest.raises(ZeroDivisionError):
             add(live, frame(31))
-    assert live.map.stored.info.counts.frames == 3
+    assert live.map.data.info.counts.frames == 3
 
 
 def test_maps_that_are_closed_at_any_moment_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -229,7 +230,7 @@ def test_a_thread_that_breaks_between_two_snapshots_leaves_nobody_waiting(tmp_pa
         within(60.0, add_until_it_is_said)
     del live._mapper.snapshot
     within(60.0, live.close)
-    assert live.map.stored.info.counts.frames == len(live) > 0
+    assert live.map.data.info.counts.frames == len(live) > 0
 
 
 def breaks(*_: object, **__: object) -> Any:
@@ -256,7 +257,7 @@ def test_a_thread_that_breaks_while_closing_is_told_and_its_map_is_written(tmp_p
             live.add_frame(one.rgb, one.depth_m, one.camera, one.world_from_camera, one.stamp_s)
     with pytest.raises(MapError, match=rf"\(ZeroDivisionError: division by zero\); .* with 3 frames, and {lost} that"):
         live.close()
-    assert live.close().stored.info.counts.frames == 3 == open_stored(tmp_path / "map").info.counts.frames
+    assert live.close().data.info.counts.frames == 3 == read(tmp_path / "map").info.counts.frames
 
 
 def test_an_end_that_breaks_is_a_sentence_and_what_was_saved_stays(
@@ -271,8 +272,8 @@ def test_an_end_that_breaks_is_a_sentence_and_what_was_saved_stays(
         patch.setattr(Mapper, "finish", breaks)
         with pytest.raises(MapError, match=r"could not be finished \(ZeroDivisionError: division by zero\)"):
             live.close()
-    assert open_stored(tmp_path / "map").info.counts.frames > 0
-    assert live.close().stored.info.counts.frames == 3
+    assert read(tmp_path / "map").info.counts.frames > 0
+    assert live.close().data.info.counts.frames == 3
 
 
 def test_a_process_does_not_end_while_questions_are_prepared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -292,7 +293,7 @@ def test_sounds_are_in_the_map_with_the_frames(tmp_path: Path) -> None:
         for number in range(40):
             add(live, frame(number))
             live.add_audio(avlmaps.Sound(samples[1600 * number : 1600 * (number + 1)], 16_000), 0.1 * number)
-    (heard,) = live.map.stored.sounds.onset_s
+    (heard,) = live.map.data.sounds.onset_s
     assert heard == pytest.approx(1.0, abs=0.1)
 
 
@@ -303,10 +304,10 @@ def test_a_sound_has_its_name_before_its_source_is_found(tmp_path: Path, monkeyp
         may_locate.wait(20.0)
         return locate(self, *args)
 
-    def snapshot_with(is_so: Callable[[StoredMap], bool]) -> AVLMap:
+    def snapshot_with(is_so: Callable[[MapData], bool]) -> AVLMap:
         until_s = time.monotonic() + 20.0
         while time.monotonic() < until_s:
-            if live.generation and is_so(live.map.stored):
+            if live.generation and is_so(live.map):
                 return live.map
             time.sleep(0.01)
         raise AssertionError("no such snapshot was published")
@@ -324,14 +325,14 @@ def test_a_sound_has_its_name_before_its_source_is_found(tmp_path: Path, monkeyp
             piece = slice(1600 * number, 1600 * (number + 1))
             live.add_audio(avlmaps.ChannelSound(two[:, piece], 16_000), 0.1 * number)
         named = snapshot_with(lambda stored: len(stored.sounds) == 1)
-        assert named.stored.data.sources_wait == 1 and not may_locate.is_set()
+        assert named.data.sources_wait == 1 and not may_locate.is_set()
         assert "1 wait; ask again" in " ".join(named.ask("where does the last sound come from?").notes)
         with pytest.raises(avlmaps.QueryError, match="1 wait; ask again in a moment"):
             named.sources()
         may_locate.set()
         located = snapshot_with(lambda stored: len(stored.sounds) == 1 and not stored.data.sources_wait)
         assert len(located.sources()) == 1 and not located.ask("where does the last sound come from?").notes
-    sources = live.map.stored.sources()
+    sources = live.map.data.sources
     assert sources is not None and len(sources) == 1 and sources.heard.any()
 
 
@@ -425,7 +426,7 @@ def test_what_a_kill_leaves_is_a_whole_map(tmp_path: Path) -> None:
             time.sleep(float(rng.uniform(0.0, 0.5)))
             os.kill(child, signal.SIGKILL)
     for folder in folders:
-        left = open_stored(folder)
+        left = read(folder)
         assert len(left.voxels) > 0 and avlmaps.open_map(folder).object("red").peak >= 0.0
         with LiveMap(folder, ENCODERS, up_in_world=UP, overwrite=True) as again:  # the lock went with the process
             add(again, frame(0))

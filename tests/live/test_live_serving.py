@@ -15,7 +15,7 @@ from starlette.testclient import TestClient
 from avlmaps.cli.live_serving import LiveFeed, live_source
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.settings import LiveSettings
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.serve.app import create_app
 from avlmaps.serve.service import Service
 
@@ -85,4 +85,4 @@ def test_the_command_serves_until_it_is_stopped(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     assert process.wait(60) == 0
     process.stderr.close()
-    assert len(open_stored(tmp_path / "map").voxels) > 0
+    assert len(read(tmp_path / "map").voxels) > 0

@@ -19,8 +19,8 @@ from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.build import build_map
 from avlmaps.maps.check import doubts_of_channels, judge
 from avlmaps.maps.finish import carving_doubts
+from avlmaps.maps.store.folder import read
 from avlmaps.maps.store.manifest import Removed
-from avlmaps.maps.store.reader import open_stored
 from avlmaps.query.contents import Contents
 from avlmaps.recordings import channels
 from avlmaps.recordings.channels import ChannelSound, write_channels
@@ -133,7 +133,7 @@ def test_a_live_map_ends_with_the_doubts_about_channels_that_a_build_has(
     end_drive(live, said.append)
     wanted = doubts_of_channels(recording.audio, recording.walk, "the sound")
     assert len(wanted) == 1 and of_channels(live.doubts) == wanted
-    assert live.doubts == open_stored(live.path).info.doubts
+    assert live.doubts == read(live.path).info.doubts
     assert said == [f"note: {doubt}" for doubt in live.doubts]
 
 

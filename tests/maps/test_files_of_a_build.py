@@ -24,7 +24,7 @@ class _Entered:
 
     def __call__(self, frame: FrameType, event: str, argument: object) -> None:
         code = frame.f_code
-        if code.co_name == "open_stored":
+        if code.co_name == "read":
             self.done = True
         runs = event == "call" and code.co_flags & CO_OPTIMIZED  # no body of a module or a class that is loaded now
         if runs and not self.done and code.co_filename.startswith(f"{ROOT}/"):

@@ -10,11 +10,13 @@ from build_fakes import SETTINGS, Walk, register_fakes
 
 from avlmaps.cli.output import ground_lines
 from avlmaps.core.errors import MapError
-from avlmaps.maps.build import build_map, describe
+from avlmaps.maps.build import build_map
 from avlmaps.maps.estimate import estimate_ground, ground_notices
 from avlmaps.maps.settings import DEFAULTS, BuildSettings, GravitySettings
+from avlmaps.maps.store.folder import read
 from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, UpInfo
-from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.store.reader import describe
 from avlmaps.recordings.types import BaseHeight, Frame, Recording
 from helpers.filmed_rooms import RIG, UP, film, office
 
@@ -107,7 +109,7 @@ def test_a_height_that_no_camera_has_is_refused(height_m: float) -> None:
         GravitySettings(camera_height_m=height_m)
 
 
-def built(path: Path) -> StoredMap:
+def built(path: Path) -> MapData:
     return build_map(Walk(6), path, PROFILE, SETTINGS, progress=False)
 
 
@@ -115,16 +117,17 @@ def test_a_map_keeps_the_floor_and_describes_it(tmp_path: Path) -> None:
     stored = built(tmp_path / "a.avlmap")
     info = stored.info.ground
     assert info is not None and stored.info.timings.stages_s["frames"] > 0.0
-    said = json.loads(json.dumps(describe(stored)))["ground"]
+    said = json.loads(json.dumps(describe(tmp_path, stored)))["ground"]
     assert said["camera_height_m"] == info.main().best.camera_height_m
     assert 0.0 <= said["confidence"] <= 1.0 and said["known_from"] == "surfaces"
     assert f"floor: {said['camera_height_m']:.2f} m under the camera" in ground_lines(said)[0]
 
 
 def test_a_map_of_an_older_release_opens_without_a_floor(tmp_path: Path) -> None:
-    manifest = built(tmp_path / "a.avlmap").path / "map.json"
+    built(tmp_path / "a.avlmap")
+    manifest = tmp_path / "a.avlmap" / "map.json"
     content = json.loads(manifest.read_text())
     del content["ground"], content["settings"]["gravity"]["camera_height_m"]
     manifest.write_text(json.dumps(content))
-    stored = open_stored(tmp_path / "a.avlmap")
-    assert stored.info.ground is None and describe(stored)["ground"] is None
+    stored = read(tmp_path / "a.avlmap")
+    assert stored.info.ground is None and describe(tmp_path, stored)["ground"] is None

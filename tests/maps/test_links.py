@@ -12,8 +12,8 @@ from build_fakes import SETTINGS, Walk, register_fakes
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import linked_folder, write_bytes_atomically
 from avlmaps.maps.build import build_map
+from avlmaps.maps.store.folder import read
 from avlmaps.maps.store.lock import lock_folder
-from avlmaps.maps.store.reader import open_stored
 from avlmaps.maps.store.tables import write_arrays
 
 PROFILE = register_fakes()
@@ -74,13 +74,13 @@ def test_what_a_linked_file_points_to_stays(copied: Path, elsewhere: Path, name:
     link.symlink_to(elsewhere / "a.jpg")
     WRITERS["build"](copied)
     assert content(elsewhere) == before
-    open_stored(copied)
+    read(copied)
 
 
 def test_a_map_may_itself_be_a_link(copied: Path, tmp_path: Path) -> None:
     (tmp_path / "link.avlmap").symlink_to(copied)
     WRITERS["build"](tmp_path / "link.avlmap")
-    assert open_stored(copied).info.counts.frames == 6
+    assert read(copied).info.counts.frames == 6
 
 
 def test_a_link_that_waits_under_a_temporary_name_is_not_written_through(tmp_path: Path, elsewhere: Path) -> None:
@@ -130,4 +130,4 @@ def test_a_file_that_somebody_put_into_a_map_stays(copied: Path, writer: str) ->
     WRITERS[writer](copied)
     assert all((copied / name).read_text() == "mine" for name in own)
     assert not (copied / "clips/000000-0123456789abcdef.flac").exists()
-    open_stored(copied)
+    read(copied)

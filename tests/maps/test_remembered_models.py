@@ -15,10 +15,10 @@ from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.registry import Backend, Kind, forget_loaded, register
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store.manifest import ModelInfo
-from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.published_models import public_choice, public_name
 from avlmaps.perception.profiles import Profile, profile, register_profile
+from avlmaps.query.avlmap import AVLMap
 
 PROFILE = register_fakes()
 WEIGHTS: dict[str, str] = {}
@@ -55,8 +55,8 @@ def used_with(choice: str) -> Profile:
 
 def test_a_map_opens_with_the_model_that_was_chosen(tmp_path: Path) -> None:
     build_map(Walk(), tmp_path / "map", used_with("chosen@org/large"), SETTINGS)
-    stored = open_stored(tmp_path / "map")
-    assert stored.info.models["pixels"].backend == "chosen@org/large"
+    stored = AVLMap.open(tmp_path / "map")
+    assert stored.data.info.models["pixels"].backend == "chosen@org/large"
     assert stored.encoders.name == PROFILE
     assert stored.encoders.name_of(Kind.PIXELS) == "chosen@org/large"
     assert stored.encoders.pixels.card.id == "org/large"
@@ -66,7 +66,7 @@ def test_a_map_opens_with_the_model_that_was_chosen(tmp_path: Path) -> None:
 def test_the_default_model_is_remembered_by_name_so_that_it_may_change(tmp_path: Path) -> None:
     build_map(Walk(), tmp_path / "map", used_with("chosen"), SETTINGS)
     register(Backend(Kind.PIXELS, "chosen", f"{__name__}:Chosen", model="org/newer"))
-    stored = open_stored(tmp_path / "map")
+    stored = AVLMap.open(tmp_path / "map")
     assert stored.encoders.name_of(Kind.PIXELS) == "chosen@org/small"
     stored.require_model(Kind.PIXELS)
 
@@ -75,7 +75,7 @@ def test_a_profile_may_come_to_hold_other_backends(tmp_path: Path) -> None:
     register_profile(replace(profile(PROFILE), name="changing", pixels="chosen@org/a"))
     build_map(Walk(), tmp_path / "map", "changing", SETTINGS)
     register_profile(replace(profile("changing"), pixels="chosen@org/b", views="none-such"))
-    stored = open_stored(tmp_path / "map")
+    stored = AVLMap.open(tmp_path / "map")
     assert stored.encoders.name_of(Kind.PIXELS) == "chosen@org/a"
     assert Kind.VIEWS not in stored.encoders, "a module that the map has no features of is not asked"
 
@@ -86,7 +86,7 @@ def test_maps_of_earlier_releases_open_unchanged(tmp_path: Path) -> None:
     assert {kind: model["backend"] for kind, model in told["models"].items()} == {
         kind: "fake" for kind in ("pixels", "local", "place", "sounds")
     }, "a backend without models is written as before"
-    assert open_stored(tmp_path / "map").encoders == Encoders.named(PROFILE)
+    assert AVLMap.open(tmp_path / "map").encoders == Encoders.named(PROFILE)
 
 
 def test_another_model_of_the_same_name_is_refused_in_one_sentence(tmp_path: Path) -> None:
@@ -94,14 +94,14 @@ def test_another_model_of_the_same_name_is_refused_in_one_sentence(tmp_path: Pat
     WEIGHTS["org/large"] = "trained once more"
     forget_loaded()
     with pytest.raises(MapError, match=r"was built with org/large \(checksum .*build it again, or name the folder"):
-        open_stored(tmp_path / "map").require_model(Kind.PIXELS)
+        AVLMap.open(tmp_path / "map").require_model(Kind.PIXELS)
 
 
 def test_only_the_model_that_a_question_needs_is_loaded(tmp_path: Path) -> None:
     build_map(Walk(), tmp_path / "map", used_with("chosen@org/large"), SETTINGS)
     register(Backend(Kind.SOUNDS, "fake", f"{__name__}:Unwanted", model="x"))
     try:
-        open_stored(tmp_path / "map").require_model(Kind.PIXELS)
+        AVLMap.open(tmp_path / "map").require_model(Kind.PIXELS)
     finally:
         register_fakes()
 
@@ -109,8 +109,8 @@ def test_only_the_model_that_a_question_needs_is_loaded(tmp_path: Path) -> None:
 @pytest.mark.parametrize("place", ["/data/of/mine/large.pt", "~/models/large.pt", "./large.pt", "C:\\m\\large.pt"])
 def test_where_a_model_lay_is_nobodys_business(tmp_path: Path, place: str) -> None:
     stored = build_map(Walk(), tmp_path / "map", used_with(f"chosen@{place}"), SETTINGS)
-    assert stored.info.models["pixels"].backend == "chosen@large.pt"
-    assert stored.info.models["pixels"].id == "large.pt"
+    assert stored.data.info.models["pixels"].backend == "chosen@large.pt"
+    assert stored.data.info.models["pixels"].id == "large.pt"
     for file in (tmp_path / "map").rglob("*.json"):
         assert place not in json.loads(f"[{json.dumps(file.read_text())}]")[0]
         assert "of/mine" not in file.read_text()
@@ -122,7 +122,7 @@ def test_a_path_in_a_strangers_map_is_not_followed(tmp_path: Path) -> None:
     build_map(Walk(), tmp_path / "map", used_with("chosen@org/large"), SETTINGS)
     manifest = tmp_path / "map" / "map.json"
     manifest.write_text(manifest.read_text().replace("chosen@org/large", "chosen@../../etc/large"))
-    assert open_stored(tmp_path / "map").encoders.name_of(Kind.PIXELS) == "chosen@large"
+    assert AVLMap.open(tmp_path / "map").encoders.name_of(Kind.PIXELS) == "chosen@large"
 
 
 @given(st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._-]{0,20}(/[A-Za-z0-9][A-Za-z0-9._-]{0,20})?", fullmatch=True))

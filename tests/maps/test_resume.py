@@ -16,7 +16,7 @@ import pytest
 from build_fakes import content_of, register_fakes
 
 from avlmaps.core.errors import MapError
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 
 register_fakes()
 OLD, NEW = 1, 2  # seeds of the walks
@@ -76,13 +76,13 @@ def undisturbed(builder: Builder) -> Undisturbed:
 def check_between(path: Path, known: Undisturbed, *, had_old: bool) -> None:
     """After a kill the folder is the old map, whole, or the new one, whole; or, without an old one, says what it is."""
     try:
-        found = open_stored(path)
+        found = read(path)
     except MapError as fault:
         # Killed before its first file there is no folder; the error may then name the map of the round before.
         assert not had_old
         assert any(said in str(fault) for said in ("is a half-built map", "a folder without a map", "is not there"))
         return
-    keys = {open_stored(known.new).info.build_key} | ({open_stored(known.old).info.build_key} if had_old else set())
+    keys = {read(known.new).info.build_key} | ({read(known.old).info.build_key} if had_old else set())
     assert found.info.build_key in keys
 
 

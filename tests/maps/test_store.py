@@ -27,7 +27,7 @@ from avlmaps.maps.store.checkpoints import load_checkpoint, save_checkpoint
 from avlmaps.maps.store.edits import read_edits
 from avlmaps.maps.store.folder import damaged_files, has_unfinished_build, read, write
 from avlmaps.maps.store.lock import EDITING, LOCK, is_locked, lock_folder
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.reader import encoders_of_map, require_model
 from avlmaps.maps.store.tables import read_arrays, write_arrays
 from avlmaps.maps.types import Keyframes, Voxels
 
@@ -119,17 +119,17 @@ def test_a_stage_comes_back_with_its_files_or_not_at_all(tmp_path: Path) -> None
 
 
 def test_a_map_comes_back_with_all_that_it_is_of(built: Path) -> None:
-    stored = open_stored(built)
+    stored = read(built)
     assert len(stored.voxels) == stored.info.counts.voxels > 100 and len(stored.sounds) > 0
     assert stored.voxels.feature.shape == (len(stored.voxels), 4)
     assert stored.place_state["centres"].shape == (2, 3)
     assert (stored.rig.rgb, stored.rig.depth) == (RIG.rgb, RIG.depth) and stored.rig.registered
     assert stored.up_in_world.tolist() == [0.0, 0.0, 1.0]
-    assert stored.encoders.name == PROFILE and stored.grid.voxel_size_m == 0.05
+    assert stored.info.profile == PROFILE and stored.grid.voxel_size_m == 0.05
     assert stored.info.models["place"].checksum and stored.info.models["place"].prompts == ("a {}",)
     assert stored.info.settings == SETTINGS.for_profile(0.6)
     for kind in (Kind.PIXELS, Kind.SOUNDS, Kind.LOCAL, Kind.PLACE):
-        stored.require_model(kind)
+        require_model(stored.info, encoders_of_map(stored.info), kind, built)
     files = {path.relative_to(built).as_posix() for path in built.rglob("*") if path.is_file() and path.name != LOCK}
     assert files == {"map.json", *stored.info.files}
     assert {"voxels.safetensors", "keyframes.safetensors", "sounds.safetensors"} < files

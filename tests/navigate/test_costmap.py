@@ -142,7 +142,7 @@ class _WordMap:
             zero, np.full(n, 9, np.int64),
         )  # fmt: skip
         keyframes = SimpleNamespace(world_from_camera=np.zeros((0, 4, 4)))
-        self.stored = SimpleNamespace(voxels=voxels, grid=grid, up_in_world=np.eye(3)[2], keyframes=keyframes)
+        self = SimpleNamespace(voxels=voxels, grid=grid, up_in_world=np.eye(3)[2], keyframes=keyframes)
         self.edited = SimpleNamespace(forbidden=())
 
     def knows(self, word):
@@ -232,5 +232,5 @@ def test_where_the_map_was_walked_the_body_may_go(furnished):
     assert not costmap_of(obstacles_for(furnished), BASE.radius_m).is_passable(off[4:, :2]).any()
     poses = np.tile(np.eye(4), (len(off), 1, 1))
     poses[:, :3, 3] = off
-    furnished.stored.keyframes.world_from_camera = poses
+    furnished.data.keyframes.world_from_camera = poses
     assert costmap_of(obstacles_for(furnished), BASE.radius_m).is_passable(off[:, :2]).all()

@@ -16,9 +16,8 @@ from avlmaps.maps.store.edits import Edit, EditedSpot, World
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.instruct import Outcome, instruct
 from avlmaps.navigate.trace_plot import draw_path, plot_path
-from avlmaps.query.avlmap import AVLMap
 from helpers.kinematic import KinematicDriver
-from query.query_fakes import furnished_map, sounds_of
+from query.query_fakes import asked, furnished_map, sounds_of
 
 OTHER = World(name="other", fingerprint="another")
 
@@ -46,7 +45,7 @@ class Scripted:
 
 def told(command: str, translator=None, driver: KinematicDriver | None = None, **more) -> tuple[Outcome, list[str]]:
     track = np.stack([np.linspace(5.0, 5.2, 5), np.full(5, 3.1), np.full(5, 1.2)], axis=1)
-    asked = AVLMap(furnished_map(sounds=sounds_of([track], [0.9])))
+    asked = furnished_map(sounds=sounds_of([track], [0.9]))
     lines: list[str] = []
     driver = driver or KinematicDriver(GroundPose(3.0, 2.0))
     return instruct(command, asked, driver, translator or LearnedTranslator(), tell=lines.append, **more), lines
@@ -77,7 +76,7 @@ def test_a_translator_that_knows_no_map_is_given_this_one() -> None:
 def test_a_forbidden_area_that_the_map_does_not_know_is_told_before_the_robot_moves() -> None:
     corners = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0))
     area = Edit.new("forbid", [EditedSpot(middle=corners[0], corners=corners)], name="the stairs", world=OTHER)
-    m = AVLMap(furnished_map(), edits=[area])
+    m = asked(furnished_map(), edits=[area])
     outcome = instruct("turn left", m, KinematicDriver(GroundPose(3.0, 2.0)), LearnedTranslator())
     assert outcome.notes == (
         "The robot may enter the stairs, which was forbidden: it was made in a map of another recording, other.",
@@ -110,8 +109,8 @@ def test_the_outcome_is_the_contract_of_the_command_line() -> None:
 
 
 def test_what_is_doubtful_about_the_map_is_told_once_before_anything_moves() -> None:
-    asked = AVLMap(furnished_map())
-    asked.stored.info.doubts = ("The poses drift.",)
+    asked = furnished_map()
+    asked.data.info.doubts = ("The poses drift.",)
     lines: list[str] = []
     planned = Translation('robot.move_to_object("table")', ("The poses drift.", "a chair is meant"))
     outcome = instruct(
@@ -179,7 +178,7 @@ def test_a_budget_holds_for_the_robot_too() -> None:
 
 def test_the_way_is_drawn_with_start_goals_and_stops(tmp_path) -> None:
     outcome, _ = told("go to the table, then go to the nearest chair")
-    asked = AVLMap(furnished_map())
+    asked = furnished_map()
     figure = draw_path(asked.space, GroundPose(3.0, 2.0), outcome.moves, contacts=np.array([[1.0, 1.0]]), title="there")
     labels = figure.axes[0].get_legend_handles_labels()[1]
     assert labels[0] == "start"

@@ -34,7 +34,7 @@ def track(x: float, y: float) -> np.ndarray:
 
 
 def furnished_robot(x: float = 3.0, y: float = 2.0, settings: RobotSettings | None = None, **parts: object) -> Robot:
-    return Robot(AVLMap(furnished_map(**parts)), KinematicDriver(GroundPose(x, y)), settings)
+    return Robot(furnished_map(**parts), KinematicDriver(GroundPose(x, y)), settings)
 
 
 def xy(place: Place) -> tuple[float, float]:
@@ -114,17 +114,16 @@ def test_between_two_of_a_kind_takes_two_and_never_one_twice() -> None:
 
 def test_a_map_that_is_tilted_is_driven_on_its_level_ground() -> None:
     stored = furnished_map()
-    stored.up_in_world = np.array([0.0, -1.0, 0.0])  # a camera's world: y down
-    asked = AVLMap(stored)
-    robot = Robot(asked, KinematicDriver(GroundPose(0.0, 0.0), asked.space.level_from_world))
+    stored.data.up_in_world = np.array([0.0, -1.0, 0.0])  # a camera's world: y down
+    robot = Robot(stored, KinematicDriver(GroundPose(0.0, 0.0), stored.space.level_from_world))
     place = robot.get_pos("table")
-    level = asked.space.level(np.array([place.x, place.y, place.z]))
+    level = stored.space.level(np.array([place.x, place.y, place.z]))
     robot.move_to("table")
     assert (robot.driver.pose.x_m, robot.driver.pose.y_m) == pytest.approx(level[:2])
     assert robot.moves[-1].goal == pytest.approx((place.x, place.y, place.z))
     assert robot.moves[-1].distance_m == pytest.approx(0.0, abs=1e-6)
     robot.move_north("table", 0.5)
-    level_goal = asked.space.level(np.array(robot.moves[-1].goal))
+    level_goal = stored.space.level(np.array(robot.moves[-1].goal))
     assert level_goal[1] > level[1] + 0.5
 
 
@@ -191,7 +190,7 @@ def test_distances_of_things_are_between_their_nearest_points() -> None:
 
 def test_a_stricter_map_stops_what_another_lets_pass() -> None:
     strict = furnished_robot()
-    strict = Robot(AVLMap(strict.asked.stored, settings=QuerySettings(found_at=1.0)), strict.driver)
+    strict = Robot(AVLMap(strict.asked, settings=QuerySettings(found_at=1.0)), strict.driver)
     with pytest.raises(GoalNotFoundError, match="best guess"):
         strict.move_to_object("chair")
 
@@ -326,7 +325,7 @@ def test_between_a_thing_and_one_inside_its_u_is_never_inside_the_thing() -> Non
 
 def test_the_floor_is_sought_among_the_voxels_that_count() -> None:
     robot = furnished_robot()
-    voxels = robot.asked.stored.voxels
+    voxels = robot.asked.data.voxels
     speckle = np.array([[x, y, -30] for x in range(120) for y in range(80)], np.int32)
     index = np.concatenate([voxels.index, speckle])
     hits = np.concatenate([np.full(len(voxels), 9), np.ones(len(speckle), int)])

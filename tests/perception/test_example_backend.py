@@ -13,12 +13,12 @@ SOURCE = Path(__file__).parent / "example_backend"
 USED = """
 import json, sys
 from avlmaps.core.registry import Kind, find, load
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.perception.conformance import check
 
 backend = load(Kind.PLACE, "thumbnail")
 check(Kind.PLACE, backend)
-stored = open_stored(sys.argv[1])
+stored = read(sys.argv[1])
 stored.require_model(Kind.PLACE)
 print(json.dumps({
     "target": find(Kind.PLACE, "thumbnail").target,

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.registry import Kind
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import ModelCard
+from avlmaps.query.avlmap import AVLMap
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -119,15 +121,13 @@ def fake_map(
 ) -> Any:
     """Return what a query needs of a stored map."""
     camera = Pinhole(100.0, 100.0, 32.0, 24.0, 64, 48)
-    return SimpleNamespace(
-        path=Path("fake.avlmap"),
+    data: Any = SimpleNamespace(
         grid=GridSpec(0.05),
         up_in_world=UP,
         voxels=voxels,
         sounds=sounds or sounds_of([], []),
         keyframes=keyframes if keyframes is not None else keyframes_at(np.zeros((0, 3))),
         place_state={},
-        encoders=encoders or fake_encoders(),
         info=SimpleNamespace(
             ground=None,
             doubts=(),
@@ -137,12 +137,23 @@ def fake_map(
             recording=SimpleNamespace(name="walk", fingerprint="f"),
         ),
         rig=Rig(camera, camera),
-        require_model=lambda kind: None,
-        sources=lambda: None,
-        knows_sources=False,
-        data=SimpleNamespace(sources_wait=0, findings={}),
-        clip_path=lambda sound: Path(f"fake.avlmap/{sound}.flac"),
+        sources=None,
+        sources_wait=0,
+        findings={},
     )
+    return FakeMap(data, encoders or fake_encoders(), path=Path("fake.avlmap"))
+
+
+class FakeMap(AVLMap):
+    """A map whose encoders are never refused."""
+
+    def require_model(self, kind: Kind) -> None:
+        del kind
+
+
+def asked(fake: AVLMap, **chosen: Any) -> AVLMap:
+    """Return a map that is queried otherwise."""
+    return type(fake)(fake.data, fake.encoders, path=fake.path, **chosen)
 
 
 def box(low: Sequence[int], high: Sequence[int]) -> np.ndarray:

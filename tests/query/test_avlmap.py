@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from query_fakes import fake_encoders, fake_map, furnished_map, keyframes_at, sounds_of, voxels_of
+from query_fakes import asked, fake_encoders, fake_map, furnished_map, keyframes_at, sounds_of, voxels_of
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, BackendError, QueryError
@@ -21,7 +21,7 @@ HERE = np.array([[1.0, 1.0, 1.2]])
 
 @pytest.fixture
 def heard() -> AVLMap:
-    return AVLMap(furnished_map(sounds=sounds_of([HERE], [0.8])))
+    return furnished_map(sounds=sounds_of([HERE], [0.8]))
 
 
 def locating(
@@ -83,7 +83,7 @@ def test_an_empty_phrase_is_refused(heard: AVLMap, way: str) -> None:
 
 def test_an_empty_map_answers_honestly(monkeypatch: pytest.MonkeyPatch) -> None:
     full = furnished_map()
-    empty = AVLMap(fake_map(voxels_of(np.zeros((0, 3)), np.zeros((0, 4))), encoders=full.encoders))
+    empty = asked(fake_map(voxels_of(np.zeros((0, 3)), np.zeros((0, 4))), encoders=full.encoders))
     locating(monkeypatch, None, inliers=0)
     picture = np.zeros((48, 64, 3), np.uint8)
     for heat in (empty.object("chair"), empty.sound("dog"), empty.image(picture)):
@@ -191,12 +191,12 @@ def test_an_area_is_told_from_other_areas() -> None:
     places = np.array([[1.0, 1.0, 1.4], [5.0, 3.0, 1.4]])
     view = np.array([[1.0, 0.0], [0.0, 1.0]], np.float32)
     stored = furnished_map(keyframes=keyframes_at(places, view), views=FakeViews())
-    m = AVLMap(stored)
+    m = asked(stored)
     assert m.area("kitchen").found
-    assert m.area("kitchen", primary=True).goals()[0].position == pytest.approx(tuple(stored.keyframes.centre[0]))
-    from_camera = AVLMap(stored, settings=QuerySettings(areas=AreaSettings(anchor="camera")))
+    assert m.area("kitchen", primary=True).goals()[0].position == pytest.approx(tuple(stored.data.keyframes.centre[0]))
+    from_camera = asked(stored, settings=QuerySettings(areas=AreaSettings(anchor="camera")))
     assert from_camera.area("kitchen", primary=True).goals()[0].position == pytest.approx((1.0, 1.0, 1.4))
-    nowhere = AVLMap(furnished_map(keyframes=keyframes_at(places[1:], view[1:]), views=FakeViews())).area("kitchen")
+    nowhere = furnished_map(keyframes=keyframes_at(places[1:], view[1:]), views=FakeViews()).area("kitchen")
     assert not nowhere.found
     assert nowhere.factors[0].note.startswith("no view is like 'kitchen'; the best score is 0.0")
 
@@ -209,9 +209,9 @@ def test_a_models_mismatch_is_told_before_anything_is_compared() -> None:
 
     stored.require_model = refuse
     with pytest.raises(BackendError, match="another model for pixels"):
-        AVLMap(stored).object("chair")
+        stored.object("chair")
     with pytest.raises(BackendError, match="another model for sounds"):
-        AVLMap(stored).sound("dog")
+        stored.sound("dog")
     assert fake_encoders().name == "fake"
 
 

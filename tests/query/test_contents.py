@@ -6,6 +6,7 @@ from query_fakes import (
     FakePixels,
     FakeSounds,
     FakeViews,
+    asked,
     box,
     fake_encoders,
     fake_map,
@@ -24,7 +25,7 @@ from avlmaps.query.avlmap import AVLMap
 @pytest.fixture
 def furnished() -> AVLMap:
     track = np.array([[1.0, 1.0, 1.0], [2.0, 1.0, 1.0]])
-    return AVLMap(furnished_map(sounds=sounds_of([track], [0.8])))
+    return furnished_map(sounds=sounds_of([track], [0.8]))
 
 
 def test_each_thing_is_listed_once_with_its_voxels(furnished: AVLMap) -> None:
@@ -53,7 +54,7 @@ def test_two_names_of_one_thing_are_one_thing() -> None:
     encoder = FakePixels(("chair", "seat"))
     index = box((0, 0, 0), (6, 6, 8))
     feature = np.tile(encoder.encode_words(["chair"]) * 0.8 + encoder.encode_words(["seat"]) * 0.6, (len(index), 1))
-    things = AVLMap(fake_map(voxels_of(index, feature), encoders=fake_encoders(encoder))).things(
+    things = asked(fake_map(voxels_of(index, feature), encoders=fake_encoders(encoder))).things(
         ["chair", "chair seat", "seat"], least_confidence=0.0
     )
     assert len(things) == 1
@@ -67,7 +68,7 @@ def test_a_narrower_thing_answers_to_the_wider_name_and_is_listed_by_its_own() -
         likely[rows, encoder.names.index(name)] = 0.9
         likely[rows, encoder.names.index("other")] = 0.1
     stored = fake_map(voxels_of(index, features_of(likely, encoder.codes)), encoders=fake_encoders(encoder))
-    avlmap = AVLMap(stored)
+    avlmap = asked(stored)
     chair, exact = (avlmap.object(word, primary=True) for word in ("chair", "office chair"))
     assert chair.found and exact.found
     assert chair.goals(1)[0].position == exact.goals(1)[0].position
@@ -82,7 +83,7 @@ def test_what_is_surely_a_chair_but_of_no_sure_kind_is_listed_as_a_chair() -> No
     likely = np.zeros((len(index), len(encoder.names)))
     for name, share in (("chair", 0.3), ("office chair", 0.3), ("armchair", 0.3), ("other", 0.1)):
         likely[:, encoder.names.index(name)] = share
-    avlmap = AVLMap(fake_map(voxels_of(index, features_of(likely, encoder.codes)), encoders=fake_encoders(encoder)))
+    avlmap = asked(fake_map(voxels_of(index, features_of(likely, encoder.codes)), encoders=fake_encoders(encoder)))
     chairs = avlmap.instances("chair")
     assert avlmap.instances("chair", alone=True).best < 0.5 < chairs.best
     for least in (0.0, 0.5):
@@ -115,8 +116,8 @@ def test_a_count_of_rooms_counts_each_once_however_often_it_was_seen(places: lis
     view = np.tile(np.array([1.0, 0], np.float32), (len(places), 1))
     where = np.array([[x, 0.0, 1.0] for x in places])
     stored = furnished_map(views=FakeViews(), keyframes=keyframes_at(where, view))
-    stored.info.models = {"pixels": None, "views": None}
-    avlmap = AVLMap(stored)
+    stored.data.info.models = {"pixels": None, "views": None}
+    avlmap = asked(stored)
     answer = avlmap.ask("how many kitchens are there?")
     assert answer.count == len([room for room in avlmap.rooms() if room.name == "kitchen"])
 
@@ -125,7 +126,7 @@ def test_rooms_are_keyframes_side_by_side_with_one_name() -> None:
     places = np.array([[0.0, 0, 1], [0.4, 0, 1], [0.8, 0, 1], [9.0, 0, 1], [9.4, 0, 1], [20.0, 0, 1]])
     view = np.array([[1.0, 0], [1, 0], [1, 0], [1, 0], [1, 0], [1, 0]], np.float32)
     stored = furnished_map(views=FakeViews(), keyframes=keyframes_at(places, view))
-    rooms = [room for room in AVLMap(stored).rooms() if room.name == "kitchen"]
+    rooms = [room for room in asked(stored).rooms() if room.name == "kitchen"]
     assert [room.views for room in rooms] == [3, 2], "the lone view at 20 m is not a room"
     assert rooms[0].position == pytest.approx((1.4, 0.0, 1.0)), "the middle of what was seen, one metre ahead"
     assert all(0.0 <= room.confidence <= 1.0 for room in rooms)
@@ -133,7 +134,7 @@ def test_rooms_are_keyframes_side_by_side_with_one_name() -> None:
 
 def test_an_empty_map_holds_nothing() -> None:
     encoders = fake_encoders(FakePixels(("chair",)), FakeSounds(), FakeViews())
-    nothing = AVLMap(fake_map(voxels_of(np.zeros((0, 3), int), np.zeros((0, 2))), encoders=encoders))
+    nothing = asked(fake_map(voxels_of(np.zeros((0, 3), int), np.zeros((0, 2))), encoders=encoders))
     assert (nothing.things(), nothing.sounds(), nothing.rooms()) == ([], [], [])
     assert nothing.points.shape == (0, 3)
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from query_fakes import (
     FakePixels,
     FakeSounds,
+    asked,
     box,
     fake_encoders,
     fake_map,
@@ -49,7 +50,7 @@ from avlmaps.query.edits import means, said
 from avlmaps.query.factors import NearAnchors
 
 STORED = furnished_map()
-RAW = AVLMap(STORED, edits=())
+RAW = asked(STORED, edits=())
 THINGS = sorted(RAW.things(least_confidence=0.2), key=lambda one: one.rows[0])
 A, B = (one for one in THINGS if one.name == "chair")
 TABLE = next(one for one in THINGS if one.name == "table")
@@ -78,7 +79,7 @@ EVERY = (STOOL, BENCH, PAIR, HALVES, DOCK, LOST)
 
 def state(edits: Sequence[Edit]) -> list[Any]:
     """Return all that a map of these edits lists and answers."""
-    m = AVLMap(STORED, edits=edits)
+    m = asked(STORED, edits=edits)
     out: list[Any] = [(one.name, one.confidence, one.position, one.rows.tolist()) for one in m.things(None, 0.2)]
     out.sort()
     for word in WORDS:
@@ -95,7 +96,7 @@ def state(edits: Sequence[Edit]) -> list[Any]:
 
 def test_an_empty_log_changes_nothing_bit_for_bit() -> None:
     assert state(()) == state([edit("undo", of="nothing")])
-    m, listed = AVLMap(STORED, edits=()), RAW.things()
+    m, listed = asked(STORED, edits=()), RAW.things()
     assert m.edited.things(listed, None, 0.5) is listed
     found = RAW.instances("chair")
     assert m.edited.instances(found, "chair") is found
@@ -127,7 +128,7 @@ def test_an_edit_that_is_undone_is_nothing_and_undone_again_is_back(edits: list[
 
 
 def test_a_thing_that_was_renamed_is_found_by_its_name_alone() -> None:
-    m = AVLMap(STORED, edits=[STOOL])
+    m = asked(STORED, edits=[STOOL])
     listed = {one.name: one for one in m.things(least_confidence=0.2)}
     assert listed["stool"].rows.tolist() == A.rows.tolist()
     assert (listed["stool"].confidence, listed["stool"].edited) == (1.0, "named by a person on 2026-11-26")
@@ -143,24 +144,24 @@ def test_a_thing_that_was_renamed_is_found_by_its_name_alone() -> None:
 
 
 def test_an_answer_says_that_a_person_named_it() -> None:
-    m = AVLMap(STORED, edits=[STOOL, edit("rename", TABLE, name="bench", by="Anna")])
+    m = asked(STORED, edits=[STOOL, edit("rename", TABLE, name="bench", by="Anna")])
     assert m.ask(object="stool").notes == ("The stool was named by a person on 2026-11-26.",)
     assert m.ask(object="bench").notes == ("The bench was named by Anna on 2026-11-26.",)
     assert m.ask(object="chair").notes == ()
 
 
 def test_things_are_merged_and_split() -> None:
-    one = AVLMap(STORED, edits=[PAIR]).things(["chair"], 0.2)
+    one = asked(STORED, edits=[PAIR]).things(["chair"], 0.2)
     assert [sorted(each.rows.tolist()) for each in one] == [sorted([*A.rows.tolist(), *B.rows.tolist()])]
-    two = AVLMap(STORED, edits=[HALVES]).things(["table"], 0.2)
+    two = asked(STORED, edits=[HALVES]).things(["table"], 0.2)
     assert sorted(np.concatenate([each.rows for each in two]).tolist()) == TABLE.rows.tolist()
     assert sorted(float(each.points[:, 0].min() > 1.4) for each in two) == [0.0, 1.0]
-    apart = AVLMap(STORED, edits=[PAIR, edit("split", A, B, cut=[])]).things(["chair"], 0.2)
+    apart = asked(STORED, edits=[PAIR, edit("split", A, B, cut=[])]).things(["chair"], 0.2)
     assert sorted(each.rows[0] for each in apart) == [A.rows[0], B.rows[0]]
 
 
 def test_a_place_of_ones_own_is_a_goal_and_a_landmark() -> None:
-    m = AVLMap(STORED, edits=[DOCK])
+    m = asked(STORED, edits=[DOCK])
     answer = m.ask("where is my dock?")
     assert answer.found and answer.goals[0].position == (3.0, 1.0, 0.0)
     assert answer.notes == ("The dock was named by a person on 2026-11-26.",)
@@ -171,23 +172,23 @@ def test_a_place_of_ones_own_is_a_goal_and_a_landmark() -> None:
 
 
 def test_an_edit_that_finds_nothing_is_reported_with_the_reason() -> None:
-    (lost,) = AVLMap(STORED, edits=[STOOL, LOST]).edited.lost
+    (lost,) = asked(STORED, edits=[STOOL, LOST]).edited.lost
     assert lost.edit is LOST and lost.why == "nothing like the sofa is at (4.00, 0.50, 0.20) m any more"
     said_so = f"Edit {LOST.id} of 2026-11-26 (rename sofa to couch) finds nothing to apply to: {lost.why}."
     assert str(lost) == said_so
-    assert said_so in AVLMap(STORED, edits=[LOST, STOOL]).edited.said_of([], ["couch"])
+    assert said_so in asked(STORED, edits=[LOST, STOOL]).edited.said_of([], ["couch"])
     other = msgspec.structs.replace(STOOL, world=World(name="other", fingerprint="g"))
-    m = AVLMap(STORED, edits=[other])
+    m = asked(STORED, edits=[other])
     assert state([other]) == state(())
     assert "another recording, other" in m.edited.lost[0].why
     again = msgspec.structs.replace(STOOL, world=World(name="walk", fingerprint="of a recording that was mended"))
-    assert not AVLMap(STORED, edits=[again]).edited.lost
+    assert not asked(STORED, edits=[again]).edited.lost
 
 
 def test_a_map_without_pixel_features_asks_for_no_pixel_model() -> None:
     stored = furnished_map(sounds=sounds_of([np.array([[1.0, 1.0, 0.0]])], [0.9]))
-    stored.encoders, stored.info.models = fake_encoders(sounds=FakeSounds()), {"sounds": None}
-    m = AVLMap(stored, edits=[STOOL, DOCK])
+    stored.encoders, stored.data.info.models = fake_encoders(sounds=FakeSounds()), {"sounds": None}
+    m = asked(stored, edits=[STOOL, DOCK])
     assert m.ask(sound="dog").found
     (lost,) = m.edited.lost
     assert lost.why.startswith("nothing like the chair is at")
@@ -219,20 +220,22 @@ def test_what_edits_are_about_is_searched_once_however_often_it_is_edited(
 def shifted(by: int) -> Any:
     """Return the map after its poses were corrected: all of it lies elsewhere."""
     stored = furnished_map()
-    stored.voxels = replace(stored.voxels, index=np.asarray(stored.voxels.index) + np.array([by, 0, 0], np.int32))
+    stored.data.voxels = replace(
+        stored.data.voxels, index=np.asarray(stored.data.voxels.index) + np.array([by, 0, 0], np.int32)
+    )
     return stored
 
 
 def test_edits_follow_poses_that_are_corrected() -> None:
     places = np.array([[0.6, 0.3, 0.5], [4.0, 3.0, 0.5]])
     before, after = furnished_map(keyframes=keyframes_at(places)), shifted(40)
-    after.keyframes = keyframes_at(places + np.array([2.0, 0.0, 0.0]))
-    own = AVLMap(before, edits=()).edited.spot_of(A.name, A.rows)
-    m = AVLMap(after, edits=[Edit.new("rename", [own], name="stool", made=DAY)])
+    after.data.keyframes = keyframes_at(places + np.array([2.0, 0.0, 0.0]))
+    own = asked(before, edits=()).edited.spot_of(A.name, A.rows)
+    m = asked(after, edits=[Edit.new("rename", [own], name="stool", made=DAY)])
     (stool,) = m.things(["stool"])
     assert stool.rows.tolist() == A.rows.tolist()
     np.testing.assert_allclose(stool.points, A.points + np.array([2.0, 0.0, 0.0]), atol=1e-9)
-    assert own.now(before.keyframes) is own
+    assert own.now(before.data.keyframes) is own
 
 
 def test_edits_are_carried_into_the_map_of_all_days() -> None:
@@ -270,8 +273,8 @@ def two_named_rooms(edits: Sequence[Edit]) -> AVLMap:
     voxels = voxels_of(index, np.zeros((len(index), 1)))
     voxels = replace(voxels, hits=np.full(len(index), 9, np.int64))
     stored = fake_map(voxels, keyframes=frames, encoders=fake_encoders(views=encoder))
-    stored.info.models = {"views": None}
-    return AVLMap(stored, edits=edits)
+    stored.data.info.models = {"views": None}
+    return asked(stored, edits=edits)
 
 
 def room_edit(m: AVLMap, room: str, to: str) -> Edit:
@@ -399,9 +402,9 @@ def test_a_disk_that_fails_leaves_the_log_as_it_was(tmp_path: Path, monkeypatch:
 
 def editable(tmp_path: Path) -> AVLMap:
     stored = furnished_map()
-    stored.path, stored.info.files = tmp_path, {}
-    m = AVLMap(stored)
-    stored.info.files = {"voxels/index": None}
+    stored.path, stored.data.info.files = tmp_path, {}
+    m = asked(stored)
+    stored.data.info.files = {"voxels/index": None}
     return m
 
 
@@ -434,7 +437,7 @@ def test_the_editor_says_what_it_cannot_do(tmp_path: Path) -> None:
         with pytest.raises(QueryError, match=why):
             call()
     assert not (tmp_path / EDITS).exists()
-    m.stored.info.files = {}
+    m.data.info.files = {}
     with pytest.raises(MapError, match="in memory alone"):
         m.edit.pin("dock", (1.0, 1.0))
 
@@ -447,21 +450,21 @@ def test_what_is_merged_hangs_together_in_any_order(tmp_path: Path) -> None:
     stored = fake_map(
         voxels_of(np.concatenate([floor, *chairs]), encoder.encode_words(words)), encoders=fake_encoders(encoder)
     )
-    stored.path, stored.info.files = tmp_path, {"voxels/index": None}
+    stored.path, stored.data.info.files = tmp_path, {"voxels/index": None}
     places = [(0.6, 0.6), (1.3, 0.6), (5.9, 0.6), (6.6, 0.6)]
     for order in permutations(places):
         with pytest.raises(QueryError, match=r"is 4\.5 m from the others"):
-            AVLMap(stored, edits=()).edit.merge(*order)
+            asked(stored, edits=()).edit.merge(*order)
     assert not (tmp_path / EDITS).exists()
-    AVLMap(stored, edits=()).edit.merge(*places[2:])
+    asked(stored, edits=()).edit.merge(*places[2:])
 
 
 def test_an_edit_does_not_bring_back_the_folder_of_a_map_that_is_gone(tmp_path: Path) -> None:
     m = editable(tmp_path)
-    m.stored.path = tmp_path / "gone.avlmap"
+    m.path = tmp_path / "gone.avlmap"
     with pytest.raises(MapError, match="is gone"):
         m.edit.pin("dock", (1.0, 1.0))
-    assert not m.stored.path.exists()
+    assert not m.path.exists()
 
 
 def test_the_editor_makes_the_edits_and_the_map_knows_them_at_once(tmp_path: Path) -> None:
@@ -515,7 +518,7 @@ def test_a_forbidden_area_is_occupied_and_its_goals_are_refused(tmp_path: Path) 
     from avlmaps.navigate.costmap import obstacles_for
 
     m = editable(tmp_path)
-    m.stored.voxels = replace(m.stored.voxels, hits=np.full(len(m.space), 9, np.int64))  # pyright: ignore[reportAttributeAccessIssue]
+    m.data.voxels = replace(m.data.voxels, hits=np.full(len(m.space), 9, np.int64))  # pyright: ignore[reportAttributeAccessIssue]
     before = obstacles_for(m)
     m.edit.forbid("the wet floor", box=(2.5, 1.0, 3.5, 2.0))
     after = obstacles_for(m)

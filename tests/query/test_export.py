@@ -14,7 +14,6 @@ from query_fakes import furnished_map
 from avlmaps.core.errors import QueryError
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.perception.embedded.colours import COLOURS, memberships
-from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.export import (
     heat_colors,
     palette,
@@ -56,8 +55,8 @@ def test_no_face_lies_between_two_voxels() -> None:
 
 
 def test_a_glb_has_the_maps_extent_and_colours(tmp_path: Path) -> None:
-    opened = AVLMap(furnished_map())
-    write_glb(tmp_path / "a.glb", opened.stored.voxels.index, 0.05, opened.colors)
+    opened = furnished_map()
+    write_glb(tmp_path / "a.glb", opened.data.voxels.index, 0.05, opened.colors)
     read = trimesh.load(tmp_path / "a.glb", force="mesh")
     np.testing.assert_allclose(read.bounds, [[0.0, 0.0, 0.0], [6.0, 4.0, 0.45]], atol=1e-5)
     assert tuple(np.asarray(read.visual.vertex_colors)[0, :3]) == (120, 90, 60)
@@ -83,7 +82,7 @@ def test_the_occupancy_grid_lies_as_map_server_reads_it(tmp_path: Path) -> None:
 
 
 def test_the_table_has_a_row_for_each_thing(tmp_path: Path) -> None:
-    opened = AVLMap(furnished_map())
+    opened = furnished_map()
     things = opened.things(least_confidence=0.0)
     write_table(tmp_path / "a.csv", [thing.to_json() for thing in things], [one.to_json() for one in opened.sounds()])
     rows = list(csv.DictReader((tmp_path / "a.csv").open()))
@@ -92,7 +91,7 @@ def test_the_table_has_a_row_for_each_thing(tmp_path: Path) -> None:
 
 
 def test_colours_tell_things_and_heat_apart() -> None:
-    opened = AVLMap(furnished_map())
+    opened = furnished_map()
     things = opened.things(least_confidence=0.0)
     colors = thing_colors(len(opened.space), things)
     chair, table = (next(t for t in things if t.name == name) for name in ("chair", "table"))

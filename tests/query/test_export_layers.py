@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from query_fakes import furnished_map
+from query_fakes import asked, furnished_map
 
 from avlmaps.core.errors import BackendError, QueryError
 from avlmaps.core.poses import FrameName, from_quaternion
@@ -22,8 +22,8 @@ UPS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda up: np.linalg.norm(up
 
 def tilted(up: tuple[float, ...]) -> AVLMap:
     stored = furnished_map()
-    stored.up_in_world = np.asarray(up, np.float64) / np.linalg.norm(up)
-    return AVLMap(stored)
+    stored.data.up_in_world = np.asarray(up, np.float64) / np.linalg.norm(up)
+    return asked(stored)
 
 
 @given(UPS)
@@ -58,7 +58,7 @@ def test_a_box_holds_its_thing_and_no_more(up: tuple[float, ...], frame: FrameNa
 
 
 def test_heat_is_that_of_the_question() -> None:
-    opened = AVLMap(furnished_map())
+    opened = furnished_map()
     layers = layers_of(opened, heat="the chair")
     expected = opened.ask("the chair").heat
     assert layers.heat is not None and expected is not None
@@ -67,14 +67,14 @@ def test_heat_is_that_of_the_question() -> None:
 
 
 def test_openlex3d_gets_a_point_and_a_feature_for_each_voxel_that_has_one(tmp_path: Path) -> None:
-    opened = AVLMap(furnished_map())
+    opened = furnished_map()
     assert [path.name for path in write_openlex3d(tmp_path / "out", opened)] == list(FILES)
     features, index = (np.load(tmp_path / "out" / name) for name in FILES[:2])
     points, colors = read_pcd((tmp_path / "out" / FILES[2]).read_bytes())
-    seen = np.asarray(opened.stored.voxels.weight) > 0
+    seen = np.asarray(opened.data.voxels.weight) > 0
     np.testing.assert_allclose(points, opened.points[seen], atol=1e-5)
     np.testing.assert_array_equal(colors, opened.colors[seen])
-    np.testing.assert_allclose(features[index], opened.stored.voxels.feature[seen], atol=1e-3)
+    np.testing.assert_allclose(features[index], opened.data.voxels.feature[seen], atol=1e-3)
 
 
 def test_a_pcd_is_read_by_open3d(tmp_path: Path) -> None:
@@ -105,14 +105,14 @@ def test_a_missing_package_is_named_with_what_installs_it(
     monkeypatch.setitem(sys.modules, module, None)
     assert callable(write)
     with pytest.raises(BackendError, match=rf"\[{extra}\]"):
-        write(tmp_path / "a.out", layers_of(AVLMap(furnished_map())))
+        write(tmp_path / "a.out", layers_of(furnished_map()))
     assert not list(tmp_path.iterdir())
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(QueryError, match="cannot be written"):
-        write_openlex3d(tmp_path / "file" / "out", AVLMap(furnished_map()))
+        write_openlex3d(tmp_path / "file" / "out", furnished_map())
 
 
 def test_a_sound_has_its_name_apart_from_how_sure_it_is() -> None:
@@ -129,5 +129,5 @@ def test_what_cannot_be_written_leaves_no_folder(tmp_path: Path, monkeypatch: py
     (tmp_path / "there").mkdir()
     for folder in (tmp_path / "new" / "out", tmp_path / "there"):
         with pytest.raises(QueryError, match="No space left"):
-            write_openlex3d(folder, AVLMap(furnished_map()))
+            write_openlex3d(folder, furnished_map())
     assert [path.name for path in tmp_path.iterdir()] == ["there"]

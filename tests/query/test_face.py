@@ -134,7 +134,7 @@ def test_arithmetic_of_heat_is_that_of_its_arrays(m: avlmaps.AVLMap, a: float, b
 
 
 def test_heat_of_two_maps_does_not_mix(m: avlmaps.AVLMap) -> None:
-    other = avlmaps.AVLMap(m.stored)
+    other = avlmaps.AVLMap(m)
     with pytest.raises(ValueError, match="different maps cannot be added"):
         m.object("chair") + other.object("chair")
     with pytest.raises(TypeError):
@@ -148,7 +148,7 @@ def test_what_is_no_point_is_refused(m: avlmaps.AVLMap, points: object) -> None:
 
 
 def test_arrays_are_read_only_and_not_copied(m: avlmaps.AVLMap) -> None:
-    count = m.stored.info.counts.voxels
+    count = m.data.info.counts.voxels
     shapes = {"points": (count, 3), "colors": (count, 3), "voxel_index": (count, 3)}
     for name in ("points", "colors", "voxel_index", "features"):
         array = getattr(m, name)
@@ -156,7 +156,7 @@ def test_arrays_are_read_only_and_not_copied(m: avlmaps.AVLMap) -> None:
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
     for name, field in (("colors", "rgb"), ("features", "feature"), ("voxel_index", "index")):
-        assert np.shares_memory(getattr(m, name), getattr(m.stored.voxels, field))
+        assert np.shares_memory(getattr(m, name), getattr(m.data.voxels, field))
     np.testing.assert_allclose(m.points, (m.voxel_index + 0.5) * 0.1)
 
 
@@ -179,7 +179,7 @@ def test_a_photo_is_located_by_its_file(m: avlmaps.AVLMap, folder: Path) -> None
 
 def test_what_python_prints_is_short(m: avlmaps.AVLMap, folder: Path) -> None:
     recording = avlmaps.open_recording(folder / "rec")
-    parts = [m, m.stored, m.stored.voxels, m.stored.keyframes, m.stored.sounds, recording, recording.frame(0)]
+    parts = [m, m, m.data.voxels, m.data.keyframes, m.data.sounds, recording, recording.frame(0)]
     values = [m.object("chair"), m.ask("the chair"), avlmaps.Encoders.named("embedded"), avlmaps.VoxelMap()]
     for thing in (*parts, *values):
         assert len(repr(thing)) < 260 and "array(" not in repr(thing), repr(thing)
@@ -210,7 +210,7 @@ def test_a_map_of_frames_one_by_one_is_the_built_one(folder: Path, tmp_path: Pat
     np.testing.assert_array_equal(live.voxel_index, built.voxel_index)
     np.testing.assert_allclose(live.features.astype(float), built.features.astype(float), atol=5e-3)
     np.testing.assert_allclose(live.colors.astype(int), built.colors, atol=1)
-    np.testing.assert_allclose(live.map.stored.up_in_world, built.stored.up_in_world, atol=1e-9)
+    np.testing.assert_allclose(live.map.data.up_in_world, built.data.up_in_world, atol=1e-9)
     saved = live.save(tmp_path / "live.avlmap")
     assert saved.ask("the sofa").probability == pytest.approx(built.ask("the sofa").probability, abs=0.02)
     assert live.ask("the sofa").found == saved.ask("the sofa").found
@@ -472,7 +472,7 @@ def test_frames_that_contradict_one_another_are_said_with_every_answer(kind: str
         live.add(truth.rgb[index], truth.depth_m[index], truth.rig.rgb, moved(index, pose))
     assert any(re.search(said, doubt) for doubt in live.doubts), live.doubts
     assert set(live.doubts) <= set(live.ask("red").notes)
-    assert set(live.doubts) <= set(live.save(tmp_path / "m").stored.info.doubts)
+    assert set(live.doubts) <= set(live.save(tmp_path / "m").data.info.doubts)
 
 
 def test_stamps_in_milliseconds_are_doubted() -> None:
@@ -513,7 +513,7 @@ def test_an_encoder_that_is_interrupted_costs_no_frame_that_waits() -> None:
         live.add(truth.rgb[7], truth.depth_m[7], truth.rig.rgb, truth.world_from_camera[7])
     assert len(live) == 8
     live.add(truth.rgb[8], truth.depth_m[8], truth.rig.rgb, truth.world_from_camera[8])
-    assert len(live) == 9 and live.map.stored.info.counts.frames == 9
+    assert len(live) == 9 and live.map.data.info.counts.frames == 9
 
 
 def test_sound_of_another_clock_than_the_frames_is_refused_from_its_first_piece(frame: avlmaps.Frame) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from query_fakes import UP, furnished_map, keyframes_at, sounds_of
+from query_fakes import UP, asked, furnished_map, keyframes_at, sounds_of
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Question, Role
@@ -24,7 +24,7 @@ def track(x: float, y: float, z: float = 1.2, length_m: float = 1.0) -> np.ndarr
 
 
 def test_each_chair_is_one_goal_and_the_larger_one_leads() -> None:
-    goals = AVLMap(furnished_map()).object("chair", primary=True).goals(top=5)
+    goals = furnished_map().object("chair", primary=True).goals(top=5)
     assert len(goals) == 2
     assert goals[0].size == pytest.approx((0.2, 0.2, 0.4))
     assert goals[1].size == pytest.approx((0.2, 0.2, 0.3))
@@ -34,7 +34,7 @@ def test_each_chair_is_one_goal_and_the_larger_one_leads() -> None:
 
 
 def test_no_two_goals_share_an_instance() -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([track(4.0, 3.0)], [0.9])))
+    m = furnished_map(sounds=sounds_of([track(4.0, 3.0)], [0.9]))
     goals = (m.object("chair", primary=True) * m.sound("dog")).goals(top=10)
     assert len({goal.position for goal in goals}) == len(goals) == 2
 
@@ -64,7 +64,7 @@ def test_no_two_goals_lie_within_one_thing(seed: int, has_context: bool) -> None
 
 def test_a_sound_decides_between_two_chairs() -> None:
     for x, y, nearest in ((0.3, 0.6, (0.6, 0.6)), (5.0, 3.1, (5.1, 3.1))):
-        m = AVLMap(furnished_map(sounds=sounds_of([track(x, y, length_m=0.2)], [0.9])))
+        m = furnished_map(sounds=sounds_of([track(x, y, length_m=0.2)], [0.9]))
         heat = m.object("chair", primary=True) * m.sound("dog")
         best = heat.goals()[0]
         assert best.position[:2] == pytest.approx(nearest, abs=0.15)
@@ -74,7 +74,7 @@ def test_a_sound_decides_between_two_chairs() -> None:
 
 
 def test_the_best_goal_of_certain_instances_is_nearly_the_hottest_place() -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0), track(4.0, 1.0)], [0.9, 0.7])))
+    m = furnished_map(sounds=sounds_of([track(1.0, 2.0), track(4.0, 1.0)], [0.9, 0.7]))
     heat = m.object("chair", primary=True) * m.sound("dog")
     goal = heat.goals()[0]
     assert 0.8 * heat.peak - 1e-6 <= goal.parts["object"] * goal.parts["sound"] <= heat.peak + 1e-6
@@ -156,7 +156,7 @@ def test_a_thing_is_as_far_in_a_region_as_its_voxels_are(seed) -> None:
 
 
 def test_of_two_regions_both_count_and_a_sound_as_before() -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([track(0.3, 0.6, length_m=0.2)], [0.9])))
+    m = furnished_map(sounds=sounds_of([track(0.3, 0.6, length_m=0.2)], [0.9]))
     thing = m.object("chair", primary=True)
     even = [Heatmap.of(VoxelHeat(m.space, Part(Modality.AREA, "y"), np.full(len(m.space), share, np.float32),
                                  regional=True)) for share in (0.5, 0.8)]  # fmt: skip
@@ -168,7 +168,7 @@ def test_of_two_regions_both_count_and_a_sound_as_before() -> None:
 
 
 def test_a_sound_alone_is_put_where_it_was_heard_not_at_any_height() -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0, z=1.3), track(4.0, 1.0, z=0.9)], [0.9, 0.7])))
+    m = furnished_map(sounds=sounds_of([track(1.0, 2.0, z=1.3), track(4.0, 1.0, z=0.9)], [0.9, 0.7]))
     first, second = m.sound("dog", primary=True).goals(top=5)
     assert first.position == pytest.approx((1.5, 2.0, 1.3))  # the middle of its track
     assert second.position == pytest.approx((4.5, 1.0, 0.9))
@@ -177,12 +177,12 @@ def test_a_sound_alone_is_put_where_it_was_heard_not_at_any_height() -> None:
 
 
 def test_two_sounds_at_one_place_are_one_goal() -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0), track(1.1, 2.2)], [0.9, 0.8])))
+    m = furnished_map(sounds=sounds_of([track(1.0, 2.0), track(1.1, 2.2)], [0.9, 0.8]))
     assert len(m.sound("dog", primary=True).goals(top=5)) == 1
 
 
 def test_a_column_between_anchors_is_put_at_the_height_of_the_lead() -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0, z=1.3)], [0.9])))
+    m = furnished_map(sounds=sounds_of([track(1.0, 2.0, z=1.3)], [0.9]))
     camera = Part(Modality.IMAGE, "x.png", is_file=True)
     image = Heatmap.of(
         NearAnchors(m.space, camera, 0.2, np.array([[4.0, 2.0, 5.0]]), np.ones(1), np.zeros(1, int), True)
@@ -193,7 +193,7 @@ def test_a_column_between_anchors_is_put_at_the_height_of_the_lead() -> None:
 
 
 def test_it_is_not_found_where_the_parts_do_not_come_together() -> None:
-    far = AVLMap(furnished_map(sounds=sounds_of([track(30.0, 30.0)], [0.9])))
+    far = furnished_map(sounds=sounds_of([track(30.0, 30.0)], [0.9]))
     heat = far.object("chair", primary=True) * far.sound("dog")
     assert all(factor.found for factor in heat.factors)
     assert not heat.found
@@ -201,7 +201,7 @@ def test_it_is_not_found_where_the_parts_do_not_come_together() -> None:
 
 
 def test_it_is_not_found_where_one_part_is_not() -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [0.05])))
+    m = furnished_map(sounds=sounds_of([track(0.5, 0.5)], [0.05]))
     heat = m.object("chair", primary=True) * m.sound("dog")
     assert not heat.found
     assert heat.goals()[0].score < 0.5
@@ -218,20 +218,20 @@ def unlikely(m: AVLMap, confidence: float, role: Role = Role.PRIMARY) -> Heatmap
 @pytest.mark.parametrize("confidence", [0.02, 0.05, 0.15])
 def test_company_makes_no_unlikely_thing_found(confidence: float) -> None:
     """A chair of .05 near a tv that is certain is not found: a robot drove 14 m to one."""
-    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [1.0])))
+    m = furnished_map(sounds=sounds_of([track(0.5, 0.5)], [1.0]))
     for heat in (unlikely(m, confidence) * m.sound("dog"), unlikely(m, confidence) * m.object("table")):
         assert heat.probability < 0.5 and not heat.found
         assert heat.goals()[0].probability == heat.probability
 
 
 def test_two_doubtful_things_are_not_found_by_each_other() -> None:
-    m = AVLMap(furnished_map())
+    m = furnished_map()
     assert not (unlikely(m, 0.3) * unlikely(m, 0.3, Role.CONTEXT)).found
 
 
 @pytest.mark.parametrize("found_at", [0.0, 0.3, 0.9, 1.0])
 def test_the_limit_of_found_is_a_setting(found_at: float) -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [0.9])), settings=QuerySettings(found_at=found_at))
+    m = asked(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [0.9])), settings=QuerySettings(found_at=found_at))
     for heat in (m.object("chair", primary=True), m.sound("dog"), m.object("chair", primary=True) * m.sound("dog")):
         assert heat.found == (heat.probability >= found_at)
     answer = m.ask(Question.of([Part(Modality.OBJECT, "chair"), Part(Modality.SOUND, "dog")]))
@@ -241,7 +241,7 @@ def test_the_limit_of_found_is_a_setting(found_at: float) -> None:
 
 @pytest.mark.parametrize("found_at", [0.0, 1e-9, 0.5])
 def test_where_there_is_no_goal_nothing_is_found_at_any_limit(found_at: float) -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([], [])), settings=QuerySettings(found_at=found_at))
+    m = asked(furnished_map(sounds=sounds_of([], [])), settings=QuerySettings(found_at=found_at))
     answer = m.ask(Question.of([Part(Modality.SOUND, "dog")]))
     assert not answer.goals and not answer.found and answer.text == "No sound of dog is found."
 
@@ -253,13 +253,13 @@ def test_a_limit_outside_of_probabilities_is_refused() -> None:
 
 @pytest.mark.parametrize("primary", [True, False])
 def test_heat_alone_never_makes_an_absent_thing_found(primary: bool) -> None:
-    heat = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0)], [0.49]))).sound("dog", primary)
+    heat = furnished_map(sounds=sounds_of([track(1.0, 2.0)], [0.49])).sound("dog", primary)
     assert not heat.found
     assert "the best score is 0.49, below 0.50" in heat.factors[0].note
 
 
 def test_a_second_part_of_a_modality_has_a_name_of_its_own() -> None:
-    m = AVLMap(furnished_map())
+    m = furnished_map()
     heat = m.object("chair", primary=True) * m.object("table") * m.object("floor")
     assert list(heat.goals()[0].parts) == ["object", "object_2", "object_3"]
 
@@ -296,9 +296,9 @@ def test_two_kitchens_are_two_goals() -> None:
     view[:, 1] = 1.0
     view[[1, 2, 8, 9]] = [1.0, 0.0]
     from_cameras = QuerySettings(areas=AreaSettings(anchor="camera", extent="cones"))
-    m = AVLMap(furnished_map(keyframes=keyframes_at(places, view), views=FakeViews()), settings=from_cameras)
+    m = asked(furnished_map(keyframes=keyframes_at(places, view), views=FakeViews()), settings=from_cameras)
     goals = m.area("kitchen", primary=True).goals(top=2)
     assert sorted(goal.position[0] for goal in goals) == pytest.approx([1.25, 4.75], abs=0.3)
     assert all(goal.position[2] == pytest.approx(1.4) for goal in goals)
     assert m.area("kitchen").found
-    assert np.allclose(UP, m.stored.up_in_world)
+    assert np.allclose(UP, m.data.up_in_world)

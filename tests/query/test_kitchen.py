@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from query_fakes import fake_map
+from query_fakes import asked, fake_map
 
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.grid import GridSpec
@@ -24,8 +24,8 @@ def kitchen(shared_data) -> AVLMap:
         frame = recording.frame(index)
         fused.add(frame, encoder.encode(frame))
     stored = fake_map(fused.voxels(), encoders=SimpleNamespace(pixels=encoder))
-    stored.up_in_world = UP / np.linalg.norm(UP)
-    return AVLMap(stored)
+    stored.data.up_in_world = UP / np.linalg.norm(UP)
+    return asked(stored)
 
 
 def test_what_is_red_is_the_cabinets_and_large(kitchen: AVLMap) -> None:

@@ -15,7 +15,7 @@ from avlmaps.perception.embedded.keypoints import RootSift
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 from avlmaps.query.locate import LocateSettings, locate, locate_features
-from avlmaps_sim.bench.locate import MapOfPictures, map_of
+from avlmaps_sim.bench.locate import LocatableMap, map_of
 from helpers.picture_room import CAMERA, RoomWalk
 
 WALK = RoomWalk(frames=12)
@@ -58,7 +58,7 @@ def encoders_of(local: Any, matcher: Any) -> Any:
     return Encoders(local=local, place="vlad", matcher=matcher)
 
 
-def stored_by(local: Any, matcher: Any) -> MapOfPictures:
+def stored_by(local: Any, matcher: Any) -> LocatableMap:
     return map_of(WALK, encoders_of(local, matcher), np.random.default_rng(0))
 
 
@@ -137,7 +137,7 @@ def test_planted_matches_of_few_or_many_keypoints_are_believed_by_the_same_rules
         points_world=seen.points_world[good],
         place=np.ones(1, np.float32),
     )
-    stored = MapOfPictures(stack_keyframes([seen]), {}, used, WALK.rig)
+    stored = LocatableMap(stack_keyframes([seen]), {}, used, WALK.rig)
     whole_pixels = np.floor(xy[good]) + 0.5  # as DISK and SuperPoint tell them
     found = locate_features(
         stored,

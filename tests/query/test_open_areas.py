@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from query_fakes import furnished_map, keyframes_at
+from query_fakes import asked, furnished_map, keyframes_at
 
 from avlmaps.perception.protocols import ModelCard, ScaledEncoder
 from avlmaps.query.avlmap import AVLMap
@@ -62,7 +62,7 @@ class ScaledViews(OpenViews):
 def _map(views: OpenViews, rooms: Sequence[str], more: float = 0.05) -> AVLMap:
     places = np.array([[2.0 * i, 1.0, 1.4] for i in range(len(rooms))])
     rows = np.array([views.view(room, more) for room in rooms], np.float32).reshape(-1, _DIM)
-    return AVLMap(furnished_map(keyframes=keyframes_at(places, rows), views=views))
+    return furnished_map(keyframes=keyframes_at(places, rows), views=views)
 
 
 def test_the_cosines_are_as_close_as_those_of_clip() -> None:
@@ -126,7 +126,7 @@ def test_without_the_scale_nothing_would_be_found() -> None:
     """What the scale is for: at the temperature that suits other encoders, all names look alike."""
     assert not _map(OpenViews(), ["kitchen", "living room"]).area("kitchen").found
     fixed = AreaSettings(temperature=0.01)
-    m = AVLMap(_map(OpenViews(), ["kitchen", "living room"]).stored, settings=QuerySettings(areas=fixed))
+    m = asked(_map(OpenViews(), ["kitchen", "living room"]), settings=QuerySettings(areas=fixed))
     assert m.area("kitchen").found
 
 

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from query_fakes import UP, box, fake_map, furnished_map, keyframes_at, sounds_of, voxels_of
+from query_fakes import UP, asked, box, fake_map, furnished_map, keyframes_at, sounds_of, voxels_of
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.factors import NearThings
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.image import image_factor
@@ -30,7 +29,7 @@ def colours_in(path: Path) -> int:
 
 @pytest.mark.slow
 def test_a_product_has_a_panel_for_each_part_and_one_for_all(tmp_path: Path) -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK)))
+    m = furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK))
     one = m.object("chair", primary=True).plot(tmp_path / "one.png")
     three = (m.object("chair", primary=True) * m.sound("dog")).plot(tmp_path / "deep" / "three.png")
     assert colours_in(one) > 50
@@ -46,7 +45,7 @@ def test_a_map_is_drawn_with_its_sounds(tmp_path: Path) -> None:
 def test_an_empty_map_can_be_drawn(tmp_path: Path) -> None:
     stored = fake_map(voxels_of(np.zeros((0, 3)), np.zeros((0, 4))), encoders=furnished_map().encoders)
     assert plot_map(stored, tmp_path / "map.png").is_file()
-    assert AVLMap(stored).sound("dog").plot(tmp_path / "dog.png").is_file()
+    assert asked(stored).sound("dog").plot(tmp_path / "dog.png").is_file()
 
 
 def test_a_picture_of_an_unknown_kind_is_refused(tmp_path: Path) -> None:
@@ -61,8 +60,8 @@ def test_the_colour_from_above_is_that_of_the_highest_voxels_under_the_ceiling()
     for colour, height in ((10, 0), (200, 10), (200, 11), (200, 12), (255, 60)):
         rgb[voxels.index[:, 2] == height] = colour
     stored = fake_map(type(voxels)(voxels.index, voxels.feature, voxels.weight, rgb, voxels.last_seen_s, voxels.hits))
-    stored.keyframes = keyframes_at(np.array([[0.1, 0.1, 1.4]]))
-    view = TopDown.of(Space(GridSpec(0.05), voxels.index, UP, stored))
+    stored.data.keyframes = keyframes_at(np.array([[0.1, 0.1, 1.4]]))
+    view = TopDown.of(Space(GridSpec(0.05), voxels.index, UP, stored.data))
     seen = view.rgb[view.seen].reshape(4, 4, 3)[..., 0]
     np.testing.assert_array_equal(seen, [[200, 200, 10, 10], [200, 200, 10, 10], [10] * 4, [10] * 4])
     values = np.zeros(len(voxels), np.float32)
@@ -72,7 +71,7 @@ def test_the_colour_from_above_is_that_of_the_highest_voxels_under_the_ceiling()
 
 
 def test_without_a_path_a_plot_is_a_figure_for_a_notebook() -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK)))
+    m = furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK))
     figure = (m.object("chair", primary=True) * m.sound("dog")).plot()
     assert isinstance(figure, Figure)
     assert len(figure.axes) >= 3
@@ -85,7 +84,7 @@ def brightest(figure: Figure) -> float:
 
 
 def test_what_was_not_found_is_drawn_as_dark_as_it_is_unsure() -> None:
-    m = AVLMap(furnished_map())
+    m = furnished_map()
     sure, unsure = m.object("chair", primary=True), m.object("chair", primary=True)
     assert sure.found
     factor = unsure.factors[0]
@@ -102,10 +101,10 @@ def test_what_was_not_found_is_drawn_as_dark_as_it_is_unsure() -> None:
 
 
 def test_each_thing_is_drawn_by_its_own_confidence_and_a_product_by_that_of_what_is_sought() -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK)))
+    m = furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK))
     factor = m.object("chair", primary=True).factors[0]
     assert isinstance(factor, NearThings)
-    along_x = m.stored.voxels.index[factor.mask][:, 0]
+    along_x = m.data.voxels.index[factor.mask][:, 0]
     split = (along_x > np.median(along_x)).astype(int)
     factor = replace(factor, instance=split, confidence=np.array([1.0, 0.25]), with_uncertain=None)
     shown = factor.shown[factor.mask]
@@ -118,7 +117,7 @@ def test_each_thing_is_drawn_by_its_own_confidence_and_a_product_by_that_of_what
 
 def test_a_photo_that_is_only_guessed_is_no_certainty() -> None:
     part = Part(Modality.IMAGE, "photo.jpg", Role.PRIMARY, is_file=True)
-    space = AVLMap(furnished_map()).object("chair").space
+    space = furnished_map().object("chair").space
     located = SimpleNamespace(world_from_camera=None, guess=np.eye(4), inliers=9, score=0.3, notes=())
     factor = image_factor(space, located, part, HeatSettings())  # pyright: ignore[reportArgumentType]
     assert not factor.found
@@ -129,12 +128,11 @@ def test_a_photo_that_is_only_guessed_is_no_certainty() -> None:
 
 
 def test_names_of_things_are_drawn_over_the_map(tmp_path: Path) -> None:
-    from avlmaps.query.avlmap import AVLMap
 
-    opened = AVLMap(furnished_map())
-    plain = cv2.imread(str(plot_map(opened.stored, tmp_path / "plain.png")))
-    again = cv2.imread(str(plot_map(opened.stored, tmp_path / "again.png")))
-    named = cv2.imread(str(plot_map(opened.stored, tmp_path / "named.png", opened.things(least_confidence=0.0))))
+    opened = furnished_map()
+    plain = cv2.imread(str(plot_map(opened, tmp_path / "plain.png")))
+    again = cv2.imread(str(plot_map(opened, tmp_path / "again.png")))
+    named = cv2.imread(str(plot_map(opened, tmp_path / "named.png", opened.things(least_confidence=0.0))))
     assert (plain == again).all()
     assert 100 < (plain != named).any(axis=2).sum() < 0.05 * plain.shape[0] * plain.shape[1]
 

@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
-from query_fakes import furnished_map
+from query_fakes import asked, furnished_map
 
 from avlmaps.core.poses import FrameName
 from avlmaps.query.avlmap import AVLMap
@@ -25,8 +25,8 @@ UPS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda up: np.linalg.norm(up
 def tilted(up: Any) -> AVLMap:
     """Return the furnished map in a world where up is another direction."""
     stored = furnished_map()
-    stored.up_in_world = np.asarray(up, np.float64) / np.linalg.norm(up)
-    return AVLMap(stored)
+    stored.data.up_in_world = np.asarray(up, np.float64) / np.linalg.norm(up)
+    return asked(stored)
 
 
 @given(UPS, st.lists(st.tuples(*[st.floats(-50.0, 50.0)] * 3), min_size=1, max_size=4))
@@ -55,7 +55,7 @@ def test_positions_poses_and_sentences_turn_together_and_sizes_stay(up: Any, pla
 @pytest.mark.parametrize("up", [(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (0.2, 0.3, 0.9)])
 def test_a_glb_stands_upright_with_y_up_and_says_so(up: tuple[float, ...], tmp_path: Path) -> None:
     avlmap = tilted(up)
-    index, size_m = avlmap.stored.voxels.index, avlmap.space.grid.voxel_size_m
+    index, size_m = avlmap.data.voxels.index, avlmap.space.grid.voxel_size_m
     write_glb(tmp_path / "a.glb", index, size_m, avlmap.colors, avlmap.space, FrameName.LEVEL)
     read = trimesh.load_scene(tmp_path / "a.glb")
     level = avlmap.space.level(avlmap.space.centres)

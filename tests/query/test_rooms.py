@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from query_fakes import FakePixels, FakeSounds, fake_encoders, fake_map, keyframes_at, voxels_of
+from query_fakes import FakePixels, FakeSounds, asked, fake_encoders, fake_map, keyframes_at, voxels_of
 from walled_rooms import storeys_at, two_rooms, two_rooms_index
 
 from avlmaps.perception.protocols import ModelCard, RoomContents, read_room_contents
@@ -190,8 +190,8 @@ def home(
     voxels = voxels_of(np.concatenate([index, bed]), encoder.encode_words(words))
     encoders = fake_encoders(encoder, FakeSounds(), OpenViews())
     stored = fake_map(voxels, keyframes=keyframes_at(places, view), encoders=encoders)
-    stored.info.models = ("views", "pixels")
-    return AVLMap(stored, settings=settings)
+    stored.data.info.models = ("views", "pixels")
+    return asked(stored, settings=settings)
 
 
 def test_a_bed_makes_the_bedroom() -> None:
@@ -310,7 +310,7 @@ def test_an_encoder_that_was_tried_out_in_rooms_says_what_its_names_mean() -> No
 
     m = home()
     surveyed = Surveyed(("wall", "bed", "stove"))
-    m.stored.encoders = m.stored.encoders.having(pixels=surveyed)
+    m.encoders = m.encoders.having(pixels=surveyed)
     right = np.array([[4.5, 1.5, 0.4]])
     assert m.area("bedroom").factors[0].at(right)[0] < home().area("bedroom").factors[0].at(right)[0]
 
@@ -325,7 +325,7 @@ def test_a_map_of_another_pixel_encoder_lets_views_vote() -> None:
         if kind is Kind.PIXELS:
             raise MapError("built with other pixels")
 
-    m.stored.require_model = require
+    m.require_model = require
     right = np.array([[4.5, 1.5, 0.4]])
     assert m.area("bedroom").factors[0].at(right) == pytest.approx(bare.area("bedroom").factors[0].at(right), abs=0.02)
 

@@ -63,7 +63,7 @@ def test_what_opens_a_recording_on_another_machine_knows_its_device(
     folder = recorded(tmp_path / "rec")
     write_directions(folder / DIRECTIONS, TRACK)
     earlier = SimpleNamespace(sources=lambda: SimpleNamespace(device=np.array([[0.5, 0.1, 0.0, 3.0]])))
-    monkeypatch.setattr(sources, "open_stored", lambda path: earlier)
+    monkeypatch.setattr(sources, "read", lambda path: earlier)
     (opened,) = _openings(Build(recording=folder, out=tmp_path / "map", same_device=tmp_path / "earlier"))
     audio = opened().audio
     assert audio is not None and audio.directions is not None and audio.directions.known_rad == (0.5, 0.1)

@@ -37,7 +37,7 @@ def agent(service: Service) -> Agent:
 @pytest.fixture(scope="module")
 def calls(room: Path, walk: Path) -> dict[str, dict[str, Any]]:
     photo = sorted((walk / "rgb").iterdir())[5].read_bytes()
-    camera = AVLMap.open(room).stored.keyframes.world_from_camera[0][:3, 3]
+    camera = AVLMap.open(room).data.keyframes.world_from_camera[0][:3, 3]
     return {
         "describe_map": {}, "list_things": {"least": 0.2}, "list_sounds": {}, "list_rooms": {},
         "ask": {"sentence": "the red thing"}, "locate_photo": {"photo": base64.b64encode(photo).decode()},
@@ -82,7 +82,7 @@ def test_answers_are_those_of_the_package_in_few_digits(agent: Agent, room: Path
     goals = agent.call("ask", sentence="the red thing", top=2)["goals"]
     expected = opened.ask("the red thing", top=2).goals
     assert [goal["position"] for goal in goals] == [pytest.approx(one.position, abs=0.006) for one in expected]
-    stamps = np.asarray(opened.stored.voxels.last_seen_s)
+    stamps = np.asarray(opened.data.voxels.last_seen_s)
     seen = [place["last_seen_s"] for place in agent.call("last_seen", thing="red thing")["places"]]
     assert seen and stamps.min() - 0.01 <= min(seen) and max(seen) <= stamps.max() + 0.01
     near = agent.call("goal_near", **calls["goal_near"])["goals"]

@@ -31,7 +31,7 @@ def client(room: Path, serving: Callable[..., TestClient]) -> TestClient:
 @pytest.fixture
 def two_days(room: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the map be of two days: a bag moved from one to the other."""
-    info = AVLMap.open(room).stored.info
+    info = AVLMap.open(room).data.info
     itself = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
     visits = tuple(
         Visit(day=day, recording=info.recording, begin_s=0.0, end_s=1.0, shift_s=0.0, map_from_recording=itself,

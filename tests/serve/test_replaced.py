@@ -70,7 +70,7 @@ def test_an_edit_that_is_made_while_the_new_map_is_opened_counts_at_once(
     shelf.refresh(wait_s=30.0)
     monkeypatch.undo()
     new = shelf.get("home").avlmap
-    assert new.stored.info.voxel_size_m == 0.3
+    assert new.data.info.voxel_size_m == 0.3
     assert new.ask("the zorb pad").found
 
 

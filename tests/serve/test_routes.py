@@ -205,7 +205,7 @@ def test_a_place_is_described(client: TestClient, document: dict[str, Any], open
 def test_a_path_leads_over_the_floor_from_one_place_to_the_other(
     client: TestClient, document: dict[str, Any], opened: AVLMap
 ) -> None:
-    cameras = np.asarray(opened.stored.keyframes.world_from_camera)[:, :3, 3]
+    cameras = np.asarray(opened.data.keyframes.world_from_camera)[:, :3, 3]
     ends = [",".join(f"{value:.3f}" for value in cameras[k]) for k in (0, -1)]
     answer = client.get("/maps/room/path", params={"from": ends[0], "to": ends[1]}).json()
     conforms(document, "/maps/{map}/path", answer)
@@ -250,7 +250,7 @@ def test_tiles_hold_every_voxel(client: TestClient, document: dict[str, Any], op
 def test_the_clip_of_a_sound_is_the_map_s_own(client: TestClient, opened: AVLMap) -> None:
     clip = client.get("/maps/room/sounds/0/clip")
     assert clip.headers["content-type"] == "audio/flac"
-    assert clip.content == opened.stored.clip_path(0).read_bytes()
+    assert clip.content == opened.data.sounds.clips[0].read_bytes()
 
 
 def test_progress_comes_as_events_and_the_answer_last(client: TestClient) -> None:

@@ -234,7 +234,7 @@ def test_controls_have_names_and_the_page_fits_a_phone(browser, served: Served) 
 
 @pytest.mark.nightly
 def test_a_thing_is_renamed_where_it_is_clicked(browser, room: AVLMap, tmp_path: Path) -> None:
-    place = Path(shutil.copytree(room.stored.path, tmp_path / "home.avlmap"))
+    place = Path(shutil.copytree(room.path, tmp_path / "home.avlmap"))
     with contextmanager(serving)(place) as own:
         page = opened(browser, own.url)
         page.wait_for_selector("#things li", state="attached")  # the server knows the things by now
@@ -437,7 +437,7 @@ def test_a_picture_is_saved(page, tmp_path: Path) -> None:
 
 @pytest.mark.nightly
 def test_the_page_shows_what_was_edited_elsewhere_without_a_reload(browser, room: AVLMap, tmp_path: Path) -> None:
-    place = Path(shutil.copytree(room.stored.path, tmp_path / "home.avlmap"))
+    place = Path(shutil.copytree(room.path, tmp_path / "home.avlmap"))
     with contextmanager(serving)(place) as own:
         page = opened(browser, own.url)
         thing, *_ = room.things()
@@ -450,7 +450,7 @@ def test_the_page_shows_what_was_edited_elsewhere_without_a_reload(browser, room
 
 @pytest.mark.nightly
 def test_two_maps_are_seen_side_by_side_and_one_over_the_other(browser, room: AVLMap) -> None:
-    for server in serving(room.stored.path, room.stored.path):
+    for server in serving(room.path, room.path):
         page = opened(browser, server.url)
         shown = picture(page)
         half = shown.shape[1] // 2

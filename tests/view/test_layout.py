@@ -30,7 +30,7 @@ def test_the_records_are_the_maps_voxels_in_the_order_of_drawing(layout: Layout,
     np.testing.assert_allclose(level, room.space.level(room.points)[layout.order], atol=1e-6)
     np.testing.assert_array_equal(records["rgb"], room.colors[layout.order])
     seen_s = records["seen"] / 65535 * layout.duration_s
-    np.testing.assert_allclose(seen_s, room.stored.voxels.last_seen_s[layout.order], atol=layout.duration_s / 65535)
+    np.testing.assert_allclose(seen_s, room.data.voxels.last_seen_s[layout.order], atol=layout.duration_s / 65535)
 
 
 def test_heat_has_the_same_order_and_any_heat_is_seen(layout: Layout, room: AVLMap) -> None:
@@ -95,7 +95,7 @@ def test_palettes_have_256_colours_each(labels: Labels) -> None:
 
 
 def test_the_likeliest_name_of_a_voxel_is_that_of_all_voxels(room: AVLMap) -> None:
-    namer = VoxelNamer(room.stored)
+    namer = VoxelNamer(room)
     number, confidence = namer.best()
     for row in range(0, len(number), 997):
         named = namer.likeliest(row)
@@ -107,7 +107,7 @@ def test_the_likeliest_name_of_a_voxel_is_that_of_all_voxels(room: AVLMap) -> No
 
 
 def test_a_keyframe_saw_what_stood_open_before_it_and_nothing_behind_a_wall(room: AVLMap) -> None:
-    stored = room.stored
+    stored = room.data
     number = len(stored.keyframes) // 2
     pose = np.asarray(stored.keyframes.world_from_camera[number])
     start, ahead = pose[:3, 3], pose[:3, 2]
@@ -115,10 +115,10 @@ def test_a_keyframe_saw_what_stood_open_before_it_and_nothing_behind_a_wall(room
     cells = np.floor(along / room.space.grid.voxel_size_m).astype(int)
     first = cells[np.flatnonzero(room.space.holds(cells))[0]]
     row = int(np.flatnonzero((np.asarray(room.space.index) == first).all(axis=1))[0])
-    assert number in keyframes_that_saw(room.stored, room.space, row)
+    assert number in keyframes_that_saw(room, room.space, row)
     behind = int(np.argmin((room.points - start) @ ahead))
     assert ((room.points[behind] - start) @ ahead) < 0
-    assert number not in keyframes_that_saw(room.stored, room.space, behind)
+    assert number not in keyframes_that_saw(room, room.space, behind)
 
 
 def test_a_space_holds_its_own_cells_and_no_others(room: AVLMap) -> None:

@@ -58,12 +58,12 @@ def test_the_file_holds_the_map_and_the_heat_of_each_question(page: str, room: A
     assert heat is not None
     np.testing.assert_array_equal(unpacked(first["heat"]), np.frombuffer(as_bytes(heat.shown[layout.order]), np.uint8))
     assert base64.b64decode(told["clips"][0][0])[:4] == b"fLaC"
-    assert len(told["pictures"][0]) == len(room.stored.keyframes)
+    assert len(told["pictures"][0]) == len(room.data.keyframes)
 
 
 def test_a_text_cannot_end_the_script_or_stand_for_another_part(room: AVLMap, tmp_path: Path) -> None:
     sentence = "the red thing"
-    hostile = AVLMap(room.stored)
+    hostile = AVLMap(room.data, room.encoders, path=room.path)
     layout = MapOnPage(hostile)
     assert layout.layout.avlmap is hostile
     out = tmp_path / "{{script}}<script>.html"

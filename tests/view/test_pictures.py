@@ -41,7 +41,7 @@ def test_the_guide_is_clicked_through(browser, room: AVLMap, tmp_path: Path) -> 
     avlmap = AVLMap.open(given) if given else room
     things = avlmap.things()
     wanted = next((one.name for one in things if one.name in ("sofa", "bed")), things[0].name)
-    for server in serving(avlmap.stored.path):
+    for server in serving(avlmap.path):
         page = opened(browser, server.url, 1280, 800)
         shoot(page, folder / "view-map.png")
         ask(page, f"the {wanted}")

@@ -82,7 +82,7 @@ def test_what_is_not_there_is_not_found(call: Call, path: str) -> None:
 
 @pytest.mark.nightly
 def test_memory_stays_flat_over_many_questions(room: AVLMap) -> None:
-    page = MapOnPage(AVLMap(room.stored))
+    page = MapOnPage(AVLMap(room))
     words = ["the red thing", "the blue thing near the red thing", "the sound of rain", "how many red things are there"]
     for sentence in words:
         page.heat_of(page.avlmap.ask(sentence))

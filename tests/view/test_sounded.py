@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from test_browser import browser, opened  # noqa: F401 - a fixture
 
-from avlmaps.maps.store.folder import write
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.view.labels import SHARES, drawn_sources
@@ -19,7 +18,7 @@ from helpers.viewing import Served, serving
 @pytest.fixture(scope="session")
 def sounded(room: AVLMap, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The small map, with evidence that its sounds came from near one voxel."""
-    stored = open_stored(room.stored.path)
+    stored = read(room.path)
     place = np.asarray(room.points, np.float32)[::3]
     away = np.linalg.norm(place[:, :2] - place[len(place) // 2, :2], axis=1)
     heard = np.tile(-((away / 0.4) ** 2), (len(stored.sounds), 1)).astype(np.float16)
@@ -28,7 +27,7 @@ def sounded(room: AVLMap, tmp_path_factory: pytest.TempPathFactory) -> Path:
         np.zeros(len(heard), np.uint8), np.array([4], np.int64),
     )  # fmt: skip
     path = tmp_path_factory.mktemp("sounded") / "room.avlmap"
-    write(path, replace(stored.data, sources=evidence))
+    write(path, replace(stored, sources=evidence))
     return path
 
 

@@ -25,7 +25,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.maps.build import build_map
 from avlmaps.maps.keyframes.choose import KeyframeSettings
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.reader import StoredMap
+from avlmaps.maps.store.map_data import MapData
 from avlmaps.perception.embedded.pixels import LARGEST_LOG_AREA, SMALLEST_LOG_AREA, EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, InstanceNotes, Notes
 from avlmaps.perception.models.settings import model_settings, using_models
@@ -96,9 +96,9 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
         record_scene(scene, recording, settings, seed)
     path = options.work / f"{seed}-{sensor}-{options.name}.avlmap"
     asked = AVLMap(_map_of(open_recording(recording), path, options.model.name))
-    encoder = asked.stored.encoders.pixels
+    encoder = asked.encoders.pixels
     assert isinstance(encoder, EmbeddedPixels)
-    things, feature, space = read_truth(recording).objects, asked.stored.voxels.feature, asked.space
+    things, feature, space = read_truth(recording).objects, asked.data.voxels.feature, asked.space
     rivals = ClosestWords.of(feature, encoder, encoder.vocabulary)
     voxels = FeatureVoxels(space, feature, encoder, rivals, ObjectSettings(least_confidence=0.0))
     for name in encoder.vocabulary:
@@ -117,7 +117,7 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
         yield Pieces(name, found.mean_probability[large].astype(np.float32), area[large], share[large] >= 0.5)
 
 
-def _map_of(recording: Recording, path: Path, model: str) -> StoredMap:
+def _map_of(recording: Recording, path: Path, model: str) -> MapData:
     """Return the map of a recording by the weights as they are now; one that is there already is not made again."""
     eyes = f"trained@{model}"
     chosen = profile("trained").choosing({Kind.PIXELS: eyes, Kind.VIEWS: eyes})

@@ -31,7 +31,7 @@ def naming_counts(homes: Sequence[str], work: Path) -> tuple[tuple[str, ...], Fl
     counts = np.zeros((0, 0))
     for job in scene_jobs(settings, settings.recorded, settings.scenes, work):
         place = Workplace(job, open_scene)
-        namer = VoxelNamer(place.avlmap.stored)
+        namer = VoxelNamer(place.avlmap)
         if not names:
             names, counts = namer.names, np.zeros((len(namer.names), len(namer.names)))
         row_of = {name: number for number, name in enumerate(names)}

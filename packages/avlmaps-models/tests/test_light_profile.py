@@ -11,7 +11,7 @@ from avlmaps.cli import main
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.registry import forget_loaded
 from avlmaps.maps.keyframes.choose import select_keyframes
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame
@@ -70,12 +70,12 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def test_the_map_names_its_models_and_has_features_of_keyframes_alone(built: Path, walk: Path, answer) -> None:
     told = answer("info", built, "--verify")
     assert told["profile"] == "light"
-    models = open_stored(built).info.models
+    models = read(built).info.models
     assert {kind: models[kind].backend for kind in ("pixels", "views", "sounds")} == dict.fromkeys(
         ("pixels", "views", "sounds"), "light@avlmaps/light-1"
     )
     assert models["pixels"].id == "avlmaps/light-1" and models["pixels"].licence == "MIT"
-    stored, chosen = open_stored(built), select_keyframes(open_recording(walk))
+    stored, chosen = read(built), select_keyframes(open_recording(walk))
     assert told["frames"] == 10 and stored.keyframes.view.shape == (len(chosen), 8)
     assert 0 < np.asarray(stored.voxels.feature).any(axis=1).mean() <= 1.0
 

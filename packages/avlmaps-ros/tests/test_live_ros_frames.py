@@ -382,7 +382,7 @@ def test_a_robot_is_mapped_and_what_never_arrived_is_told(tmp_path: Path) -> Non
     assert not status.dropped
     assert any("note: 3 of about 18 frames never arrived" in said for said in told)
     assert any("Mapping from ROS 2: rgb /rgb, depth /depth" in said for said in told)
-    assert live.map.stored.info.counts.voxels > 100
+    assert live.map.data.info.counts.voxels > 100
 
 
 def test_a_live_map_hears_when_its_coding_is_known_after_its_sound(tmp_path: Path) -> None:

@@ -180,11 +180,11 @@ def build(verb: "Build") -> dict[str, Any]:
         if pool is not None and verb.more:
             from avlmaps.days.together import build_together
 
-            stored = build_together(
+            avlmap = build_together(
                 openings, verb.out, used, pool, resolved, cache=cache, allow=verb.allow, overwrite=verb.overwrite
             )
         else:
-            stored = build_map(
+            data = build_map(
                 recording,
                 verb.out,
                 used,
@@ -195,19 +195,20 @@ def build(verb: "Build") -> dict[str, Any]:
                 resume=not verb.fresh,
                 overwrite=verb.overwrite,
             )
+            avlmap = AVLMap(data, path=user_path(verb.out))
     answer: dict[str, Any] = {}
     if poses is not None:
-        from avlmaps.maps.corrected import correct_stored
+        from avlmaps.maps.corrected import correct_map
 
-        stored, done = correct_stored(stored, *poses, recording)
-        answer["corrected"] = asdict(done)
+        answer["corrected"] = asdict(correct_map(avlmap.path, *poses, recording))
+        avlmap = AVLMap.open(avlmap.path)
     if verb.close_loops:
         from avlmaps.days.loops import close_loops
 
-        stored, done, found = close_loops(stored, recording=recording)
+        done, found = close_loops(avlmap, recording=recording)
         answer["corrected"] = {**asdict(done), "loops": found.report()}
-    stored = with_findings(AVLMap(stored)).stored
-    return {**describe_map(stored), **answer, "elapsed_s": round(perf_counter() - begin, 3)}
+        avlmap = AVLMap.open(avlmap.path)
+    return {**describe_map(with_findings(avlmap)), **answer, "elapsed_s": round(perf_counter() - begin, 3)}
 
 
 def _openings(verb: "Build") -> "list[Callable[[], Recording]]":

@@ -13,7 +13,6 @@ from avlmaps.cli.verb import MapVerb, ModelVerb
 from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
-    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.query.avlmap import AVLMap
 
 
@@ -99,32 +98,31 @@ class Merge(ModelVerb):
 def merge(verb: Merge) -> dict[str, Any]:
     """Merge two maps and return by what the place was found, and what changed."""
     from avlmaps.days.merge import merge_maps
-    from avlmaps.maps.store.reader import open_stored
     from avlmaps.query.avlmap import AVLMap, with_findings
 
     begin_s = perf_counter()
     made = merge_maps(
-        open_stored(verb.map), open_stored(verb.other), verb.out, day=verb.day or "",
+        AVLMap.open(verb.map), AVLMap.open(verb.other), verb.out, day=verb.day or "",
         first_day=verb.first_day or "",
         overwrite=verb.overwrite,
     )  # fmt: skip
-    made = with_findings(AVLMap(made)).stored
+    made = with_findings(made)
     return {**merged_answer(made), "elapsed_s": round(perf_counter() - begin_s, 3)}
 
 
-def merged_answer(made: "StoredMap") -> dict[str, Any]:
+def merged_answer(made: "AVLMap") -> dict[str, Any]:
     """Return what is known of a merged map's last day."""
     from avlmaps.days.merge import NO_SOURCES
     from avlmaps.query.changes import Days, changes_answer
 
     days = Days.of(made)
-    visit = made.info.visits[-1]
-    notes = [notice for notice in made.info.notices if notice.startswith(NO_SOURCES)]
+    visit = made.data.info.visits[-1]
+    notes = [notice for notice in made.data.info.notices if notice.startswith(NO_SOURCES)]
     return {
         **({"notes": notes} if notes else {}),
         "path": str(made.path),
-        "voxels": made.info.counts.voxels,
-        "keyframes": made.info.counts.keyframes,
+        "voxels": made.data.info.counts.voxels,
+        "keyframes": made.data.info.counts.keyframes,
         "map_from_recording": [list(row) for row in visit.map_from_recording],
         "checks": visit.checks,
         **{key: value for key, value in changes_answer(days, str(made.path), days.last - 1).items() if key != "map"},

@@ -157,7 +157,7 @@ def _write_voxels(verb: Export, opened: "AVLMap", kind: str, frame: FrameName) -
     if kind == ".ply":
         write_ply(verb.out, opened.points, colors, columns, opened.space, frame)
     else:
-        write_glb(verb.out, opened.stored.voxels.index, opened.space.grid.voxel_size_m, colors, opened.space, frame)
+        write_glb(verb.out, opened.data.voxels.index, opened.space.grid.voxel_size_m, colors, opened.space, frame)
 
 
 def _write_layers(verb: Export, opened: "AVLMap", kind: str, frame: FrameName) -> None:

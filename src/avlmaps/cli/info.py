@@ -16,7 +16,7 @@ from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
-    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.recordings.corrections import Corrections
     from avlmaps.recordings.types import Recording
 
@@ -123,7 +123,7 @@ def _consistency_lines(found: dict[str, Any]) -> list[str]:
 
 def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]:
     from avlmaps.maps.store.folder import damaged_files
-    from avlmaps.maps.store.reader import open_stored
+    from avlmaps.query.avlmap import AVLMap
 
     if verify and (faults := damaged_files(path)):
         for fault in faults:
@@ -131,34 +131,32 @@ def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]
         raise MapError(
             f"{len(faults)} of the files of {path} are not what was written; restore it from a copy, or build it again."
         )
-    stored = open_stored(path)
-    answer = describe_map(stored)
+    avlmap = AVLMap.open(path)
+    answer = describe_map(avlmap)
     if plot is not None:
-        answer["plot"] = str(plot_named(stored, plot))
+        answer["plot"] = str(plot_named(avlmap, plot))
     return answer
 
 
-def plot_named(stored: "StoredMap", plot: Path) -> Path:
+def plot_named(avlmap: "AVLMap", plot: Path) -> Path:
     """Draw a map with the names of its things and rooms, as far as its models are here."""
-    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.plots import plot_map
 
-    opened, models = AVLMap(stored), stored.info.models
+    models = avlmap.data.info.models
     things, rooms = [], []
     try:
-        things = opened.things() if "pixels" in models else []
-        rooms = opened.rooms() if "views" in models else []
+        things = avlmap.things() if "pixels" in models else []
+        rooms = avlmap.rooms() if "views" in models else []
     except AvlmapsError as error:  # a map can be looked at without the models that made it
         say(f"note: the picture has no names: {error}")
-    return plot_map(stored, plot, things, rooms)
+    return plot_map(avlmap, plot, things, rooms)
 
 
-def describe_map(stored: "StoredMap") -> dict[str, Any]:
+def describe_map(avlmap: "AVLMap") -> dict[str, Any]:
     """Describe a map: its counts and models, its sounds with names, the rules that it was built by."""
-    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.selection import map_answer
 
-    return map_answer(AVLMap(stored), note=lambda error: say(f"note: the sounds have no names here. {error}"))
+    return map_answer(avlmap, note=lambda error: say(f"note: the sounds have no names here. {error}"))
 
 
 def _describe_recording(recording: "Recording") -> dict[str, Any]:

@@ -15,7 +15,7 @@ from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
     from avlmaps.live.live_map import LiveMap
-    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.recordings.microphones import Microphones
 
 
@@ -131,12 +131,12 @@ def _live(verb: Live) -> dict[str, Any]:
             except KeyboardInterrupt:
                 say("note: Stopped by Ctrl-C; the map is finished.")
             end_drive(live)
-    status, stored = live.status(), live.map.stored
+    status, made = live.status(), live.map
     return {
-        **describe_map(stored),
+        **describe_map(made),
         "path": str(verb.out),
         "live": {**status.to_dict(), "summary": str(status)},
-        **({} if first is None else {"into": _joined(first, stored, verb.day or "")}),
+        **({} if first is None else {"into": _joined(first, made, verb.day or "")}),
         "elapsed_s": round(perf_counter() - begin_s, 3),
     }
 
@@ -163,7 +163,6 @@ def _recording(verb: Live) -> _Source:
     from avlmaps.live.growing_folder import is_being_written
     from avlmaps.live.replay import follow, replay
     from avlmaps.maps.located import take_device
-    from avlmaps.maps.store.reader import open_stored
     from avlmaps.recordings.layout import UNFINISHED, decode_description
     from avlmaps.recordings.open import open_recording
 
@@ -195,7 +194,7 @@ def _recording(verb: Live) -> _Source:
         microphones=microphones,
     )
     if verb.same_device is not None:
-        take_device(recording, open_stored(verb.same_device))
+        take_device(recording, verb.same_device)
     for notice in recording.notices:
         say(f"note: {notice}")
     rate = None if verb.as_fast_as_possible else verb.rate
@@ -228,9 +227,9 @@ def _robot(verb: Live) -> _Source:
     return _Source((0.0, 0.0, 1.0), 0.0, verb.microphones, lambda live, over: source.play(live, verb.give_up_s, over))
 
 
-def _days_before(verb: Live) -> "StoredMap | None":
+def _days_before(verb: Live) -> "AVLMap | None":
     """Return the map that the drive is to update; None where it updates none."""
-    from avlmaps.maps.store.reader import open_stored
+    from avlmaps.query.avlmap import AVLMap
 
     if verb.into is None:
         if verb.day is not None:
@@ -238,10 +237,10 @@ def _days_before(verb: Live) -> "StoredMap | None":
         return None
     if verb.into.resolve() == verb.out.resolve():
         raise UsageError("--into is the map of the days before, and --out that of this drive; name two folders.")
-    return open_stored(verb.into)
+    return AVLMap.open(verb.into)
 
 
-def _joined(first: "StoredMap", today: "StoredMap", day: str) -> dict[str, Any]:
+def _joined(first: "AVLMap", today: "AVLMap", day: str) -> dict[str, Any]:
     from avlmaps.cli.days import merged_answer
     from avlmaps.days.merge import merge_maps
 

@@ -20,7 +20,7 @@ _LOOK_S = 0.1
 
 def live_source(live: LiveMap) -> MapSource:
     """Return a live map as the server takes it: its last snapshot; none before the first."""
-    return MapSource(live.path, lambda: live.generation or None, lambda: live.map.stored, tells=False)
+    return MapSource(live.path, lambda: live.generation or None, lambda: live.map, tells=False)
 
 
 class LiveFeed:

@@ -123,7 +123,7 @@ class Query(MapVerb):
 
         files, asked = Files(None if self.intrinsics is None else numbers_of(self.intrinsics)), self._asked()
         if avlmap.settings != (settings := self._settings()):
-            avlmap = type(avlmap)(avlmap.stored, settings=settings)
+            avlmap = type(avlmap)(avlmap.data, avlmap.encoders, path=avlmap.path, settings=settings)
         # A question about one thing runs no loops that are compiled, and loads nothing to announce them.
         quick = self.plot is None and thing_alone(asked, avlmap) is not None
         try:
@@ -181,7 +181,7 @@ class Locate(MapVerb):
         found = avlmap.locate(rgb, given, None if given is not None else focal_35mm_of(self.image))
         if found.world_from_camera is not None and given is not None and found.camera != given:
             say(f"note: the focal length {given.fx:g} does not fit the photo; {found.camera.fx:.1f} was used.")
-        return shown_in(locate_answer(found, avlmap.stored.info.doubts), self.frame, avlmap)
+        return shown_in(locate_answer(found, avlmap.data.info.doubts), self.frame, avlmap)
 
     def lines(self, answer: Mapping[str, Any]) -> list[str]:
         """Lay out the pose."""

@@ -221,7 +221,7 @@ class ShellSession:
             raise UsageError("plot takes the name of a picture, such as: plot heat.png")
         file = user_path(words[0])
         if self._last is None:
-            plotted = str(plot_named(self.opened.stored, file))
+            plotted = str(plot_named(self.opened, file))
         else:
             plotted = replace(self._last, plot=file).answer(self.opened).get("plot")
             if plotted is None:
@@ -295,7 +295,7 @@ def _split(rest: str) -> list[str]:
 
 
 def _names_in(opened: "AVLMap") -> tuple[str, ...]:
-    models = opened.stored.info.models
+    models = opened.data.info.models
     things = [t.name for t in opened.things(None, _LEAST_COMPLETED)] if "pixels" in models else []
     rooms = [room.name for room in opened.rooms()] if "views" in models else []
     sounds = [event.names[0] for event in opened.sounds() if event.names]

@@ -134,7 +134,7 @@ class Rooms(MapVerb):
         from avlmaps.query.selection import MapLists
 
         require_share(self.least, "probability")
-        doubts, rooms = avlmap.stored.info.doubts, MapLists(avlmap).rooms(self.least)
+        doubts, rooms = avlmap.data.info.doubts, MapLists(avlmap).rooms(self.least)
         listed = {
             "map": str(self.map),
             "frame": _FRAME,
@@ -144,7 +144,7 @@ class Rooms(MapVerb):
         answer = shown_in(listed, self.frame, avlmap)
         if self.plot is not None:
             held = avlmap.rooms(self.least) if rooms else []
-            answer["plot"] = str(plot_map(avlmap.stored, self.plot, rooms=held))
+            answer["plot"] = str(plot_map(avlmap, self.plot, rooms=held))
         return answer
 
     def lines(self, answer: "Mapping[str, Any]") -> list[str]:

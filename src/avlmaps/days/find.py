@@ -22,9 +22,9 @@ from avlmaps.core.timeline import is_in_future
 from avlmaps.days.evidence import THROUGH_VIEWS, DayViews
 from avlmaps.days.surfaces import Occupied, refine
 from avlmaps.maps.store.manifest import RecordingInfo, Visit
-from avlmaps.maps.store.reader import StoredMap
 from avlmaps.perception.protocols import LocalFeatures
-from avlmaps.query.locate import LocateSettings, locate_features
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.locate import LocatableMap, LocateSettings, locate_features
 from avlmaps.recordings.types import Recording
 
 MOST_TRIED = 60  # keyframes of the other map that are located, spread over its walk
@@ -68,23 +68,23 @@ class Votes:
         return len(self.map_from_other)
 
 
-def require_alike(stored: StoredMap, other: StoredMap) -> None:
+def require_alike(stored: AVLMap, other: AVLMap) -> None:
     """Raise ``MapError`` where two maps cannot be one: other voxels or models, or nothing to find the place by."""
     for one in (stored, other):
-        if not len(one.keyframes):
+        if not len(one.data.keyframes):
             raise MapError(f"{one.path} has no keyframes, by which the place is found; build it from a recording.")
-        if len(one.keyframes.clear_mm) != len(one.keyframes):
+        if len(one.data.keyframes.clear_mm) != len(one.data.keyframes):
             raise MapError(
-                f"{one.path} does not know where its {len(one.keyframes)} keyframes saw freely (an older avlmaps built "
-                "it, or with every depth as it is), so that nobody would know what is gone; build it again."
+                f"{one.path} does not know where its {len(one.data.keyframes)} keyframes saw freely (an older avlmaps "
+                "built it, or with every depth as it is), so that nobody would know what is gone; build it again."
             )
-    if not np.isclose(stored.grid.voxel_size_m, other.grid.voxel_size_m, rtol=1e-9):
+    if not np.isclose(stored.data.grid.voxel_size_m, other.data.grid.voxel_size_m, rtol=1e-9):
         raise MapError(
-            f"{stored.path} has voxels of {stored.grid.voxel_size_m:g} m and {other.path} of "
-            f"{other.grid.voxel_size_m:g} m; build one of them again with the other's."
+            f"{stored.path} has voxels of {stored.data.grid.voxel_size_m:g} m and {other.path} of "
+            f"{other.data.grid.voxel_size_m:g} m; build one of them again with the other's."
         )
     for kind in Kind:
-        one, two = (each.info.models.get(kind.value) for each in (stored, other))
+        one, two = (each.data.info.models.get(kind.value) for each in (stored, other))
         said = [
             ("none" if model is None else f"{model.id} ({model.checksum[:8] or 'unknown'})") for model in (one, two)
         ]
@@ -93,7 +93,7 @@ def require_alike(stored: StoredMap, other: StoredMap) -> None:
                 f"{stored.path} was built with {said[0]} for {kind.value} and {other.path} with {said[1]}; build one "
                 "of them again with the other's profile."
             )
-    if missing := [kind.value for kind in NEEDED if kind.value not in stored.info.models]:
+    if missing := [kind.value for kind in NEEDED if kind.value not in stored.data.info.models]:
         raise MapError(f"{stored.path} was built without a model for {missing[0]}, by which the place is found; "
                        "build both maps with a profile that has one.")  # fmt: skip
 
@@ -105,22 +105,24 @@ def spread_out(count: int, most: int) -> Int[np.ndarray, " n"]:
     return chosen[np.argsort(turn)]
 
 
-def gather_votes(stored: StoredMap, other: StoredMap, rng: np.random.Generator) -> Votes:
+def gather_votes(stored: AVLMap, other: AVLMap, rng: np.random.Generator) -> Votes:
     """Locate keyframes of another map in this one, until enough agree."""
     for kind in NEEDED:
         stored.require_model(kind)
+    here, chosen = LocatableMap.of(stored), LocateSettings(refine_focal=False)
     votes: list[np.ndarray] = []
     cameras: list[np.ndarray] = []
     tried = 0
-    rows = spread_out(len(other.keyframes), MOST_TRIED)
+    rows = spread_out(len(other.data.keyframes), MOST_TRIED)
     for row in progress(rows.tolist(), "locating", total=len(rows), unit="keyframe"):
         tried += 1
         local, rgb = local_features(other, row), thumbnail(other, row)
-        place = stored.encoders.place.encode(rgb, local, stored.place_state)
-        found = locate_features(stored, local, place, other.rig.rgb, rng, LocateSettings(refine_focal=False))
+        place = stored.encoders.place.encode(rgb, local, stored.data.place_state)
+        found = locate_features(here, local, place, other.data.rig.rgb, rng, chosen)
         if found.world_from_camera is None:
             continue
-        there = np.asarray(other.keyframes.world_from_camera[row], np.float64) @ inverse(other.rig.rgb_from_depth)
+        depth = np.asarray(other.data.keyframes.world_from_camera[row], np.float64)
+        there = depth @ inverse(other.data.rig.rgb_from_depth)
         votes.append(found.world_from_camera @ inverse(there))
         cameras.append(there)
         if len(votes) >= ENOUGH:
@@ -131,9 +133,9 @@ def gather_votes(stored: StoredMap, other: StoredMap, rng: np.random.Generator) 
     return Votes(np.stack(votes) if votes else none, np.stack(cameras) if cameras else none, tried)
 
 
-def local_features(stored: StoredMap, row: int) -> LocalFeatures:
+def local_features(stored: AVLMap, row: int) -> LocalFeatures:
     """Return the keypoints of a keyframe as they were found."""
-    keyframes, camera = stored.keyframes, stored.rig.rgb
+    keyframes, camera = stored.data.keyframes, stored.data.rig.rgb
     rows = slice(keyframes.offsets[row], keyframes.offsets[row + 1])
     return LocalFeatures(
         xy=np.asarray(keyframes.xy[rows]),
@@ -143,11 +145,11 @@ def local_features(stored: StoredMap, row: int) -> LocalFeatures:
     )
 
 
-def thumbnail(stored: StoredMap, row: int) -> np.ndarray:
+def thumbnail(stored: AVLMap, row: int) -> np.ndarray:
     """Return the picture of a keyframe, (h, w, 3) RGB, as small as the map stores it."""
     import cv2
 
-    code = stored.keyframes.jpeg(row)
+    code = stored.data.keyframes.jpeg(row)
     if not len(code):
         return np.zeros((1, 1, 3), np.uint8)
     picture = cv2.imdecode(code, cv2.IMREAD_COLOR)
@@ -236,7 +238,7 @@ _IDENTITY = tuple(tuple(float(value) for value in row) for row in np.eye(4))
 
 
 def find_other(
-    stored: StoredMap, other: StoredMap, known: Occupied | None = None
+    stored: AVLMap, other: AVLMap, known: Occupied | None = None
 ) -> tuple[Float[np.ndarray, "4 4"], dict[str, float]]:
     """Return where another map lies in this one, without a guess; ``known`` are this one's voxels, where they are had.
 
@@ -248,25 +250,25 @@ def find_other(
     rng = np.random.default_rng(0)
     votes = gather_votes(stored, other, rng)
     first, checks = consensus(votes, (stored.path, other.path))
-    require_upright(first, stored.up_in_world, other.up_in_world)
-    grid = stored.grid
-    points, others = (grid.centre_of(np.asarray(one.voxels.index)) for one in (stored, other))
+    require_upright(first, stored.data.up_in_world, other.data.up_in_world)
+    grid = stored.data.grid
+    points, others = (grid.centre_of(np.asarray(one.data.voxels.index)) for one in (stored, other))
     fine = first
     if checks["votes_off_m"] > REFINE_FROM * grid.voxel_size_m:
         fine, off_m = refine(points, others, first, rng)
         checks["surface_off_m"] = round(off_m, 4)
-    known = known or Occupied.of(np.asarray(stored.voxels.index), grid)
+    known = known or Occupied.of(np.asarray(stored.data.voxels.index), grid)
     checks |= _agreement(stored, other.path, apply(fine, others), known)
     return fine, checks
 
 
-def _agreement(stored: StoredMap, other: Path, points: Float[np.ndarray, "n 3"], known: Occupied) -> dict[str, float]:
+def _agreement(stored: AVLMap, other: Path, points: Float[np.ndarray, "n 3"], known: Occupied) -> dict[str, float]:
     """Return how much of the other map's surface (``points``) lies on this one's, of what this one looked at.
 
     Raises:
         NotTheSamePlaceError: too little, or too little was looked at.
     """
-    grid = stored.grid
+    grid = stored.data.grid
     on_surface = known.near(points)
     index = grid.index_of(points)
     free = np.zeros(len(index), np.int64)
@@ -284,14 +286,14 @@ def _agreement(stored: StoredMap, other: Path, points: Float[np.ndarray, "n 3"],
     return {"looked": looked, "agreement": round(share, 4)}
 
 
-def visits_of(stored: StoredMap) -> tuple[Visit, ...]:
+def visits_of(stored: AVLMap) -> tuple[Visit, ...]:
     """Return the days of a map: the one of its recording, where it was not merged."""
-    info = stored.info
+    info = stored.data.info
     if info.visits:
         return info.visits
-    stamps = np.asarray(stored.keyframes.stamp_s)
+    stamps = np.asarray(stored.data.keyframes.stamp_s)
     begin = float(stamps.min(initial=np.inf)) if len(stamps) else 0.0
-    seen = np.asarray(stored.voxels.last_seen_s)
+    seen = np.asarray(stored.data.voxels.last_seen_s)
     begin = min(begin, float(seen.min(initial=begin)))
     end = max(float(stamps.max(initial=begin)), float(seen.max(initial=begin)))
     day = day_of(clock_s(info.recording, begin))
@@ -314,13 +316,13 @@ def clock_s(recording: RecordingInfo | Recording, stamp_s: float) -> float | Non
     return at_s if at_s > _CLOCK_S and not is_in_future(at_s) else None
 
 
-def require_another_drive(stored: StoredMap, other: StoredMap, visits: Sequence[Visit]) -> None:
+def require_another_drive(stored: AVLMap, other: AVLMap, visits: Sequence[Visit]) -> None:
     """Raise ``MapError`` where the other map is of a drive that is one of the visits.
 
     Its recording says so, or, where it was read in another way or while it was driven, its keyframes: no two drives
     have the same pictures at the same stamps.
     """
-    keyframes, others = stored.keyframes, other.keyframes
+    keyframes, others = stored.data.keyframes, other.data.keyframes
     number = visit_of_stamps(visits, np.asarray(keyframes.stamp_s))
     for count, visit in enumerate(visits):
         rows = np.flatnonzero(number == count)
@@ -329,7 +331,7 @@ def require_another_drive(stored: StoredMap, other: StoredMap, visits: Sequence[
         same = len(here) >= _LEAST_COMMON and all(
             np.array_equal(keyframes.jpeg(int(rows[a])), others.jpeg(int(b))) for a, b in zip(here, there, strict=True)
         )
-        if same or visit.recording.fingerprint == other.info.recording.fingerprint:
+        if same or visit.recording.fingerprint == other.data.info.recording.fingerprint:
             raise MapError(
                 f"{other.path} is of the same drive as visit {count + 1} of {stored.path} "
                 f"({visit.recording.name}{', ' + visit.day if visit.day else ''}), and one drive counts once; "
@@ -337,9 +339,9 @@ def require_another_drive(stored: StoredMap, other: StoredMap, visits: Sequence[
             )
 
 
-def views_of(stored: StoredMap) -> list[DayViews]:
+def views_of(stored: AVLMap) -> list[DayViews]:
     """Return what the keyframes of each visit saw freely, in the map's world."""
-    keyframes, visits, out = stored.keyframes, visits_of(stored), list[DayViews]()
+    keyframes, visits, out = stored.data.keyframes, visits_of(stored), list[DayViews]()
     number = visit_of_stamps(visits, np.asarray(keyframes.stamp_s))
     for visit, one in enumerate(visits):
         own = np.flatnonzero(number == visit)

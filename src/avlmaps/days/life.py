@@ -20,7 +20,6 @@ from avlmaps.days.evidence import Day, DayVerdict, DayViews, seen_again, seen_be
 from avlmaps.days.surfaces import AROUND, Occupied, packed
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.life import Life, Stay
-from avlmaps.maps.store.reader import StoredMap
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import STRUCTURE, Thing
 from avlmaps.query.naming import VoxelNamer
@@ -280,7 +279,7 @@ _BESIDE = 2  # voxels: so near to each other two are of one thing
 
 
 def changed_things(
-    stored: StoredMap,
+    stored: AVLMap,
     loose: Bool[np.ndarray, " n"],
     through: Bool[np.ndarray, " n"],
     owned: Sequence[Int[np.ndarray, " r"]],
@@ -291,18 +290,18 @@ def changed_things(
     for a thing, or hardly looked at, those alone that rays pass through are. What lies beside a thing that changed
     itself is a part of it.
     """
-    index = np.asarray(stored.voxels.index)
+    index = np.asarray(stored.data.voxels.index)
     changed = [rows for rows in owned if loose[rows].sum() > _MOSTLY * len(rows)]
     parts_of = Occupied.of(
-        np.concatenate([np.zeros((0, 3), np.int32), *(index[rows] for rows in changed)]), stored.grid
+        np.concatenate([np.zeros((0, 3), np.int32), *(index[rows] for rows in changed)]), stored.data.grid
     )
     loose = loose.copy()
     for rows in owned:
         loose[rows] = False
-    if "pixels" not in stored.info.models or not (loose & through).any():
+    if "pixels" not in stored.data.info.models or not (loose & through).any():
         return []
-    avlmap, namer = AVLMap(stored, edits=()), VoxelNamer(stored)
-    voxel_m = stored.grid.voxel_size_m
+    avlmap, namer = AVLMap(stored.data, stored.encoders, path=stored.path, edits=()), VoxelNamer(stored)
+    voxel_m = stored.data.grid.voxel_size_m
     named = np.array([name not in (*STRUCTURE, "other") for name in namer.names])
 
     def size_m(own: Int[np.ndarray, " k"]) -> Float[np.ndarray, "3"]:
@@ -324,7 +323,7 @@ def changed_things(
                 continue
             share = np.where(named, namer.confidences(own).mean(axis=0), -1.0)
             best = int(share.argmax())
-            r, g, b = (int(value) for value in np.asarray(stored.voxels.rgb)[own].mean(axis=0).round())
+            r, g, b = (int(value) for value in np.asarray(stored.data.voxels.rgb)[own].mean(axis=0).round())
             middle = points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
             likely = round(min(float(share[best]), CONFIDENT_AT - 0.01), 3)
             found.append(

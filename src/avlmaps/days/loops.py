@@ -10,22 +10,19 @@ Newton's steps; sparse, by SciPy).
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
-from avlmaps.core.camera import Rig
 from avlmaps.core.columns import take
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import from_rotation, inverse, mean_rotation, rotation_angle_rad, rotation_to_level
 from avlmaps.core.progress import progress
 from avlmaps.days.find import NEEDED, local_features, spread_out
-from avlmaps.maps.corrected import Corrected, correct_stored, require_submaps
-from avlmaps.maps.store.reader import StoredMap
-from avlmaps.maps.types import Keyframes
-from avlmaps.perception.encoders import Encoders
-from avlmaps.query.locate import LocateSettings, locate_features
+from avlmaps.maps.corrected import Corrected, correct_map, require_submaps
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.locate import LocatableMap, LocateSettings, locate_features
 from avlmaps.recordings.types import Recording
 
 MOST_TRIED = 150  # keyframes that are looked for among earlier ones, spread over the drive
@@ -178,34 +175,23 @@ class Loops:
         return {name: round(getattr(self, name), 4) for name in names}
 
 
-@dataclass(frozen=True, slots=True)
-class _Earlier:
-    """One keyframe as a map to be located in."""
-
-    keyframes: Keyframes
-    place_state: dict[str, np.ndarray]
-    encoders: Encoders
-    rig: Rig
-
-
-def close_loops(stored: StoredMap, recording: Recording | None = None) -> tuple[StoredMap, Corrected, Loops]:
+def close_loops(stored: AVLMap, recording: Recording | None = None) -> tuple[Corrected, Loops]:
     """Find where the drive came back, correct the poses by it, and make the map follow them, in its folder.
 
     Raises:
         MapError: the map has no submaps, or no models to find places by; too few closures were found, or they
             contradict each other. It stays as it was.
     """
-    require_submaps(stored)  # before the long search
+    require_submaps(stored.path, stored.data)  # before the long search
     found = find_loops(stored)
-    moved, done = correct_stored(stored, found.stamps_s, found.poses, recording)
-    return moved, done, found
+    return correct_map(stored.path, found.stamps_s, found.poses, recording), found
 
 
-def find_loops(stored: StoredMap) -> Loops:
+def find_loops(stored: AVLMap) -> Loops:
     """Return corrected poses of the keyframes of a map; see ``close_loops``. The map is not touched."""
     for kind in NEEDED:
         stored.require_model(kind)
-    keyframes = stored.keyframes
+    keyframes = stored.data.keyframes
     poses = np.asarray(keyframes.world_from_camera, np.float64)
     closures, tried = _closures(stored, poses)
     if len(closures) < LEAST_CLOSURES:
@@ -220,7 +206,7 @@ def find_loops(stored: StoredMap) -> Loops:
     if 0 < agree.sum() < len(agree):
         found = optimise(poses, _joined(odometry, closures.only(agree)))
         agree = _agreeing(closures, found)
-    found = _upright(found, poses, stored.up_in_world)
+    found = _upright(found, poses, stored.data.up_in_world)
     strain = odometry.errors(found) / np.repeat(np.stack([odometry.sigma_m, odometry.sigma_rad], axis=1), 3, axis=1)
     bent = float(np.sqrt(np.mean(strain**2))) if len(odometry) else 0.0
     before, after = (np.linalg.norm(closures.errors(of)[:, :3], axis=1) for of in (poses, found))
@@ -245,9 +231,9 @@ def find_loops(stored: StoredMap) -> Loops:
     )  # fmt: skip
 
 
-def _closures(stored: StoredMap, poses: Float[np.ndarray, "k 4 4"]) -> tuple[Edges, int]:
+def _closures(stored: AVLMap, poses: Float[np.ndarray, "k 4 4"]) -> tuple[Edges, int]:
     """Return what was seen again, and how many keyframes were looked for."""
-    keyframes, rng = stored.keyframes, np.random.default_rng(0)
+    keyframes, rng, every = stored.data.keyframes, np.random.default_rng(0), LocatableMap.of(stored)
     stamps_s, place = np.asarray(keyframes.stamp_s), np.asarray(keyframes.place)
     way_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1))])
     first: list[int] = []
@@ -263,14 +249,14 @@ def _closures(stored: StoredMap, poses: Float[np.ndarray, "k 4 4"]) -> tuple[Edg
         alike = earlier[np.argsort(-(place[earlier] @ place[row]), kind="stable")[:CANDIDATES]]
         local = local_features(stored, row)
         for other in alike.tolist():
-            there = _Earlier(keyframes.take(np.array([other])), stored.place_state, stored.encoders, stored.rig)
+            there = replace(every, keyframes=keyframes.take(np.array([other])))
             chosen = LocateSettings(refine_focal=False)
-            located = locate_features(there, local, place[row], stored.rig.rgb, rng, chosen)
+            located = locate_features(there, local, place[row], stored.data.rig.rgb, rng, chosen)
             found = located.world_from_camera
             if found is not None and located.score >= LEAST_SCORE:
                 first.append(other)
                 second.append(row)
-                measured.append(inverse(poses[other]) @ found @ stored.rig.rgb_from_depth)
+                measured.append(inverse(poses[other]) @ found @ stored.data.rig.rgb_from_depth)
                 break
     count = len(first)
     edges = Edges(

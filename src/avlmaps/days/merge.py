@@ -38,12 +38,11 @@ from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.sources.carried import carry_evidence
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.edits import Edit, World, carried_edits, read_edits, write_edits
-from avlmaps.maps.store.folder import write
+from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.life import PEOPLE, Life
 from avlmaps.maps.store.lock import EDITING, lock_folder
 from avlmaps.maps.store.manifest import Counts, MapBounds, MapInfo, RecordingInfo, RigInfo, Timings, Visit
 from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Voxels
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Thing
@@ -58,19 +57,24 @@ _NEAR_M, _NEAR_RAD = 0.15, math.radians(10.0)  # a keyframe of the new day takes
 
 def default_things(avlmap: AVLMap) -> Sequence[Thing]:
     """Return the things of a map as its pixel encoder names them."""
-    return avlmap.things(least_confidence=_LEAST_CONFIDENCE) if "pixels" in avlmap.stored.info.models else []
+    return avlmap.things(least_confidence=_LEAST_CONFIDENCE) if "pixels" in avlmap.data.info.models else []
+
+
+def unedited(avlmap: AVLMap) -> AVLMap:
+    """Return a map as its encoders see it, without what people corrected."""
+    return AVLMap(avlmap.data, avlmap.encoders, path=avlmap.path, settings=avlmap.settings, edits=())
 
 
 def merge_maps(
-    stored: StoredMap,
-    other: StoredMap,
+    stored: AVLMap,
+    other: AVLMap,
     out: Path | str,
     *,
     day: str = "",
     first_day: str = "",
     overwrite: bool = False,
     things_of: ThingsOf | None = None,
-) -> StoredMap:
+) -> AVLMap:
     """Write the map of all days: the other map is found in this one, laid on it, and changes what it looked at.
 
     What the other day looked through is no surface any more, what it has of surface is; where it did not look, the map
@@ -92,32 +96,30 @@ def merge_maps(
     """
     begin_s, out = perf_counter(), user_path(out)
     require_place(out, overwrite)
-    if other.info.visits:
+    if other.data.info.visits:
         raise MapError(
-            f"{other.path} is a map of {len(other.info.visits)} days; merge its recordings' maps one after the other "
-            f"into {stored.path}, the earliest first."
+            f"{other.path} is a map of {len(other.data.info.visits)} days; merge its recordings' maps one after the "
+            f"other into {stored.path}, the earliest first."
         )
     visits = _dated(visits_of(stored), first_day, stored)
     require_another_drive(stored, other, visits)
     visit = _visit(other, visits[-1], day)  # before the search, which takes long
-    known = Occupied.of(np.asarray(stored.voxels.index), stored.grid)
+    known = Occupied.of(np.asarray(stored.data.voxels.index), stored.data.grid)
     (moved, checks), number = find_other(stored, other, known), len(visits)
     visit = msgspec.structs.replace(visit, map_from_recording=_rows(moved), checks=checks)
     visits = (*visits, visit)
     listed = things_of or default_things
-    grid = stored.grid
+    grid = stored.data.grid
     before = views_of(stored)
-    laid, *_ = resampled(np.asarray(other.voxels.index), grid, moved)
+    laid, *_ = resampled(np.asarray(other.data.voxels.index), grid, moved)
     now = Day(
         views_of(other)[0].moved(moved),
-        Occupied.of(np.asarray(other.voxels.index), grid),
+        Occupied.of(np.asarray(other.data.voxels.index), grid),
         inverse(moved),
         Occupied.of(laid, grid),
     )
-    life = stored.life() or lives.begun(
-        [_seen(one, stored, np.eye(4), 0.0) for one in listed(AVLMap(stored, edits=()))]
-    )
-    things = list(listed(AVLMap(other, edits=())))
+    life = stored.data.life or lives.begun([_seen(one, stored, np.eye(4), 0.0) for one in listed(unedited(stored))])
+    things = list(listed(unedited(other)))
     if things_of is None:  # a list of names misses small things, whose surface changes nevertheless
         life = _with_vanished(life, stored, known, now, visits)
         things += _unnamed_new(other, things, before, known, moved)
@@ -130,26 +132,26 @@ def merge_maps(
     keyframes = joined_keyframes(stored, other, moved, visit.shift_s)
     sounds = joined_sounds(stored, other, moved, visit.shift_s)
     sources, why_not = joined_sources(stored, other, moved, voxels, keyframes)
-    data = MapData(stored.info, voxels, keyframes, sounds, stored.place_state, sources, life=life)
+    data = MapData(stored.data.info, voxels, keyframes, sounds, stored.data.place_state, sources, life=life)
     info = _manifest(stored, other, data, visits, perf_counter() - begin_s, why_not)
     with lock_folder(out), lock_folder(out, EDITING):
         edits = _edits(stored, other, read_edits(out), keyframes, moved)
         write(out, replace(data, info=info))
         if edits:
             write_edits(out, edits)
-    return replace(open_stored(out), encoders=stored.encoders)
+    return AVLMap(read(out), stored.encoders, path=out)
 
 
 def _edits(
-    stored: StoredMap, other: StoredMap, replaced: Sequence[Edit], onto: Keyframes, moved: Float[np.ndarray, "4 4"]
+    stored: AVLMap, other: AVLMap, replaced: Sequence[Edit], onto: Keyframes, moved: Float[np.ndarray, "4 4"]
 ) -> tuple[Edit, ...]:
     """Return what people corrected in both maps, in the world of this one, in the order of time.
 
     What they corrected in the map that is replaced stays as well.
     """
-    world = World.of(stored.info)
-    own = carried_edits(read_edits(stored.path), stored.keyframes, world, world, onto, np.eye(4))
-    others = carried_edits(read_edits(other.path), other.keyframes, World.of(other.info), world, onto, moved)
+    world = World.of(stored.data.info)
+    own = carried_edits(read_edits(stored.path), stored.data.keyframes, world, world, onto, np.eye(4))
+    others = carried_edits(read_edits(other.path), other.data.keyframes, World.of(other.data.info), world, onto, moved)
     known = {edit.id: edit for edit in (*replaced, *others, *own)}
     return tuple(sorted(known.values(), key=lambda edit: edit.made))
 
@@ -159,7 +161,7 @@ def merged_key(first: str, other: str) -> str:
     return key_of("days", first, other, _REVISION)
 
 
-def _dated(visits: tuple[Visit, ...], first_day: str, stored: StoredMap) -> tuple[Visit, ...]:
+def _dated(visits: tuple[Visit, ...], first_day: str, stored: AVLMap) -> tuple[Visit, ...]:
     if not first_day:
         return visits
     if len(visits) > 1:
@@ -180,7 +182,7 @@ def _date(said: str) -> date:
     return day
 
 
-def _visit(other: StoredMap, last: Visit, day: str) -> Visit:
+def _visit(other: AVLMap, last: Visit, day: str) -> Visit:
     (own,) = visits_of(other)
     own_s, last_s = clock_s(own.recording, own.begin_s), clock_s(last.recording, last.begin_s - last.shift_s)
     if not day and last.day and own_s is not None and last_s is not None and own_s + own.end_s - own.begin_s < last_s:
@@ -210,23 +212,23 @@ def _when(stamp_s: float) -> str:
     return datetime.fromtimestamp(stamp_s, UTC).strftime("%Y-%m-%d %H:%M UTC")
 
 
-def _seen(thing: Thing, stored: StoredMap, map_from_own: Float[np.ndarray, "4 4"], shift_s: float) -> lives.SeenThing:
-    index = np.asarray(stored.voxels.index)[thing.rows]
+def _seen(thing: Thing, stored: AVLMap, map_from_own: Float[np.ndarray, "4 4"], shift_s: float) -> lives.SeenThing:
+    index = np.asarray(stored.data.voxels.index)[thing.rows]
     if not np.array_equal(map_from_own, np.eye(4)):
-        index, *_ = resampled(index, stored.grid, map_from_own)
-    seen_s = float(np.max(np.asarray(stored.voxels.last_seen_s)[thing.rows])) + shift_s
+        index, *_ = resampled(index, stored.data.grid, map_from_own)
+    seen_s = float(np.max(np.asarray(stored.data.voxels.last_seen_s)[thing.rows])) + shift_s
     position = plain_point(apply(map_from_own, np.array(thing.position)))
     look = _look(stored, thing.rows)
     return lives.SeenThing(thing.name, thing.confidence, position, thing.size, thing.color, index, seen_s, look)
 
 
-def _look(stored: StoredMap, rows: Int[np.ndarray, " r"]) -> Float[np.ndarray, " d"] | None:
-    total = np.asarray(stored.voxels.feature)[rows].astype(np.float64).sum(axis=0)
+def _look(stored: AVLMap, rows: Int[np.ndarray, " r"]) -> Float[np.ndarray, " d"] | None:
+    total = np.asarray(stored.data.voxels.feature)[rows].astype(np.float64).sum(axis=0)
     length = float(np.linalg.norm(total))
     return total / length if length > 0.0 else None
 
 
-def _looks(life: Life, stored: StoredMap, known: Occupied) -> dict[int, Float[np.ndarray, " d"]]:
+def _looks(life: Life, stored: AVLMap, known: Occupied) -> dict[int, Float[np.ndarray, " d"]]:
     looks = {number: _look(stored, rows) for number, rows in _rows_there(life, known).items()}
     return {number: look for number, look in looks.items() if look is not None}
 
@@ -246,12 +248,12 @@ def same_thing(one: str, other: str) -> bool:
     return one == other or words.is_a(one, other, EntryKind.THING) or words.is_a(other, one, EntryKind.THING)
 
 
-def _with_vanished(life: Life, stored: StoredMap, known: Occupied, now: Day, visits: Sequence[Visit]) -> Life:
-    index, grid = np.asarray(stored.voxels.index), stored.grid
+def _with_vanished(life: Life, stored: AVLMap, known: Occupied, now: Day, visits: Sequence[Visit]) -> Life:
+    index, grid = np.asarray(stored.data.voxels.index), stored.data.grid
     surface = now.has_surface(grid.centre_of(index))
     loose, through = ~surface, now.views.through(index, grid) >= THROUGH_VIEWS
     things = changed_things(stored, loose, through, [*_rows_there(life, known).values()])
-    stamps = np.array([float(np.max(np.asarray(stored.voxels.last_seen_s)[one.rows])) for one in things])
+    stamps = np.array([float(np.max(np.asarray(stored.data.voxels.last_seen_s)[one.rows])) for one in things])
     seen_on = visit_of_stamps(visits[:-1], stamps).tolist()
     begun = [lives.begun([_seen(one, stored, np.eye(4), 0.0)], on) for one, on in zip(things, seen_on, strict=True)]
     stays = [*life.stays, *(one.stays[0] for one in begun)]
@@ -259,26 +261,26 @@ def _with_vanished(life: Life, stored: StoredMap, known: Occupied, now: Day, vis
 
 
 def _unnamed_new(
-    other: StoredMap,
+    other: AVLMap,
     things: Sequence[Thing],
     before: Sequence[DayViews],
     known: Occupied,
     moved: Float[np.ndarray, "4 4"],
 ) -> list[Thing]:
-    grid = other.grid
-    points = apply(moved, grid.centre_of(np.asarray(other.voxels.index)))
+    grid = other.data.grid
+    points = apply(moved, grid.centre_of(np.asarray(other.data.voxels.index)))
     index = grid.index_of(points)
     through = np.sum([views.through(index, grid) for views in before], axis=0) >= THROUGH_VIEWS
     return changed_things(other, ~known.near(points), through, [thing.rows for thing in things])
 
 
-def _still_there(stored: StoredMap, known: Occupied, life: Life, now: Day, visit: int) -> Bool[np.ndarray, " n"]:
+def _still_there(stored: AVLMap, known: Occupied, life: Life, now: Day, visit: int) -> Bool[np.ndarray, " n"]:
     """Return which voxels of the map are surface still.
 
     One goes where two views of the new day see through it and nothing is beside it; of what is gone every voxel goes
     where the new day has no surface; of what is there none goes; people's go.
     """
-    index, grid = np.asarray(stored.voxels.index), stored.grid
+    index, grid = np.asarray(stored.data.voxels.index), stored.data.grid
     surface = now.has_surface(grid.centre_of(index))
     through = now.views.through(index, grid) >= THROUGH_VIEWS
     goes = through & ~surface
@@ -292,19 +294,19 @@ def _still_there(stored: StoredMap, known: Occupied, life: Life, now: Day, visit
 
 
 def _manifest(
-    stored: StoredMap,
-    other: StoredMap,
+    stored: AVLMap,
+    other: AVLMap,
     content: MapData,
     visits: tuple[Visit, ...],
     elapsed_s: float,
     notice: str,
 ) -> MapInfo:
-    info, grid = stored.info, stored.grid
+    info, grid = stored.data.info, stored.data.grid
     recording = RecordingInfo(
         name=info.recording.name,
         format=info.recording.format,
-        fingerprint=key_of(info.recording.fingerprint, other.info.recording.fingerprint),
-        frames=info.recording.frames + other.info.recording.frames,
+        fingerprint=key_of(info.recording.fingerprint, other.data.info.recording.fingerprint),
+        frames=info.recording.frames + other.data.info.recording.frames,
         duration_s=visits[-1].end_s - visits[0].begin_s,
         notices=info.recording.notices,
     )
@@ -312,39 +314,39 @@ def _manifest(
     return msgspec.structs.replace(
         info,
         avlmaps_version=__version__,
-        build_key=merged_key(info.build_key, other.info.build_key),
+        build_key=merged_key(info.build_key, other.data.info.build_key),
         recording=recording,
         counts=Counts.of(frames, content.keyframes, content.voxels, content.sounds),
-        rig=RigInfo.of(stored.rig),
+        rig=RigInfo.of(stored.data.rig),
         bounding_box_m=MapBounds.of(content.voxels.index, grid.voxel_size_m),
         notices=(
-            *dict.fromkeys(one for one in (*info.notices, *other.info.notices) if not one.startswith(NO_SOURCES)),
+            *dict.fromkeys(one for one in (*info.notices, *other.data.info.notices) if not one.startswith(NO_SOURCES)),
             *([notice] if notice else ()),
         ),
-        doubts=tuple(dict.fromkeys((*info.doubts, *other.info.doubts))),
+        doubts=tuple(dict.fromkeys((*info.doubts, *other.data.info.doubts))),
         visits=visits,
         timings=Timings.now({"merging": elapsed_s}),
     )
 
 
 def joined_voxels(
-    stored: StoredMap,
+    stored: AVLMap,
     kept: Bool[np.ndarray, " n"],
-    other: StoredMap,
+    other: AVLMap,
     moved: Float[np.ndarray, "4 4"],
     shift_s: float,
     life: Life,
 ) -> Voxels:
     """Return what is left of the map's voxels, and the other's laid on its grid; where both are, their means."""
-    table = VoxelTable(stored.voxels.feature.shape[1])
-    table.add(_sums(stored.voxels, np.flatnonzero(kept)))
-    index, cell, source, part = resampled(np.asarray(other.voxels.index), other.grid, moved)
-    table.add(_spread(other.voxels, index, cell, source, part, shift_s))
+    table = VoxelTable(stored.data.voxels.feature.shape[1])
+    table.add(_sums(stored.data.voxels, np.flatnonzero(kept)))
+    index, cell, source, part = resampled(np.asarray(other.data.voxels.index), other.data.grid, moved)
+    table.add(_spread(other.data.voxels, index, cell, source, part, shift_s))
     people = [life.voxels(number) for number, stay in enumerate(life.stays) if stay.name in PEOPLE]
     if not people:
         return table.voxels()
     sums = table.evidence().index
-    crowd = Occupied.of(np.concatenate(people), stored.grid)
+    crowd = Occupied.of(np.concatenate(people), stored.data.grid)
     return table.voxels(kept=crowd.row_of(sums) < 0)
 
 
@@ -383,14 +385,14 @@ def _spread(
     )  # fmt: skip
 
 
-def joined_keyframes(stored: StoredMap, other: StoredMap, moved: Float[np.ndarray, "4 4"], shift_s: float) -> Keyframes:
+def joined_keyframes(stored: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 4"], shift_s: float) -> Keyframes:
     """Return the keyframes of all days; one of the new day takes the place of older ones from about where it is.
 
     Their places are described again, in the words that this map's place encoder learned.
     """
     from scipy.spatial import KDTree
 
-    old, new = stored.keyframes, other.keyframes
+    old, new = stored.data.keyframes, other.data.keyframes
     pose = moved @ np.asarray(new.world_from_camera, np.float64)
     before = np.asarray(old.world_from_camera, np.float64)
     near = KDTree(pose[:, :3, 3]).query_ball_point(before[:, :3, 3], _NEAR_M)
@@ -400,9 +402,8 @@ def joined_keyframes(stored: StoredMap, other: StoredMap, moved: Float[np.ndarra
         if not any(rotation_angle_rad(before[row], pose[rival]) <= _NEAR_RAD for rival in rivals)
     ]
     encoder = stored.encoders.place
-    place = [
-        encoder.encode(thumbnail(other, row), local_features(other, row), stored.place_state) for row in range(len(new))
-    ]
+    state = stored.data.place_state
+    place = [encoder.encode(thumbnail(other, row), local_features(other, row), state) for row in range(len(new))]
     turned = replace(
         new,
         stamp_s=np.asarray(new.stamp_s) + shift_s,
@@ -432,15 +433,15 @@ def _padded(clear_mm: np.ndarray, rows: int, columns: int) -> np.ndarray:
 
 
 def joined_sources(
-    stored: StoredMap, other: StoredMap, moved: Float[np.ndarray, "4 4"], voxels: Voxels, keyframes: Keyframes
+    stored: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 4"], voxels: Voxels, keyframes: Keyframes
 ) -> tuple[SourceEvidence | None, str]:
     """Return the evidence of where the sounds of all days came from; or why there is none, in a sentence."""
-    parts = [(of.sources(), where) for of, where in ((stored, np.eye(4)), (other, moved)) if len(of.sounds)]
+    parts = [(of.data.sources, where) for of, where in ((stored, np.eye(4)), (other, moved)) if len(of.data.sounds)]
     known = [(evidence, where) for evidence, where in parts if evidence is not None]
     if not known:
         return None, ""
     if len(known) < len(parts):
-        of = next(of for of in (stored, other) if len(of.sounds) and of.sources() is None)
+        of = next(of for of in (stored, other) if len(of.data.sounds) and of.data.sources is None)
         return None, (
             f"{NO_SOURCES}: {of.path.name} was built without the places of its microphones; give them (microphones in "
             "recording.json), build it again and merge again."
@@ -451,14 +452,14 @@ def joined_sources(
             f"{NO_SOURCES}: {stored.path.name} was heard with {counts[0]} microphones and {other.path.name} with "
             f"{counts[1]}; query where sounds came from in each day's own map, or record with the same array."
         )
-    voxel_m = stored.grid.centre_of(np.asarray(voxels.index))
+    voxel_m = stored.data.grid.centre_of(np.asarray(voxels.index))
     robot_m = np.asarray(keyframes.world_from_camera, np.float64)[:, :3, 3]
-    return carry_evidence(known, voxel_m, robot_m, stored.up_in_world), ""
+    return carry_evidence(known, voxel_m, robot_m, stored.data.up_in_world), ""
 
 
-def joined_sounds(stored: StoredMap, other: StoredMap, moved: Float[np.ndarray, "4 4"], shift_s: float) -> HeardSounds:
+def joined_sounds(stored: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 4"], shift_s: float) -> HeardSounds:
     """Return the sounds of all days."""
-    old, new = stored.sounds, other.sounds
+    old, new = stored.data.sounds, other.data.sounds
     width = max(old.feature.shape[1], new.feature.shape[1])
     laid = replace(
         new,

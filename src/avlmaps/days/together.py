@@ -26,10 +26,10 @@ from avlmaps.maps.cluster import (
 )
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.folder import MANIFEST
-from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.store.tables import explain_write_errors
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.encoders import Encoders
+from avlmaps.query.avlmap import AVLMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ def build_together(
     cache: CacheSettings = DEFAULT_CACHE,
     allow: Sequence[str] = (),
     overwrite: bool = False,
-) -> StoredMap:
+) -> AVLMap:
     """Build the map of several recordings of one place with the workers of a pool, or finish one that was begun.
 
     The maps of the single recordings lie beside it, in ``NAME-recordings``: a recording more costs its own work alone.
@@ -77,7 +77,7 @@ def build_together(
         for reopen, path in zip(recordings, paths, strict=True):
             build_map(reopen(), path, encoders, settings, cache=cache, workers=ClusterWorkers(pool, reopen, cache),
                       allow=allow, overwrite=overwrite)  # fmt: skip
-    return merge_in_turn([open_stored(path) for path in paths], folder, out, overwrite=overwrite)
+    return merge_in_turn([AVLMap.open(path) for path in paths], folder, out, overwrite=overwrite)
 
 
 def build_job(job: BuildJob) -> JobResult:
@@ -121,15 +121,15 @@ def _build_each(
         token.unlink(missing_ok=True)
 
 
-def merge_in_turn(days: Sequence[StoredMap], scratch: Path, out: Path, *, overwrite: bool = False) -> StoredMap:
+def merge_in_turn(days: Sequence[AVLMap], scratch: Path, out: Path, *, overwrite: bool = False) -> AVLMap:
     """Merge maps in their order, each found in the ones before; what a stopped run had merged is used again.
 
     Raises:
         MapError: see ``merge_maps``; what was merged before stays in ``scratch``.
     """
-    keys = [days[0].info.build_key]
+    keys = [days[0].data.info.build_key]
     for day in days[1:]:
-        keys.append(merged_key(keys[-1], day.info.build_key))
+        keys.append(merged_key(keys[-1], day.data.info.build_key))
     paths = [days[0].path, *(scratch / f"first-{number:04d}.avlmap" for number in range(2, len(days))), out]
     at, merged = next(
         (number, found)
@@ -148,11 +148,11 @@ def merge_in_turn(days: Sequence[StoredMap], scratch: Path, out: Path, *, overwr
     return merged
 
 
-def _finished(path: Path, key: str) -> StoredMap | None:
+def _finished(path: Path, key: str) -> AVLMap | None:
     if not (path / MANIFEST).is_file():
         return None
     try:
-        found = open_stored(path)
+        found = AVLMap.open(path)
     except MapError:
         return None
-    return found if found.info.build_key == key else None
+    return found if found.data.info.build_key == key else None

@@ -31,10 +31,9 @@ from avlmaps.maps.keyframes.choose import KeyframeSettings
 from avlmaps.maps.located import device_of
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.folder import write
+from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap
@@ -121,7 +120,7 @@ class LiveMap:
             raise MapError(fault)
         used = encoders_of("embedded" if encoders is None else encoders)
         array = None if microphones is None else given_microphones(microphones)
-        known_rad = None if same_device is None else device_of(open_stored(same_device))
+        known_rad = None if same_device is None else device_of(same_device)
         require_place(self.path, overwrite)
         self._held = contextlib.ExitStack()
         self._held.enter_context(lock_folder(self.path))
@@ -325,7 +324,7 @@ class LiveMap:
     def status(self) -> LiveStatus:
         """Return how the map fares."""
         snapshot, track, now_s = self._snapshot, self._mapper.hearing.came, time.perf_counter()
-        counts = snapshot[0].stored.info.counts if snapshot is not None else None
+        counts = snapshot[0].data.info.counts if snapshot is not None else None
         p50_ms, p95_ms = self._tally.quantiles_ms()
         return LiveStatus(
             frames_in=self._tally.of("came"),
@@ -385,8 +384,8 @@ class LiveMap:
             self._held.close()
         if not len(self._mapper):
             raise MapError(f"No frame came, so that there is no map in {self.path}; add frames before it is closed.")
-        stored = replace(open_stored(self.path), encoders=self._mapper.encoders)
-        self._snapshot = AVLMap(stored, settings=self._query), time.perf_counter()
+        made = AVLMap(read(self.path), self._mapper.encoders, path=self.path, settings=self._query)
+        self._snapshot = made, time.perf_counter()
         self._generation += 1
         if self._broken is not None and not self._is_told:
             self._is_told = True
@@ -555,7 +554,7 @@ class LiveMap:
 
     def _publish(self, now_s: float, *, absorb: bool) -> None:
         """Make a snapshot, and put it in the place of the last one if something came."""
-        before = None if self._snapshot is None else self._snapshot[0].stored.data
+        before = None if self._snapshot is None else self._snapshot[0].data
         if before is None and not absorb:
             return
         if absorb:
@@ -573,7 +572,7 @@ class LiveMap:
 
     def _save(self) -> None:
         assert self._snapshot is not None
-        write(self.path, self._snapshot[0].stored.data)
+        write(self.path, self._snapshot[0].data)
         self._saved_s, self._shown_s = self._snapshot[1], None
 
     def _show(self, data: MapData, came_s: float) -> None:

@@ -24,18 +24,16 @@ from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.perceived import encode_pixels
 from avlmaps.maps.plan import BuildPlan, Span, claim, make_plan, require_unchanged, strip_folder
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.store.folder import MANIFEST, is_map_or_free, write
+from avlmaps.maps.store.folder import MANIFEST, is_map_or_free, read, write
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import BadFrame
-from avlmaps.maps.store.reader import StoredMap, describe, open_stored
+from avlmaps.maps.store.map_data import MapData
 from avlmaps.perception.cache.cached_encoders import cache_note, with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import BatchPixelEncoder, PixelEncoder
 from avlmaps.recordings.types import Frame, Recording
-
-__all__ = ["BuildSettings", "CacheSettings", "build_map", "describe", "open_stored"]
 
 _MOST_HELD = 4  # frames in memory for each that is encoded
 EncodedFrame = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
@@ -61,7 +59,7 @@ def build_map(
     resume: bool = True,
     overwrite: bool = False,
     progress: bool = True,
-) -> StoredMap:
+) -> MapData:
     """Build a map of a recording, or finish one that was begun.
 
     A build that is killed at any instant continues from its last finished stretch of frames when it is started again,
@@ -100,7 +98,7 @@ def build_map(
             made = mapper.finish()
             require_unchanged(plan, stamp)
             write(plan.path, made)
-    return open_stored(plan.path)
+    return read(plan.path)
 
 
 def require_place(path: Path, overwrite: bool) -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -23,11 +24,10 @@ from avlmaps.maps.fusion.sensor import NONE
 from avlmaps.maps.fusion.submaps import MovedSubmaps
 from avlmaps.maps.located import locate_sources
 from avlmaps.maps.pose_correction import PoseCorrection
-from avlmaps.maps.store.folder import write
+from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import MapBounds, Removed, Timings, UpInfo
 from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps
 from avlmaps.recordings.types import Recording
 
@@ -53,44 +53,40 @@ class Corrected:
     elapsed_s: float
 
 
-def correct_stored(
-    stored: StoredMap, stamps_s: Any, poses: Any, recording: Recording | None = None
-) -> tuple[StoredMap, Corrected]:
+def correct_map(path: Path, stamps_s: Any, poses: Any, recording: Recording | None = None) -> Corrected:
     """Make a map follow corrected poses, in its folder. Later corrections replace this one and do not add to it.
 
     Args:
-        stored: a map that was built with submaps.
+        path: folder of a map that was built with submaps.
         stamps_s: (k,) of the corrected poses, rising, on the recording's clock.
         poses: (k, 4, 4) world_from_camera of the depth camera then, metres. Between them frames follow smoothly.
         recording: that the map is of: by it, where sounds came from is found again; without it that is not known.
-
-    Returns:
-        The map as it is now, opened, and what was done.
 
     Raises:
         MapError: the map has no submaps, the poses are not of its frames, or it cannot be written.
         RecordingError: a pose is no rigid motion.
     """
     begin_s = perf_counter()
-    submaps = require_submaps(stored)
+    data = read(path)
+    submaps = require_submaps(path, data)
     frames_s, last = np.asarray(submaps.stamp_s), np.asarray(submaps.pose)
     motion = PoseCorrection.of(stamps_s, poses, frames_s, last)
     now = motion.moved(frames_s, last)
-    with lock_folder(stored.path), silence_progress(True):
-        content, removed = _moved(stored, submaps, now)
-        sources, sources_s = _sources(stored, content, Trajectory(frames_s, now), motion.turn, recording)
+    with lock_folder(path), silence_progress(True):
+        content, removed = _moved(data, submaps, now)
+        sources, sources_s = _sources(data, content, Trajectory(frames_s, now), motion.turn, recording)
         content = replace(content, sources=sources)
         apart_m = np.linalg.norm(now[:, :3, 3] - np.asarray(submaps.fused_pose)[:, :3, 3], axis=1)
         median_m, most_m = float(np.median(apart_m)), float(apart_m.max())
         said = f"{MOVED}: frames moved by {median_m:.2f} m (median), {most_m:.2f} m at most."
         finished = datetime.now(UTC).isoformat(timespec="seconds")
         elapsed_s = perf_counter() - begin_s
-        info, count = stored.info, len(content.voxels)
+        info, count = data.info, len(content.voxels)
         doubts = tuple(carving_doubts(removed, count))
         others = [one for one in info.notices if not one.startswith(MOVED) and one not in info.doubts]
         kept = [one for one in info.doubts if "seen through by other frames" not in one]
         write(
-            stored.path,
+            path,
             replace(content, info=structs.replace(
                 info,
                 up=UpInfo.of(motion.turn @ info.up.vector(), info.up.known_from, info.up.support),
@@ -103,12 +99,11 @@ def correct_stored(
                                 stages_s={**info.timings.stages_s, "correcting": elapsed_s, **sources_s}),
             )),
         )  # fmt: skip
-    opened = replace(open_stored(stored.path), encoders=stored.encoders)
-    return opened, Corrected(median_m, most_m, info.counts.voxels, count, perf_counter() - begin_s)
+    return Corrected(median_m, most_m, info.counts.voxels, count, perf_counter() - begin_s)
 
 
 def _sources(
-    stored: StoredMap,
+    data: MapData,
     content: MapData,
     walk: Trajectory,
     turn: Float[np.ndarray, "3 3"],
@@ -118,43 +113,42 @@ def _sources(
     if recording is None:
         return None, {}
     found, elapsed_s = locate_sources(
-        recording, turn @ stored.up_in_world, content.sounds, content.voxels, stored.grid, walk
+        recording, turn @ data.up_in_world, content.sounds, content.voxels, data.grid, walk
     )
     return found, {} if found is None else {"sources": elapsed_s}
 
 
-def require_submaps(stored: StoredMap) -> Submaps:
+def require_submaps(path: Path, data: MapData) -> Submaps:
     """Return the submaps of a map.
 
     Raises:
         MapError: it has none.
     """
-    submaps = stored.submaps()
+    submaps = data.submaps
     if submaps is None:
         raise MapError(
-            f"{stored.path} has no submaps, so that it cannot follow corrected poses; build it again with "
-            f"{option('submaps')}."
+            f"{path} has no submaps, so that it cannot follow corrected poses; build it again with {option('submaps')}."
         )
     return submaps
 
 
-def _moved(stored: StoredMap, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> tuple[MapData, Removed]:
+def _moved(data: MapData, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> tuple[MapData, Removed]:
     """Return the content of a map whose frames have these poses, and what was no surface."""
-    total = MovedSubmaps(submaps, now, stored.grid)
-    sensor = NONE if stored.info.sensor is None else stored.info.sensor.model
+    total = MovedSubmaps(submaps, now, data.grid)
+    sensor = NONE if data.info.sensor is None else data.info.sensor.model
     clear_mm = np.asarray(submaps.clear_mm)
     views = FreeViews(clear_mm, now[: len(clear_mm)])
-    evidence, camera = total.evidence(), stored.rig.depth
+    evidence, camera = total.evidence(), data.rig.depth
     kept, removed = clean(
-        evidence, [views], camera, stored.grid, sensor,
-        lambda _: count_where_it_matters(evidence, stored.grid, camera, views),
+        evidence, [views], camera, data.grid, sensor,
+        lambda _: count_where_it_matters(evidence, data.grid, camera, views),
     )  # fmt: skip
     if not kept.any():
         raise MapError("With the corrected poses every voxel is seen through or a speck; check the poses.")
-    keyframes = moved_keyframes(stored.keyframes, np.asarray(submaps.stamp_s), now)
-    sounds = _replaced(stored.sounds, WalkedTrack(np.asarray(submaps.stamp_s), now))
+    keyframes = moved_keyframes(data.keyframes, np.asarray(submaps.stamp_s), now)
+    sounds = _replaced(data.sounds, WalkedTrack(np.asarray(submaps.stamp_s), now))
     content = replace(
-        stored.data, voxels=total.voxels(kept=kept), keyframes=keyframes, sounds=sounds, sources=None,
+        data, voxels=total.voxels(kept=kept), keyframes=keyframes, sounds=sounds, sources=None,
         submaps=replace(submaps, pose=now), findings={},
     )  # fmt: skip
     return content, Removed(**removed)

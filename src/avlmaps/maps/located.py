@@ -11,7 +11,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.maps.types import HeardSounds, SourceEvidence, Voxels
 from avlmaps.recordings.types import Recording
 
@@ -40,11 +40,11 @@ def locate_sources(
 def open_with_device(reopen: Callable[[], Recording], path: Path) -> Recording:
     """Open a recording and take the device of a map with it, here or on another machine; see ``take_device``."""
     recording = reopen()
-    take_device(recording, open_stored(path))
+    take_device(recording, path)
     return recording
 
 
-def take_device(recording: Recording, stored: StoredMap) -> None:
+def take_device(recording: Recording, path: Path | str) -> None:
     """Begin with the offset of the device that says directions as the map of an earlier recording has it.
 
     Raises:
@@ -54,17 +54,17 @@ def take_device(recording: Recording, stored: StoredMap) -> None:
     track = recording.audio
     if track is None or track.directions is None:
         raise RecordingError(f"{recording.path} has no directions that a device said, so that no offset is of use.")
-    recording.audio = replace(track, directions=replace(track.directions, known_rad=device_of(stored)))
+    recording.audio = replace(track, directions=replace(track.directions, known_rad=device_of(path)))
 
 
-def device_of(stored: StoredMap) -> tuple[float, float]:
+def device_of(path: Path | str) -> tuple[float, float]:
     """Return the offset of a map's device that says directions, and the standard deviation of that.
 
     Raises:
         MapError: the map knows of no such device.
     """
-    found = stored.sources()
+    found = read(path).sources
     if found is None or not len(found.device):
-        raise MapError(f"{stored.path} knows of no device that says directions; name a map of a recording with one.")
+        raise MapError(f"{path} knows of no device that says directions; name a map of a recording with one.")
     offset_rad, sd_rad = found.device[-1, :2].tolist()
     return offset_rad, sd_rad

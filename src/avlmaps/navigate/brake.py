@@ -64,7 +64,7 @@ class EditBrake(Brake):
     def __init__(self, avlmap: AVLMap) -> None:
         """Take the map of the drive; one without a folder is not edited."""
         super().__init__()
-        self._folder, self._stamp = avlmap.stored.path, None
+        self._folder, self._stamp = avlmap.path, None
         self._known = {edit.id for edit in avlmap.edited.edits}
 
     @property

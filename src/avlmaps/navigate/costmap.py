@@ -144,23 +144,23 @@ def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE, storey: int | None 
         QueryError: a word of the shape means nothing to the map's encoder, or one of ``only`` is not known to it.
         BackendError: the shape has words, and the map's profile has no pixel encoder.
     """
-    stored = avlmap.stored
-    ignored = np.zeros(len(stored.voxels), bool)
+    data = avlmap.data
+    ignored = np.zeros(len(data.voxels), bool)
     for word in shape.ignores:
         ignored |= _voxels_called(avlmap, word)
     if shape.only is not None:
         require_known(avlmap.knows, shape.only)  # else nothing would be in its way
-        counting = np.zeros(len(stored.voxels), bool)
+        counting = np.zeros(len(data.voxels), bool)
         for word in shape.only:
             counting |= _voxels_called(avlmap, word)
         ignored |= ~counting
-    walked = np.asarray(stored.keyframes.world_from_camera)[:, :3, 3]
+    walked = np.asarray(data.keyframes.world_from_camera)[:, :3, 3]
     storeys = avlmap.storeys
     number = storey_of_walk(avlmap) if storey is None else storey
     if not 0 <= number < (1 if storeys is None else len(storeys)):
         raise MapError(f"The map has no storey {number}; {said_storeys(storeys)}.")
     found = find_obstacles(
-        stored.voxels, stored.grid, stored.up_in_world, shape, ignored=ignored, walked=walked, storeys=storeys,
+        data.voxels, data.grid, data.up_in_world, shape, ignored=ignored, walked=walked, storeys=storeys,
         storey=number,
     )  # fmt: skip
     return found.without(avlmap.edited.forbidden)
@@ -170,7 +170,7 @@ def storey_of_walk(avlmap: "AVLMap") -> int:
     """Return the number of the storey on which the walk of a map began; 0 for a map of one."""
     if avlmap.storeys is None:
         return 0
-    cameras = np.asarray(avlmap.stored.keyframes.world_from_camera, np.float64)[:1, :3, 3]
+    cameras = np.asarray(avlmap.data.keyframes.world_from_camera, np.float64)[:1, :3, 3]
     return int(avlmap.storeys.of_places(cameras)[0]) if len(cameras) else 0
 
 
@@ -182,7 +182,7 @@ def floor_of_walk(avlmap: "AVLMap") -> float:
     if not len(space):
         return 0.0
     height_m = space.level(space.centres)[:, 2]
-    sure = np.asarray(avlmap.stored.voxels.hits) >= MIN_HITS  # as where obstacles are sought
+    sure = np.asarray(avlmap.data.voxels.hits) >= MIN_HITS  # as where obstacles are sought
     return floor_height(height_m[sure] if sure.any() else height_m, space.grid.voxel_size_m)
 
 

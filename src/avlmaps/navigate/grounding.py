@@ -144,7 +144,7 @@ class Seeker:
             return None
         if sound is None:
             raise ProgramError(f'{skill} takes at="source" with a sound; what is seen has no other place.')
-        why = no_sources(self.avlmap.stored)
+        why = no_sources(self.avlmap)
         self.note(why)
         return None if why else "source"
 

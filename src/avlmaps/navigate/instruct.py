@@ -132,7 +132,7 @@ class Outcome:
 def given_by(avlmap: AVLMap, image: str | None = None, clip: str | None = None, *, said: str = "") -> Attachments:
     """Return what a command to a robot (``said``) may mean: the map's names, and which places its sounds have."""
     sounds_at, own = avlmap.settings.sounds.at, own_names(avlmap, said)
-    return Attachments(image, clip, avlmap.knows, sounds_at, own, lambda: no_sources(avlmap.stored))
+    return Attachments(image, clip, avlmap.knows, sounds_at, own, lambda: no_sources(avlmap))
 
 
 def _silent(_: str) -> None:

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from avlmaps.language.own_names import OwnName
     from avlmaps.language.questions import AskedSentence
     from avlmaps.maps.storeys import Storeys
-    from avlmaps.query.queryable import Attachment, Queryable
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.queryable import Attachment
 
 _MOST_ALIKE = 10  # goals that are looked at for others that fit as well
 # For a count, up to this many instances are taken; those that are found count.
@@ -162,7 +163,7 @@ class Files:
         return rgb.shape[:2]
 
 
-def ask(avlmap: "Queryable", asked: Asked, files: Files | None = None) -> Answer:
+def ask(avlmap: "AVLMap", asked: Asked, files: Files | None = None) -> Answer:
     """Answer a sentence or parts.
 
     Raises:
@@ -184,13 +185,13 @@ def ask(avlmap: "Queryable", asked: Asked, files: Files | None = None) -> Answer
     return on_storey(replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin)), avlmap.storeys)
 
 
-def _asks_for_list(avlmap: "Queryable", asked: Asked) -> bool:
+def _asks_for_list(avlmap: "AVLMap", asked: Asked) -> bool:
     from avlmaps.language.list_questions import read_list
 
     return bool(asked.sentence.strip()) and read_list(asked.sentence, own_names(avlmap, asked.sentence)) is not None
 
 
-def nearest_first(avlmap: "Queryable", answer: Answer, place: Float[np.ndarray, " n"], top: int) -> Answer:
+def nearest_first(avlmap: "AVLMap", answer: Answer, place: Float[np.ndarray, " n"], top: int) -> Answer:
     """Return an answer whose goals are those that count as found, the nearest to a place first.
 
     One that is less than half as likely as the best is left behind them, as when a robot goes to the nearest. Of what
@@ -217,7 +218,7 @@ def nearest_first(avlmap: "Queryable", answer: Answer, place: Float[np.ndarray, 
     return replace(answer, goals=goals, text=text, notes=notes)
 
 
-def _ask_of_storeys(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
+def _ask_of_storeys(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
     from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
     from avlmaps.query.lists import answer_on_storey, how_many
 
@@ -242,7 +243,7 @@ def on_storey(answer: Answer, storeys: "Storeys | None") -> Answer:
     return replace(answer, storeys=storeys, text=text)
 
 
-def _ask(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
+def _ask(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
     question = thing_alone(asked, avlmap)
     if question is None and asked.parts and not asked.sentence.strip():
         question = Question.of(asked.parts, asked.primary)
@@ -252,7 +253,7 @@ def _ask(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
 
 
 def answer_question(
-    avlmap: "Queryable", question: Question, top: int = 3, files: Files | None = None, *, between: bool = False
+    avlmap: "AVLMap", question: Question, top: int = 3, files: Files | None = None, *, between: bool = False
 ) -> Answer:
     """Answer a question whose parts are known; ``between`` says that the goals lie between its first two other things.
 
@@ -282,7 +283,7 @@ def answer_question(
     named = {kind: [part.query for part in question.parts if part.modality is kind] for kind in Modality}
     places = [goal.position for goal in goals] if found else []
     said = avlmap.edited.said_of(places, named[Modality.OBJECT], named[Modality.AREA])
-    notes = (*avlmap.stored.info.doubts, *said)
+    notes = (*avlmap.data.info.doubts, *said)
     return Answer(
         goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone, notes=notes,
         alike=len(equal) if found else 0,
@@ -302,7 +303,7 @@ def _alone(question: Question, heats: Sequence[Heatmap]) -> Alternative:
     return Alternative(Question.of([part]), heat.probability, heat.found, tuple(heat.goals(1)))
 
 
-def thing_alone(asked: Asked, avlmap: "Queryable") -> Question | None:
+def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
     """Return the question where a query is the name of one thing and nothing else; None for others.
 
     A sentence that is one of the encoder's names is read as the grammar reads it, without loading that. Stairs are a
@@ -313,26 +314,26 @@ def thing_alone(asked: Asked, avlmap: "Queryable") -> Question | None:
     if not asked.sentence.strip():
         return Question.of(asked.parts) if len(asked.parts) == 1 and asked.object is not None else None
     kinds = {entry.kind for entry in lexicon().senses(asked.sentence)}
-    if kinds != {EntryKind.THING} or "pixels" not in avlmap.stored.info.models:
+    if kinds != {EntryKind.THING} or "pixels" not in avlmap.data.info.models:
         return None
-    encoder = avlmap.stored.encoders.pixels
+    encoder = avlmap.encoders.pixels
     is_name = isinstance(encoder, NamedPixelEncoder) and asked.sentence in encoder.vocabulary
     return Question.of([Part(Modality.OBJECT, asked.sentence)]) if is_name else None
 
 
-def _answer_sentence(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
+def _answer_sentence(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
     from avlmaps.language.source_words import asks_for_source
     from avlmaps.query.sound_sources import no_sources
 
     if (asked.at or avlmap.settings.sounds.at) is not None or not asks_for_source(asked.sentence):
         return _answer_said(avlmap, asked, files)
-    why = no_sources(avlmap.stored)
+    why = no_sources(avlmap)
     answer = _answer_said(avlmap, asked if why else replace(asked, at="source", at_by_words=True), files)
     silent = answer.parts and not any(one.part.modality is Modality.SOUND for one in answer.parts)
     return answer if silent or not why else replace(answer, notes=(why, *answer.notes))
 
 
-def _answer_said(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
+def _answer_said(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
     from avlmaps.language.list_questions import read_list, said_number
     from avlmaps.query.lists import answer_list
 
@@ -357,7 +358,7 @@ def _answer_said(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     return replace(answer, goals=goals, found=count >= number, text=f"{said[:1].upper()}{said[1:]}. {answer.text}")
 
 
-def _answer_words(avlmap: "Queryable", asked: Asked, words: str, files: Files) -> Answer:
+def _answer_words(avlmap: "AVLMap", asked: Asked, words: str, files: Files) -> Answer:
     from avlmaps.language.list_questions import speaks_of_photo
 
     if asked.image is not None and asked.clip is None and speaks_of_photo(words):
@@ -366,7 +367,7 @@ def _answer_words(avlmap: "Queryable", asked: Asked, words: str, files: Files) -
     return _answer_read(avlmap, replace(asked, sentence=words, primary=None), files)
 
 
-def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
+def _answer_read(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
     """Answer the questions that a sentence is read as; the likeliest counts."""
     questions, notes, counted = _questions(asked, own_names(avlmap, asked.sentence))
     answers: list[tuple[Question, Answer]] = []
@@ -426,7 +427,7 @@ def _middle(factor: NearThings, number: int) -> Float[np.ndarray, "2"]:
     return factor.space.level(factor.anchors[factor.instance == number].mean(axis=0))[:2]
 
 
-def _one_a_room(avlmap: "Queryable", goals: Sequence[Goal]) -> tuple[Goal, ...]:
+def _one_a_room(avlmap: "AVLMap", goals: Sequence[Goal]) -> tuple[Goal, ...]:
     from avlmaps.query.whereabouts import NOWHERE, Whereabouts
 
     rooms: list[int] = Whereabouts.of(avlmap).rooms_of(np.array([goal.position for goal in goals])).tolist()

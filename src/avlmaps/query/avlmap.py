@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
     from avlmaps.maps.store.edits import Edit
     from avlmaps.maps.store.map_data import MapData
-    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.maps.storeys import Storeys
     from avlmaps.perception.encoders import Encoders
     from avlmaps.query.answer import Answer
@@ -61,13 +60,14 @@ class AVLMap:
     The first query by word of an object scores all voxels against the vocabulary and stores that for later ones.
 
     Attributes:
-        stored: the map as it lies on the disk.
+        data: the map as a value.
+        path: its folder; of a map in memory a name.
         settings: how to query.
     """
 
     def __init__(
         self,
-        data: "MapData | StoredMap",
+        data: "MapData",
         encoders: "Encoders | None" = None,
         *,
         path: Path | None = None,
@@ -85,7 +85,8 @@ class AVLMap:
             edits: what people corrected; None for those in the map's folder, none for what the encoders say alone.
             heats: remembers the heat of words, for a map that many query; files then come as attachments alone.
         """
-        self.stored = _opened_map(data, encoders, path)
+        self.data, self.path = data, path or Path("a map in memory")
+        self._encoders = encoders
         self.settings = settings or QuerySettings()
         self._given_edits = edits
         self._heats = heats
@@ -98,24 +99,23 @@ class AVLMap:
         Raises:
             MapError: it is not a map, damaged, or of another schema or profile.
         """
-        from avlmaps.maps.store.reader import open_stored
+        from avlmaps.maps.store.folder import read
 
-        return cls(open_stored(lasting_path(path)), settings=settings)
+        path = lasting_path(path)
+        return cls(read(path), path=path, settings=settings)
 
-    @property
-    def data(self) -> "MapData":
-        """The map as a value."""
-        return self.stored.data
-
-    @property
+    @cached_property
     def encoders(self) -> "Encoders":
-        """The models that it is asked with."""
-        return self.stored.encoders
+        """The models that it is asked with; those that it names need not be known here until they are used."""
+        from avlmaps.maps.store.reader import encoders_of_map
 
-    @property
-    def path(self) -> Path:
-        """Its folder; of a map in memory a name."""
-        return self.stored.path
+        return self._encoders or encoders_of_map(self.data.info)
+
+    def require_model(self, kind: Kind) -> None:
+        """Raise ``MapError`` unless its encoder of a kind is the one that made its features."""
+        from avlmaps.maps.store.reader import require_model
+
+        require_model(self.data.info, self.encoders, kind, self.path)
 
     def of_data(self, data: "MapData") -> Self:
         """Return this map with other content."""
@@ -127,7 +127,7 @@ class AVLMap:
         from avlmaps.maps.store.edits import read_edits
         from avlmaps.query.edits import apply
 
-        return apply(read_edits(self.stored.path) if self._given_edits is None else self._given_edits, self)
+        return apply(read_edits(self.path) if self._given_edits is None else self._given_edits, self)
 
     @property
     def edit(self) -> "Editor":
@@ -152,7 +152,7 @@ class AVLMap:
     @cached_property
     def space(self) -> Space:
         """The voxels' places, shared by all heatmaps of this map."""
-        return Space(self.stored.grid, self.stored.voxels.index, self.stored.up_in_world, self.stored)
+        return Space(self.data.grid, self.data.voxels.index, self.data.up_in_world, self.data)
 
     @checked(QueryError)
     def object(self, word: str, primary: bool = False, vocabulary: Sequence[str] | None = None) -> Heatmap:
@@ -193,7 +193,7 @@ class AVLMap:
 
     @cached_property
     def _names(self) -> MapNames:
-        return MapNames(self.stored, self.space, self.settings, lambda: self.things_in_rooms)
+        return MapNames(self, self.space, self.settings, lambda: self.things_in_rooms)
 
     def found(self) -> dict[str, np.ndarray]:
         """Return what a build stores of the names and rooms that the encoders here see; see ``findings``."""
@@ -233,7 +233,7 @@ class AVLMap:
             from avlmaps.query.changes import Days, things_at
             from avlmaps.query.sound_sources import with_heard_then
 
-            days = Days.of(self.stored, self.edited.life)
+            days = Days.of(self, self.edited.life)
             found = things_at(self.space, days, at, names, least_confidence)
             every = found if names is None else things_at(self.space, days, at, None, least_confidence)
             return with_heard_then(self, days.visit_of(at), found, every)
@@ -257,7 +257,7 @@ class AVLMap:
         def instances_of(name: str, alone: bool) -> Instances:
             return self._names.search(name, alone).instances
 
-        return find_things(self.stored, self.space, instances_of, names, least_confidence, structure, watch)
+        return find_things(self, self.space, instances_of, names, least_confidence, structure, watch)
 
     def things_to_edit(self, name: str | None) -> "Sequence[Thing]":
         """Return the things that an edit may be about, as the encoder sees them: of a name, or of its vocabulary.
@@ -265,7 +265,7 @@ class AVLMap:
         A map without pixel features has none. They are looked for once, for the edits of now and of later.
         """
         if name not in self._to_edit:
-            is_seen = "pixels" in self.stored.info.models and (name is None or self.sees(name))
+            is_seen = "pixels" in self.data.info.models and (name is None or self.sees(name))
             names = None if name is None else [name]
             self._to_edit[name] = self.unedited_things(names, _LEAST_EDITED) if is_seen else ()
         return self._to_edit[name]
@@ -282,9 +282,9 @@ class AVLMap:
         """
         from avlmaps.query.changes import Days, changes_answer, room_namer
 
-        days = Days.of(self.stored, self.edited.life)
+        days = Days.of(self, self.edited.life)
         since_visit = days.visit_of(since)
-        return changes_answer(days, self.stored.path.name, since_visit, room_namer(self), first_seen=first_seen)
+        return changes_answer(days, self.path.name, since_visit, room_namer(self), first_seen=first_seen)
 
     @checked(QueryError)
     def last_seen(self, name: str) -> "LastSeenAnswer":
@@ -295,7 +295,7 @@ class AVLMap:
         """
         from avlmaps.query.changes import Days, is_meant, last_seen, room_namer
 
-        return last_seen(Days.of(self.stored, self.edited.life), name, is_meant(name), room_namer(self))
+        return last_seen(Days.of(self, self.edited.life), name, is_meant(name), room_namer(self))
 
     @checked(QueryError)
     def contents(
@@ -314,7 +314,7 @@ class AVLMap:
         from avlmaps.query.contents import Contents, require_known
         from avlmaps.query.sound_sources import with_heard
 
-        models = self.stored.info.models
+        models = self.data.info.models
         require_known(self.knows, (names or ()) if "pixels" in models else ())
         things = self.things(names, least_confidence, structure) if "pixels" in models else []
         rooms = self.rooms() if "views" in models else []
@@ -328,13 +328,13 @@ class AVLMap:
     @property
     def doubts_of_drives(self) -> tuple[str, ...]:
         """What is doubtful about the map for a robot: why it may be wrong, and areas that it no longer forbids."""
-        return (*self.stored.info.doubts, *self.edited.unheeded)
+        return (*self.data.info.doubts, *self.edited.unheeded)
 
     @property
     def doubts_of_things(self) -> tuple[str, ...]:
         """Why a list of its things may be wrong, one sentence each."""
-        doubts = self.stored.info.doubts
-        if "pixels" in self.stored.info.models:
+        doubts = self.data.info.doubts
+        if "pixels" in self.data.info.models:
             return doubts
         return (*doubts, "The map was made without a model for things, so that it names none.")
 
@@ -343,7 +343,7 @@ class AVLMap:
         """Return the sounds of the map in the order of their onset; see ``contents.find_sounds``."""
         from avlmaps.query.contents import find_sounds
 
-        return find_sounds(self.stored, most_names)
+        return find_sounds(self, most_names)
 
     @checked(QueryError)
     def rooms(self, least_confidence: float = 0.0) -> list["Room"]:
@@ -352,7 +352,7 @@ class AVLMap:
 
         field, regions = self.room_field, self.room_regions
         by_floor = None if field is None or regions is None else (field, regions)
-        rooms = find_rooms(self.stored, self.space, self.settings.areas, least_confidence, by_floor)
+        rooms = find_rooms(self, self.space, self.settings.areas, least_confidence, by_floor)
         return self.edited.listed_rooms(rooms)
 
     @cached_property
@@ -368,17 +368,17 @@ class AVLMap:
     @property
     def colors(self) -> UInt8[np.ndarray, "n 3"]:
         """RGB of the voxels; read-only, not copied from the disk."""
-        return _read_only(self.stored.voxels.rgb)
+        return _read_only(self.data.voxels.rgb)
 
     @property
     def features(self) -> Float16[np.ndarray, "n d"]:
         """Features of the voxels, of unit length or zero; read-only, not copied from the disk."""
-        return _read_only(self.stored.voxels.feature)
+        return _read_only(self.data.voxels.feature)
 
     @property
     def voxel_index(self) -> Int32[np.ndarray, "n 3"]:
         """Which voxels: voxel i covers [i·s, (i+1)·s) along each axis; read-only, not copied from the disk."""
-        return _read_only(self.stored.voxels.index)
+        return _read_only(self.data.voxels.index)
 
     def plot(self, path: str | Path | None = None, *, names: bool = True) -> "Path | Figure":
         """Draw the map from above with its walk and sounds, and by default the names of its things and rooms.
@@ -388,9 +388,9 @@ class AVLMap:
         """
         from avlmaps.query.plots import draw_map, save
 
-        models = self.stored.info.models
+        models = self.data.info.models
         things = self.things() if names and "pixels" in models else ()
-        figure = draw_map(self.stored, things, self.rooms() if names and "views" in models else ())
+        figure = draw_map(self, things, self.rooms() if names and "views" in models else ())
         return figure if path is None else save(figure, path)
 
     def _repr_png_(self) -> bytes:
@@ -425,10 +425,10 @@ class AVLMap:
         return to_trimesh(self.points, self.colors)
 
     def __repr__(self) -> str:
-        counts = self.stored.info.counts
+        counts = self.data.info.counts
         return (
-            f"AVLMap({self.stored.path.name!r}: {counts.voxels:,} voxels of {self.stored.info.voxel_size_m:g} m, "
-            f"{counts.keyframes} keyframes, {counts.sounds} sounds, profile {self.stored.info.profile})"
+            f"AVLMap({self.path.name!r}: {counts.voxels:,} voxels of {self.data.info.voxel_size_m:g} m, "
+            f"{counts.keyframes} keyframes, {counts.sounds} sounds, profile {self.data.info.profile})"
         )
 
     @checked(QueryError)
@@ -441,7 +441,7 @@ class AVLMap:
         """Return whether the pixel encoder can look for a phrase: any phrase for an open vocabulary, else its words."""
         from avlmaps.query.words import is_open
 
-        encoder = self.stored.encoders.pixels
+        encoder = self.encoders.pixels
         return is_open(encoder) or bool(encoder.understood(phrase))
 
     @checked(QueryError)
@@ -462,11 +462,11 @@ class AVLMap:
     @checked(QueryError)
     def sound_scores(self, text: str) -> Float[np.ndarray, " sounds"]:
         """Return for each sound of the map the probability that it is called so, in [0, 1]."""
-        heard = self.stored.sounds
+        heard = self.data.sounds
         if not len(heard):
             return np.zeros(0)
-        self.stored.require_model(Kind.SOUNDS)
-        return self.stored.encoders.sounds.score_words(sound_features(heard), [text])[:, 0]
+        self.require_model(Kind.SOUNDS)
+        return self.encoders.sounds.score_words(sound_features(heard), [text])[:, 0]
 
     @checked(QueryError)
     def sound_clip(self, clip: str | Path | Sound, primary: bool = False, *, at: HeardAt | None = None) -> Heatmap:
@@ -482,11 +482,11 @@ class AVLMap:
         name = "a clip" if isinstance(clip, Sound) else str(clip)
         part = Part(Modality.SOUND, name, _role(primary), is_file=True)
         sound = require_audible(clip, "that was given") if isinstance(clip, Sound) else read_clip(user_path(clip))
-        heard = self.stored.sounds
+        heard = self.data.sounds
         scores = np.zeros(0)
         if len(heard):
-            self.stored.require_model(Kind.SOUNDS)
-            encoder = self.stored.encoders.sounds
+            self.require_model(Kind.SOUNDS)
+            encoder = self.encoders.sounds
             scores = encoder.score_sounds(sound_features(heard), encoder.encode(sound))
         return self._sound_heat(part, scores, at)
 
@@ -498,7 +498,7 @@ class AVLMap:
 
             factor = source_factor(self.space, self.source_map, scores, part, settings, self.settings.heat)
         else:
-            factor = sound_factor(self.space, self.stored.sounds, scores, part, settings, self.settings.heat)
+            factor = sound_factor(self.space, self.data.sounds, scores, part, settings, self.settings.heat)
         return Heatmap.of(factor, self.settings.found_at)
 
     @cached_property
@@ -532,11 +532,11 @@ class AVLMap:
             BackendError: the map's profile has no view encoder.
         """
         part = Part(Modality.AREA, word, _role(primary))
-        encoder = self.stored.encoders.views
-        self.stored.require_model(Kind.VIEWS)
+        encoder = self.encoders.views
+        self.require_model(Kind.VIEWS)
         settings, number = self.settings, region_named(self, word)
         factor = area_factor(
-            self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes,
+            self.space, self.data.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes,
             self._settled if number is None else partial(self._with_room, number), self._rooms.room_of_places,
         )  # fmt: skip
         return Heatmap.of(factor, settings.found_at)
@@ -555,12 +555,12 @@ class AVLMap:
         """The storeys of the map and the stairs between them; None for a map of one storey."""
         from avlmaps.maps.storeys import find_storeys, stayed_on_one
 
-        cameras = self.space.level(np.asarray(self.stored.keyframes.world_from_camera, np.float64)[:, :3, 3])
+        cameras = self.space.level(np.asarray(self.data.keyframes.world_from_camera, np.float64)[:, :3, 3])
         if stayed_on_one(cameras[:, 2]):
             return None
         from avlmaps.maps.obstacles import MIN_HITS  # slow to load, and most maps have one storey
 
-        certain = np.asarray(self.stored.voxels.hits) >= MIN_HITS
+        certain = np.asarray(self.data.voxels.hits) >= MIN_HITS
         level = self.space.level(self.space.centres[certain])
         found = find_storeys(level, self.space.grid.voxel_size_m, cameras)
         x, y, z = self.space.level_from_world[2].tolist()
@@ -568,7 +568,7 @@ class AVLMap:
 
     @cached_property
     def _rooms(self) -> MapRooms:
-        return MapRooms(self.stored, self.space, self.settings.areas, lambda: self.storeys)
+        return MapRooms(self, self.space, self.settings.areas, lambda: self.storeys)
 
     @cached_property
     def room_votes(self) -> Rooms | None:
@@ -652,14 +652,14 @@ class AVLMap:
         guess_references: int = 0,
         focal_35mm: float | None = None,
     ) -> "Located":
-        from avlmaps.query.locate import LocateSettings, locate
+        from avlmaps.query.locate import LocatableMap, LocateSettings, locate
 
         require_fitting(rgb, intrinsics)
         for kind in (Kind.LOCAL, Kind.PLACE):  # an imported map has neither
-            self.stored.require_model(kind)
+            self.require_model(kind)
         rng = np.random.default_rng(self.settings.seed)
         settings = LocateSettings(guess_references=guess_references)
-        return locate(self.stored, rgb, intrinsics, rng, settings, focal_35mm)
+        return locate(LocatableMap.of(self), rgb, intrinsics, rng, settings, focal_35mm)
 
     def heat(
         self, part: Part, intrinsics: Pinhole | None = None, attachments: "Mapping[str, Attachment] | None" = None
@@ -776,16 +776,6 @@ class AVLMap:
         return ask(self, asked, files)
 
 
-def _opened_map(data: "MapData | StoredMap", encoders: "Encoders | None", path: Path | None) -> "StoredMap":
-    """Return a map with its folder and the encoders that it is asked with."""
-    from avlmaps.maps.store.map_data import MapData
-    from avlmaps.maps.store.reader import StoredMap, encoders_of_map
-
-    if not isinstance(data, MapData):
-        return data if encoders is None else replace(data, encoders=encoders)
-    return StoredMap(path or Path("a map in memory"), data, encoders or encoders_of_map(data.info))
-
-
 def _require_place(at: Any) -> None:
     if at is not None and (not isinstance(at, str) or at not in ("robot", "source")):
         raise QueryError(f"at is robot, where a sound was heard, or source, where it came from; not {at!r}.")
@@ -821,12 +811,11 @@ def with_findings(avlmap: AVLMap) -> AVLMap:
     """
     from avlmaps.maps.store.folder import add_findings, read
 
-    stored = avlmap.stored
-    found = {} if stored.data.findings else avlmap.found()
+    found = {} if avlmap.data.findings else avlmap.found()
     if not found:
         return avlmap
     try:
-        add_findings(stored.path, found)
+        add_findings(avlmap.path, found)
     except MapError:
         return avlmap
-    return avlmap.of_data(read(stored.path))
+    return avlmap.of_data(read(avlmap.path))

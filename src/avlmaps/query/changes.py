@@ -18,9 +18,8 @@ from avlmaps.query.settings import FOUND_AT
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Life, Stay
     from avlmaps.maps.store.manifest import Visit
-    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Thing
-    from avlmaps.query.queryable import Queryable
     from avlmaps.query.schema import ChangeAnswer, ChangesAnswer, DayAnswer, LastSeenAnswer, UsualAnswer
     from avlmaps.query.voxel_space import Space
 
@@ -44,19 +43,19 @@ class Days:
     life: "Life"
 
     @classmethod
-    def of(cls, stored: "StoredMap", corrected: "Callable[[Life], Life] | None" = None) -> "Days":
+    def of(cls, stored: "AVLMap", corrected: "Callable[[Life], Life] | None" = None) -> "Days":
         """Return those of a map.
 
         Raises:
             QueryError: it was seen on one day alone.
         """
-        life = stored.life()
+        life = stored.data.life
         if life is None:
             raise QueryError(
                 f"{stored.path.name} was seen on one day alone, so that nothing is known to have changed; add another "
                 "day with `avlmaps merge`."
             )
-        return cls(stored.info.visits, life if corrected is None else corrected(life))
+        return cls(stored.data.info.visits, life if corrected is None else corrected(life))
 
     @property
     def last(self) -> int:
@@ -241,14 +240,14 @@ def is_meant(name: str) -> Callable[[str], bool]:
     return lambda other: other in (name, own) or lexicon().is_a(other, own, EntryKind.THING)
 
 
-def room_namer(avlmap: "Queryable") -> RoomOf:
+def room_namer(avlmap: "AVLMap") -> RoomOf:
     """Return what names the room of a place in a map; nothing where it has no model of views."""
     from avlmaps.query.whereabouts import NOWHERE, Whereabouts
 
     known: list[Whereabouts] = []
 
     def room_of(place: tuple[float, float, float]) -> str | None:
-        if "views" not in avlmap.stored.info.models:
+        if "views" not in avlmap.data.info.models:
             return None
         if not known:
             known.append(Whereabouts.of(avlmap))
@@ -340,13 +339,13 @@ class Usual:
         return {"there": self.there, "looked": self.looked}
 
 
-def days_of(stored: "StoredMap", corrected: "Callable[[Life], Life]") -> Days:
+def days_of(stored: "AVLMap", corrected: "Callable[[Life], Life]") -> Days:
     """Return the days of a map.
 
     Raises:
         QueryError: it was seen on one day alone.
     """
-    if not getattr(stored.info, "visits", ()):
+    if not getattr(stored.data.info, "visits", ()):
         raise QueryError(
             f"{stored.path.name} was seen on one day alone, so that nobody knows what is usual there; add other days "
             "with `avlmaps merge`."

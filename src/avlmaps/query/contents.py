@@ -26,8 +26,8 @@ from avlmaps.query.settings import FOUND_AT, AreaSettings
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
-    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.maps.storeys import Storeys
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.room_regions import RoomRegions
     from avlmaps.query.rooms import RoomField
     from avlmaps.query.schema import ContentsAnswer, HeardFromAnswer, RoomAnswer, SoundAnswer, ThingAnswer
@@ -257,7 +257,7 @@ def require_known(knows: Callable[[str], bool], names: Sequence[str]) -> None:
 
 
 def find_things(
-    stored: "StoredMap",
+    stored: "AVLMap",
     space: Space,
     instances_of: Callable[[str, bool], Instances],
     names: Sequence[str] | None = None,
@@ -313,22 +313,22 @@ def _confident(found: Instances, least: float) -> Iterator[tuple[float, Int[np.n
         yield float(found.confidence[number]), found.rows[order[bounds[number] : bounds[number + 1]]]
 
 
-def thing_of(stored: "StoredMap", space: Space, name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:
+def thing_of(stored: "AVLMap", space: Space, name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:
     """Return some voxels of a map as a thing of a name."""
     points = space.centres_of(rows)
     extent = np.ptp(space.level(points), axis=0) + space.grid.voxel_size_m
-    colors: UInt8[np.ndarray, "m 3"] = np.asarray(stored.voxels.rgb)[rows]
+    colors: UInt8[np.ndarray, "m 3"] = np.asarray(stored.data.voxels.rgb)[rows]
     r, g, b = (int(value) for value in colors.mean(axis=0).round())
     return Thing(name, round(confidence, 3), _middle(points), plain_point(extent), (r, g, b), rows, points)
 
 
-def find_sounds(stored: "StoredMap", most_names: int = 3) -> list[SoundEvent]:
+def find_sounds(stored: "AVLMap", most_names: int = 3) -> list[SoundEvent]:
     """Return the sounds of a map in the order of their onset, each with its likeliest names.
 
     Raises:
         MapError: the map was built with another sound encoder than is installed.
     """
-    heard = stored.sounds
+    heard = stored.data.sounds
     if not len(heard):
         return []
     stored.require_model(Kind.SOUNDS)
@@ -347,14 +347,14 @@ def find_sounds(stored: "StoredMap", most_names: int = 3) -> list[SoundEvent]:
                 offset_s=float(heard.offset_s[k]),
                 position=plain_point(track.mean(axis=0)),
                 track=track,
-                clip=stored.clip_path(k),
+                clip=stored.data.sounds.clips[k],
             )
         )
     return events
 
 
 def find_rooms(
-    stored: "StoredMap",
+    stored: "AVLMap",
     space: Space,
     settings: AreaSettings,
     least_confidence: float = 0.0,
@@ -368,14 +368,14 @@ def find_rooms(
     Raises:
         BackendError: the map's profile has no view encoder.
     """
-    if not len(stored.keyframes):
+    if not len(stored.data.keyframes):
         return []
     encoder = stored.encoders.views
     stored.require_model(Kind.VIEWS)
     names = area_names(encoder)
-    places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)
+    places = np.asarray(stored.data.keyframes.centre, np.float64).reshape(-1, 3)
     if by_floor is None:
-        share = pooled_name_shares(np.asarray(stored.keyframes.view), encoder, settings, places)
+        share = pooled_name_shares(np.asarray(stored.data.keyframes.view), encoder, settings, places)
         group = _groups_of_views(space.level(places)[:, :2], share, settings.link_m)
         rooms = [*_rooms_of_views(names, share, places, group)]
     else:

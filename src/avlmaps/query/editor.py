@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,9 +14,9 @@ from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, EditedSpot, World, append_edit, in_force, read_edits
 from avlmaps.query.edits import Edited, apply, means, plain_name, said
 from avlmaps.query.places import is_place, place_given, place_of
-from avlmaps.query.queryable import Queryable
 
 if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Thing
     from avlmaps.query.schema import EditAnswer, EditsAnswer
 
@@ -29,26 +28,13 @@ _APART_M = 3.0  # how far apart things that are one may be
 _MOST_NAMED = 8
 
 
-class EditableMap(Queryable, Protocol):
-    """A map that can be corrected: ``AVLMap`` is one."""
-
-    @cached_property
-    def edited(self) -> Edited:
-        """What people corrected."""
-        ...
-
-    def forget_edits(self) -> None:
-        """Read what people corrected again at the next question."""
-        ...
-
-
 class Editor:
     """Corrects a map in its folder.
 
     Edits are stored beside the map and survive another build of it. ``by`` says who made them.
     """
 
-    def __init__(self, avlmap: EditableMap) -> None:
+    def __init__(self, avlmap: "AVLMap") -> None:
         self._map = avlmap
 
     @checked(QueryError)
@@ -193,7 +179,7 @@ class Editor:
         place = numbers if len(numbers) == 3 else self._map.space.world(np.append(numbers, self._floor_m()))
         return self._add(
             "pin",
-            [EditedSpot(middle=plain_point(place)).anchored(self._map.stored.keyframes)],
+            [EditedSpot(middle=plain_point(place)).anchored(self._map.data.keyframes)],
             name=_own_name(name),
             by=by,
         )
@@ -225,7 +211,7 @@ class Editor:
         rows = list({edit.id: edit for edit in log}.values())
         pins = {plain_name(edit.name): edit.id for edit in in_force(log) if edit.does == "pin"}
         moved = {edit.id for edit in rows if edit.does == "pin"} - set(pins.values()) - set(lost)
-        return {"map": self._map.stored.path.name, "edits": [_row(edit, counting, lost, moved) for edit in rows]}
+        return {"map": self._map.path.name, "edits": [_row(edit, counting, lost, moved) for edit in rows]}
 
     def _thing(self, name: str | None, at: Place | None) -> "Thing":
         """Return the one thing that is meant."""
@@ -288,16 +274,16 @@ class Editor:
         if found is None or found.region < 0:
             raise QueryError(f"The floor of the room {room!r} is not mapped, so that it has no extent to name.")
         spot = EditedSpot(name=found.name, middle=found.position, corners=tuple(map(plain_point, found.outline)))
-        return spot.anchored(self._map.stored.keyframes)
+        return spot.anchored(self._map.data.keyframes)
 
     def _area(self, corners: Sequence[Float[np.ndarray, "2"]]) -> EditedSpot:
         floor_m = self._floor_m()
         points = [self._map.space.world(np.append(corner, floor_m)) for corner in corners]
         middle = plain_point(np.mean(points, axis=0))
-        return EditedSpot(middle=middle, corners=tuple(map(plain_point, points))).anchored(self._map.stored.keyframes)
+        return EditedSpot(middle=middle, corners=tuple(map(plain_point, points))).anchored(self._map.data.keyframes)
 
     def _floor_m(self) -> float:
-        space, cameras = self._map.space, np.asarray(self._map.stored.keyframes.world_from_camera)[:1, :3, 3]
+        space, cameras = self._map.space, np.asarray(self._map.data.keyframes.world_from_camera)[:1, :3, 3]
         if self._map.storeys is not None and len(cameras):
             storey = int(self._map.storeys.of_places(cameras)[0])
             return float(self._map.storeys[storey].floor_m)
@@ -322,15 +308,15 @@ class Editor:
         of: str = "",
         by: str = "",
     ) -> Edit:
-        world = World.of(self._map.stored.info) if at else None
+        world = World.of(self._map.data.info) if at else None
         return Edit.new(does, at, name=name, cut=cut, of=of, by=_name(by) if by else "", world=world)
 
     def _add(self, does: Does, at: Sequence[EditedSpot], *, name: str, by: str) -> Edit:
         return self._append(self._new(does, at, name=name, by=by))
 
     def _append(self, edit: Edit) -> Edit:
-        stored = self._map.stored
-        if not stored.info.files:
+        stored = self._map
+        if not stored.data.info.files:
             raise MapError("The map lies in memory alone; save it, and edit what is saved.")
         if not stored.path.is_dir():  # to lock it would make it, and the map may come back
             raise MapError(f"{stored.path} is gone, so that the edit has no place; bring the map back first.")
@@ -339,7 +325,7 @@ class Editor:
         return edit
 
     def _log(self) -> tuple[Edit, ...]:
-        return read_edits(self._map.stored.path)
+        return read_edits(self._map.path)
 
     def _after(self, *more: Edit) -> Edited:
         return apply((*self._log(), *more), self._map)

@@ -8,7 +8,7 @@ which rooms and areas follow.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,11 +31,8 @@ from avlmaps.query.voxel_space import linked
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import ForbiddenArea
     from avlmaps.maps.store.life import Life
-    from avlmaps.maps.store.reader import StoredMap
-    from avlmaps.maps.storeys import Storeys
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Room, Thing
-    from avlmaps.query.room_regions import RoomRegions
-    from avlmaps.query.voxel_space import Space
 
 Box = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]
 """The lowest and the highest corner, metres, level frame."""
@@ -50,38 +47,10 @@ which the truth is not clear. With .15, 88 are found and three more are wrong; w
 """
 
 
-class SeenMap(Protocol):
-    """What edits need of a map: what its encoders see."""
-
-    @property
-    def stored(self) -> "StoredMap":
-        """The map as it lies on the disk."""
-        ...
-
-    @cached_property
-    def space(self) -> "Space":
-        """The voxels' places."""
-        ...
-
-    @cached_property
-    def storeys(self) -> "Storeys | None":
-        """The storeys of the map; None for a map of one."""
-        ...
-
-    @cached_property
-    def room_regions(self) -> "RoomRegions | None":
-        """The rooms that walls and doorways bound."""
-        ...
-
-    def things_to_edit(self, name: str | None) -> "Sequence[Thing]":
-        """Return the things that an edit may be about, of a name or all, as the encoder sees them."""
-        ...
-
-
 class Spots:
     """Finds what fills the box of a spot, in a map without its edits."""
 
-    def __init__(self, avlmap: SeenMap) -> None:
+    def __init__(self, avlmap: "AVLMap") -> None:
         self._map = avlmap
 
     def thing_at(self, spot: EditedSpot | None) -> "Thing | None":
@@ -100,7 +69,7 @@ class Spots:
 
     def carried(self, spot: EditedSpot) -> EditedSpot | None:
         """Return where a later day found the thing of a spot, of which an earlier day knew; None where it did not."""
-        life = self._map.stored.life() if getattr(self._map.stored.info, "visits", ()) else None
+        life = self._map.data.life if getattr(self._map.data.info, "visits", ()) else None
         if life is None:
             return None
         number = self.stay_at(life, spot)
@@ -145,7 +114,7 @@ class Spots:
         low, high = self.box(rows)
         middle = self._map.space.world((low + high) / 2.0)
         spot = EditedSpot(name=name, middle=plain_point(middle), size=plain_point(high - low))
-        return spot.anchored(self._map.stored.keyframes)
+        return spot.anchored(self._map.data.keyframes)
 
 
 _SAME_BOX = 0.5
@@ -213,7 +182,7 @@ class FoundEdits:
         edits: those in force.
     """
 
-    def __init__(self, edits: tuple[Edit, ...], avlmap: SeenMap) -> None:
+    def __init__(self, edits: tuple[Edit, ...], avlmap: "AVLMap") -> None:
         self.edits = edits
         self._map, self._spots = avlmap, Spots(avlmap)
         self._lost: dict[str, LostEdit] = {}
@@ -226,7 +195,7 @@ class FoundEdits:
         """The things that were renamed, merged or split, by their first voxel."""
         claims: list[Claim] = []
         for edit in self._of("rename", "merge", "split"):
-            found = [self._targets(spot.now(self._map.stored.keyframes), claims) for spot in edit.at]
+            found = [self._targets(spot.now(self._map.data.keyframes), claims) for spot in edit.at]
             if not all(found):
                 at = edit.at[[bool(one) for one in found].index(False)]
                 self._lose(edit, f"nothing like the {at.name or 'thing'} is at {place_text(at.middle)} any more")
@@ -266,7 +235,7 @@ class FoundEdits:
             return np.zeros((0, 2))
         spot = edit.at[0]
         with_cut = EditedSpot(middle=spot.middle, corners=edit.cut, seen_from=spot.seen_from).now(
-            self._map.stored.keyframes
+            self._map.data.keyframes
         )
         return self._map.space.level(np.array(with_cut.corners, np.float64))[:, :2]
 
@@ -300,7 +269,7 @@ class FoundEdits:
             regions = self._map.room_regions
         found: dict[int, Edit] = {}
         for edit in edits:
-            spot = edit.at[0].now(self._map.stored.keyframes)
+            spot = edit.at[0].now(self._map.data.keyframes)
             share = np.zeros(1)
             if regions is not None and len(regions) and spot.corners:
                 share = regions.shares_of(np.array(spot.middle), np.array(spot.corners))
@@ -314,7 +283,7 @@ class FoundEdits:
     @cached_property
     def pins(self) -> Mapping[str, tuple[Edit, Float[np.ndarray, "3"]]]:
         """The places that were named, by plain names: the last place of each."""
-        keyframes = self._map.stored.keyframes
+        keyframes = self._map.data.keyframes
         return {plain_name(edit.name): (edit, np.array(edit.at[0].now(keyframes).middle)) for edit in self._of("pin")}
 
     @cached_property
@@ -325,7 +294,7 @@ class FoundEdits:
         areas: list[ForbiddenArea] = []
         storeys = self._map.storeys
         for edit in self._of("forbid"):
-            corners = np.array(edit.at[0].now(self._map.stored.keyframes).corners, np.float64)
+            corners = np.array(edit.at[0].now(self._map.data.keyframes).corners, np.float64)
             storey = 0 if storeys is None else int(storeys.of_places(corners.mean(axis=0))[0])
             level = self._map.space.level(corners)[:, :2]
             areas.append(ForbiddenArea(edit.name, said(edit), level, storey))
@@ -348,7 +317,7 @@ class FoundEdits:
         wanted = [edit for edit in self.edits if edit.does in does]
         own: list[Edit] = []
         for edit in wanted:
-            if edit.world is None or edit.world.is_that_of(World.of(self._map.stored.info)):
+            if edit.world is None or edit.world.is_that_of(World.of(self._map.data.info)):
                 own.append(edit)
             else:
                 self._lose(edit, f"it was made in a map of another recording, {edit.world.name}")
@@ -395,7 +364,7 @@ def means(asked: str) -> Callable[[str], bool]:
     return is_meant
 
 
-def apply(edits: Sequence[Edit], avlmap: SeenMap) -> "Edited":
+def apply(edits: Sequence[Edit], avlmap: "AVLMap") -> "Edited":
     """Return what edits make of a map: of no edits, everything stays the same object.
 
     Args:
@@ -457,7 +426,7 @@ class Edited(FoundEdits):
         rows, instance, confidence, given = self._claimed(rows, raw.instance, raw.confidence, word)
         if colour is not None and lexicon().find(word, EntryKind.THING) is None and len(given):
             last = np.arange(len(confidence) - len(given), len(confidence))
-            rgb = np.asarray(self._map.stored.voxels.rgb)
+            rgb = np.asarray(self._map.data.voxels.rgb)
             for number, claim in zip(last, given, strict=True):
                 own = np.zeros(len(claim.rows), np.int64)
                 confidence[number] *= colour_share(rgb, claim.rows, own, colour)[0]
@@ -530,7 +499,7 @@ class Edited(FoundEdits):
         def is_wanted(name: str, sure: float) -> bool:
             return sure >= least_confidence and (wanted is None or any(one(name) for one in wanted))
 
-        stored, space = self._map.stored, self._map.space
+        stored, space = self._map, self._map.space
         own = [
             replace(thing_of(stored, space, one.name, one.confidence, one.rows), edited=said(one.edit))
             for one in self.claims
@@ -572,7 +541,7 @@ class Edited(FoundEdits):
 
         stays, changed = list(life.stays), False
         for edit in self._of("rename"):
-            number = self._spots.stay_at(life, edit.at[0].now(self._map.stored.keyframes))
+            number = self._spots.stay_at(life, edit.at[0].now(self._map.data.keyframes))
             if number is None:
                 continue
             while (before := stays[number].moved_from) is not None:

@@ -340,7 +340,7 @@ def write_openlex3d(folder: Path, opened: "AVLMap") -> tuple[Path, ...]:
     Raises:
         QueryError: no voxel has a feature, or a file cannot be written.
     """
-    voxels = opened.stored.voxels
+    voxels = opened.data.voxels
     rows = np.flatnonzero(np.asarray(voxels.weight) > 0.0)
     if not len(rows):
         raise QueryError("No voxel of the map has a feature, so that there is nothing to evaluate.")

@@ -124,7 +124,7 @@ def layers_of(
     Raises:
         QueryError: the question cannot be answered.
     """
-    space, stored = opened.space, opened.stored
+    space, stored = opened.space, opened
     level = space.level_from_recording
     turn = level if frame is FrameName.LEVEL else np.eye(4)
     axes = turn @ inverse(level)
@@ -134,7 +134,7 @@ def layers_of(
 
     qx, qy, qz, qw = (float(value) for value in to_quaternion(axes))
     boxes: list[ExportedBox] = []
-    known = "pixels" in stored.info.models  # else it names none, and shows the rest
+    known = "pixels" in stored.data.info.models  # else it names none, and shows the rest
     for thing in opened.things(least_confidence=least_confidence) if known else []:
         corners = space.level(thing.points)
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
@@ -143,7 +143,7 @@ def layers_of(
     warm = None
     if heat is not None and (asked := opened.ask(heat).heat) is not None:
         warm = heat, np.asarray(asked.values, np.float32)
-    keyframes, rig = stored.keyframes, stored.rig
+    keyframes, rig = stored.data.keyframes, stored.data.rig
     pictures = tuple(keyframes.jpeg(row).tobytes() for row in range(len(keyframes)))
     return Layers(
         frame=frame,

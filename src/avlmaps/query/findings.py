@@ -33,8 +33,8 @@ from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import ClosestWords, EncodedWord, KnownClosestWords, Vocabulary
 
 if TYPE_CHECKING:
-    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.maps.storeys import Storeys
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.settings import QuerySettings
 
 Findings = Mapping[str, np.ndarray]
@@ -147,7 +147,7 @@ class MapNames:
 
     def __init__(
         self,
-        stored: "StoredMap",
+        stored: "AVLMap",
         space: Space,
         settings: "QuerySettings",
         in_rooms: Callable[[], ThingsInRooms | None],
@@ -162,7 +162,7 @@ class MapNames:
         # Of names, most voxels have too little of the word to be compared with all others.
         words = self._known_words if vocabulary is None else None
         rivals = self.closest_words(vocabulary) if words is None else words
-        voxels = self._feature_voxels(encoder, rivals, self._stored.voxels.rgb)
+        voxels = self._feature_voxels(encoder, rivals, self._stored.data.voxels.rgb)
         known = (
             dict(self._known_searches) if vocabulary is None else {}
         )  # of a name of the encoder, narrower names with it
@@ -186,14 +186,14 @@ class MapNames:
     def _feature_voxels(
         self, encoder: PixelEncoder, rivals: Vocabulary, rgb: UInt8[np.ndarray, "n 3"] | None = None
     ) -> FeatureVoxels:
-        feature, settings = self._stored.voxels.feature, self._settings.objects
+        feature, settings = self._stored.data.voxels.feature, self._settings.objects
         return FeatureVoxels(self._space, feature, encoder, rivals, settings, rgb, self._in_rooms)
 
     def closest_words(self, vocabulary: Sequence[str] | None = None) -> ClosestWords:
         """Return the two words of a vocabulary, by default the encoder's own, that are closest to each voxel."""
         encoder = self._stored.encoders.pixels
         self._stored.require_model(Kind.PIXELS)
-        feature, known = self._stored.voxels.feature, self._known_words if vocabulary is None else None
+        feature, known = self._stored.data.voxels.feature, self._known_words if vocabulary is None else None
         if known is not None:
             return known.whole(feature)
         names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
@@ -215,7 +215,7 @@ class MapNames:
         closest = names_from(self._stored.data.findings, key_of(vocabulary.digest))
         if closest is not None:
             return KnownClosestWords.known_everywhere(vocabulary, closest)
-        return KnownClosestWords.of(vocabulary, len(self._stored.voxels))
+        return KnownClosestWords.of(vocabulary, len(self._stored.data.voxels))
 
     def found(self) -> dict[str, np.ndarray]:
         """Return the names closest to each voxel and the instances of all names; none of an encoder of any words."""
@@ -224,7 +224,7 @@ class MapNames:
         known, encoder = self._known_words, self._stored.encoders.pixels
         if known is None:
             return {}
-        words = known.whole(self._stored.voxels.feature)
+        words = known.whole(self._stored.data.voxels.feature)
         closest = words.best, words.best_word, words.second, words.second_word
         searches = searches_for([name for name in encoder.vocabulary if name not in STRUCTURE], encoder)
         things = {one: self.search(*one) for one in searches}
@@ -246,7 +246,7 @@ class MapRooms:
     """What the encoders see of the rooms of a map; computed when it is asked for, or as the build found it."""
 
     def __init__(
-        self, stored: "StoredMap", space: Space, settings: AreaSettings, storeys: "Callable[[], Storeys | None]"
+        self, stored: "AVLMap", space: Space, settings: AreaSettings, storeys: "Callable[[], Storeys | None]"
     ) -> None:
         self._stored, self._space, self._settings, self._storeys = stored, space, settings, storeys
 
@@ -259,12 +259,12 @@ class MapRooms:
         from avlmaps.maps.storeys import one_storey
 
         settings, stored = self._settings, self._stored
-        if not settings.by_room or not len(stored.keyframes):
+        if not settings.by_room or not len(stored.data.keyframes):
             return None
-        cameras = self._space.level(np.asarray(stored.keyframes.world_from_camera, np.float64)[:, :3, 3])[:, 2]
-        ground = stored.info.ground
+        cameras = self._space.level(np.asarray(stored.data.keyframes.world_from_camera, np.float64)[:, :3, 3])[:, 2]
+        ground = stored.data.info.ground
         known = [(floor.best.height_m, floor.cameras) for floor in ground.floors] if ground is not None else []
-        places = area_anchors(stored.keyframes, settings)
+        places = area_anchors(stored.data.keyframes, settings)
         plan = FloorPlan.of(self._space, self._storeys() or one_storey(known, cameras), places)
         return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms)
 
@@ -280,9 +280,9 @@ class MapRooms:
         return regions if field is None else regions.joined(seen_twice(field, regions))
 
     def _seen_regions(self, votes: Rooms) -> RoomRegions:
-        camera = self._stored.rig.depth
+        camera = self._stored.data.rig.depth
         width_rad = 2.0 * float(np.arctan2(camera.width, 2.0 * camera.fx))
-        return RoomRegions.of(votes.plan, np.asarray(self._stored.keyframes.world_from_camera), width_rad)
+        return RoomRegions.of(votes.plan, np.asarray(self._stored.data.keyframes.world_from_camera), width_rad)
 
     @cached_property
     def field(self) -> RoomField | None:
@@ -296,7 +296,7 @@ class MapRooms:
         known = field_from(self._stored.data.findings, votes.plan, kinds, self._settings)
         if known is not None:
             return known
-        return votes.field(kinds, name_shares(np.asarray(self._stored.keyframes.view), encoder, self._settings))
+        return votes.field(kinds, name_shares(np.asarray(self._stored.data.keyframes.view), encoder, self._settings))
 
     @property
     def known_field(self) -> RoomField | None:
@@ -316,8 +316,8 @@ class MapRooms:
             return None
         if not namer.calibrated or not namer.names:
             return None
-        feature = self._stored.voxels.feature
-        rows, every = voting_rows(np.asarray(self._stored.voxels.index), len(namer.names) * feature.shape[1])
+        feature = self._stored.data.voxels.feature
+        rows, every = voting_rows(np.asarray(self._stored.data.voxels.index), len(namer.names) * feature.shape[1])
         area_m2 = every * self._space.grid.voxel_size_m**2
         encoder = self._stored.encoders.pixels
         surveyed = encoder.room_contents if isinstance(encoder, SurveyedEncoder) else None
@@ -333,7 +333,7 @@ class MapRooms:
     def room_of_cells(self) -> Int[np.ndarray, " c"]:
         """The number of the room of each cell of the floor plan."""
         assert self.regions is not None
-        return rooms_of_cells(self.regions, area_anchors(self._stored.keyframes, self._settings))
+        return rooms_of_cells(self.regions, area_anchors(self._stored.data.keyframes, self._settings))
 
     def found(self) -> dict[str, np.ndarray]:
         """Return the rooms and their kinds, for ``findings``; none where there is no floor plan."""

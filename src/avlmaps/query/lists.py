@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -38,8 +38,8 @@ from avlmaps.query.whereabouts import NOWHERE, Whereabouts
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Stay
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import SoundEvent, Thing
-    from avlmaps.query.queryable import Queryable
 
 BESIDE_M = 1.0  # from box to box, horizontally
 _ON_M = 0.3  # how far over a thing's box another that lies on it may be
@@ -53,7 +53,7 @@ _MOST_SOURCES = 5  # of sounds by time; each costs a density
 
 
 def answer_list(
-    avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[[str], Answer], at: HeardAt | None = None
+    avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callable[[str], Answer], at: HeardAt | None = None
 ) -> Answer:
     """Answer a question from the lists of a map.
 
@@ -81,7 +81,7 @@ def answer_list(
 
 
 def _answer(
-    avlmap: "Queryable", goals: Sequence[Goal], text: str, subject: Answer | None = None, count: int | None = None
+    avlmap: "AVLMap", goals: Sequence[Goal], text: str, subject: Answer | None = None, count: int | None = None
 ) -> Answer:
     probability = goals[0].probability if goals else 0.0
     found = bool(goals) and probability >= avlmap.settings.found_at
@@ -90,7 +90,7 @@ def _answer(
     return Answer(tuple(goals), found, parts, 0.0, heat, probability, count, text=text, notes=said)
 
 
-def _rooms_by_size(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:
+def _rooms_by_size(avlmap: "AVLMap", first: bool) -> tuple[list[Goal], str]:
     where = Whereabouts.of(avlmap)
     areas = where.areas_m2()
     if not len(areas):
@@ -109,7 +109,7 @@ def _room_goal(where: Whereabouts, number: int) -> Goal:
     return Goal(room.position, room.confidence, _NO_SIZE, {}, room.confidence, where.names[number])
 
 
-def _sounds_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:
+def _sounds_by_time(avlmap: "AVLMap", first: bool) -> tuple[list[Goal], str]:
     sounds = sorted(avlmap.sounds(), key=lambda sound: sound.onset_s if first else -sound.onset_s)
     if not sounds:
         return [], "The map holds no sounds."
@@ -123,7 +123,7 @@ def _sound_goal(sound: "SoundEvent") -> Goal:
     return Goal(sound.position, score, _NO_SIZE, {}, score, sound.names[0] if sound.names else "sound")
 
 
-def _heard(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
+def _heard(avlmap: "AVLMap", question: ListQuestion, top: int) -> Answer:
     """Return when, where and how often a sound was heard, which came first, or what was heard in a room."""
     sounds = sorted(avlmap.sounds(), key=lambda sound: sound.onset_s)
     room_of = room_namer(avlmap)
@@ -176,7 +176,7 @@ def _stems(words: str) -> frozenset[str]:
     return frozenset(stem_of(forms.get(word, word)) for word in plain)
 
 
-def _sources_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:
+def _sources_by_time(avlmap: "AVLMap", first: bool) -> tuple[list[Goal], str]:
     """Return the sounds by their onset at the places that they came from, and what the first one may be.
 
     Raises:
@@ -185,11 +185,11 @@ def _sources_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]
     heard, _ = _sounds_by_time(avlmap, first)
     if not heard:
         return _sounds_by_time(avlmap, first)
-    from avlmaps.query.sound_sources import Listening, source_of
+    from avlmaps.query.sound_sources import source_of
 
     sounds = avlmap.sounds()
     numbers = sorted(range(len(sounds)), key=lambda number: sounds[number].onset_s * (1.0 if first else -1.0))
-    listening = cast(Listening, avlmap)
+    listening = avlmap
     if not listening.source_map.is_located(numbers[0]):
         goals, text = _sounds_by_time(avlmap, first)
         return goals, f"{text} Where it came from is not found yet; ask again in a moment."
@@ -205,7 +205,7 @@ def _sources_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]
     return goals, f"{told} It may be {things}." if things else told
 
 
-def _names(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
+def _names(avlmap: "AVLMap", question: ListQuestion, top: int) -> Answer:
     if question.name == "rooms":
         where = Whereabouts.of(avlmap)
         goals = [_room_goal(where, number) for number in range(len(where.rooms))]
@@ -220,11 +220,11 @@ def _names(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
     return _answer(avlmap, goals[:top], text, count=len(named))
 
 
-def _changes(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
+def _changes(avlmap: "AVLMap", question: ListQuestion, top: int) -> Answer:
     """Return what is new, gone or moved, in a room or anywhere, and when it was noticed."""
-    days = Days.of(avlmap.stored, avlmap.edited.life)
+    days = Days.of(avlmap, avlmap.edited.life)
     since = days.visit_of(question.since) if question.since else 0
-    answer = changes_answer(days, avlmap.stored.path.name, since, room_namer(avlmap))
+    answer = changes_answer(days, avlmap.path.name, since, room_namer(avlmap))
     every: tuple[ChangeKind, ...] = ("new", "moved", "gone")
     kinds: list[ChangeKind] = [kind for kind in every if question.change in ("", kind)]
     listed = [one for one in answer["changes"] if one["kind"] in kinds]
@@ -246,11 +246,11 @@ def _changes(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
     return replace(whole, found=bool(whole.goals), when=tuple(one["noticed"] for one in listed[:top]))
 
 
-def _last_seen(avlmap: "Queryable", name: str, top: int) -> Answer:
+def _last_seen(avlmap: "AVLMap", name: str, top: int) -> Answer:
     entry = lexicon().head(name, EntryKind.THING)
     if entry is None:
         raise QueryError(f"{name!r} is no thing that is known; name a thing, such as: where was the bag last seen?")
-    answer = last_seen(Days.of(avlmap.stored, avlmap.edited.life), name, is_meant(entry.name), room_namer(avlmap))
+    answer = last_seen(Days.of(avlmap, avlmap.edited.life), name, is_meant(entry.name), room_namer(avlmap))
     goals = [
         Goal(tuple(one["position"]), one["confidence"], _NO_SIZE, {}, one["confidence"], one["name"])  # pyright: ignore[reportArgumentType]
         for one in answer["seen"]
@@ -259,9 +259,9 @@ def _last_seen(avlmap: "Queryable", name: str, top: int) -> Answer:
     return replace(whole, when=tuple(one["last_seen"] for one in answer["seen"][:top]))
 
 
-def _usual(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
+def _usual(avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
     """Return what is usually somewhere, or where a thing usually is, by the days that looked."""
-    days = days_of(avlmap.stored, avlmap.edited.life)
+    days = days_of(avlmap, avlmap.edited.life)
     name = question.name
     if not question.how:
         meant = means(name)
@@ -288,7 +288,7 @@ def _usual(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[
     return replace(whole, found=is_known, usual=tuple(one.to_json() for one in found[:top]))
 
 
-def lies(avlmap: "Queryable", how: str, stay: "Stay", mark: Goal) -> bool:
+def lies(avlmap: "AVLMap", how: str, stay: "Stay", mark: Goal) -> bool:
     """Return whether a thing lies on or near another."""
     level = avlmap.space.level
     own, place = level(np.array([stay.position]))[0], level(np.array([mark.position]))[0]
@@ -305,7 +305,7 @@ def lies(avlmap: "Queryable", how: str, stay: "Stay", mark: Goal) -> bool:
     return over and 0.0 <= rises_m <= mark_size[2] / 2.0 + _ON_M
 
 
-def _about(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
+def _about(avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
     subject = ask(question.name)
     if not subject.found:
         return replace(subject, goals=())
@@ -318,7 +318,7 @@ def _about(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[
     return _answer(avlmap, goals[:top], text, subject)
 
 
-def _room_of(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:
+def _room_of(avlmap: "AVLMap", subject: Answer) -> tuple[list[Goal], str]:
     where, goal = Whereabouts.of(avlmap), subject.goals[0]
     number = int(where.rooms_of(np.array([goal.position]))[0])
     if number == NOWHERE:
@@ -330,7 +330,7 @@ def _room_of(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:
     return [inside], placed(f"{words} is in {the_room(where.names[number])}", inside)
 
 
-def _contents(avlmap: "Queryable", name: str) -> tuple[list[Goal], str]:
+def _contents(avlmap: "AVLMap", name: str) -> tuple[list[Goal], str]:
     where, things = Whereabouts.of(avlmap), _things(avlmap)
     places = np.array([thing.position for thing in things]).reshape(-1, 3)
     inside = _inside(where, name, places)
@@ -340,7 +340,7 @@ def _contents(avlmap: "Queryable", name: str) -> tuple[list[Goal], str]:
     return goals, f"In {the_room(name)}: {counted([goal.name for goal in goals])}."
 
 
-def _has_room(avlmap: "Queryable", name: str) -> bool:
+def _has_room(avlmap: "AVLMap", name: str) -> bool:
     where = Whereabouts.of(avlmap)
     return where.one_named(name) is not None or any(
         room.may_be(lambda kind: _same_room(kind, name)) for room in where.rooms
@@ -358,7 +358,7 @@ def _no_room(name: str) -> str:
     return f"The map shows no room that is a {name} as a whole."
 
 
-def _things_beside(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:
+def _things_beside(avlmap: "AVLMap", subject: Answer) -> tuple[list[Goal], str]:
     level, things = avlmap.space.level, _things(avlmap)
     own, size = level(np.array([subject.goals[0].position]))[0], np.array(subject.goals[0].size)
     near: list[tuple[float, Thing]] = []
@@ -388,13 +388,13 @@ def _overlap(
     return bool((apart <= size_a / 2.0).all() and (apart <= size_b / 2.0).all())
 
 
-def contents_of(avlmap: "Queryable") -> list[Goal]:
+def contents_of(avlmap: "AVLMap") -> list[Goal]:
     """Return all things of a map as goals, the most confident first."""
     return [_thing_goal(thing) for thing in _things(avlmap)]
 
 
-def _things(avlmap: "Queryable") -> "list[Thing]":
-    return avlmap.things() if "pixels" in avlmap.stored.info.models else []
+def _things(avlmap: "AVLMap") -> "list[Thing]":
+    return avlmap.things() if "pixels" in avlmap.data.info.models else []
 
 
 def _thing_goal(thing: "Thing") -> Goal:
@@ -418,7 +418,7 @@ def counted(names: Sequence[str]) -> str:
 _MOST_GOALS = 200
 
 
-def how_many(avlmap: "Queryable") -> Answer:
+def how_many(avlmap: "AVLMap") -> Answer:
     """Return how many storeys a map has."""
     storeys = avlmap.storeys
     count, text = 1 if storeys is None else len(storeys), said_storeys(storeys).removeprefix("it ")
@@ -426,7 +426,7 @@ def how_many(avlmap: "Queryable") -> Answer:
 
 
 def answer_on_storey(
-    avlmap: "Queryable", said: Sequence[SaidStorey], top: int, ask: Callable[[str, int], Answer]
+    avlmap: "AVLMap", said: Sequence[SaidStorey], top: int, ask: Callable[[str, int], Answer]
 ) -> Answer:
     """Answer a question that names a storey.
 
@@ -466,7 +466,7 @@ def _list(word: SaidStorey, goals: Sequence[Goal]) -> str:
 
 
 def _restricted(
-    avlmap: "Queryable", whole: Answer, word: SaidStorey, numbers: Sequence[int], notes: tuple[str, ...], top: int
+    avlmap: "AVLMap", whole: Answer, word: SaidStorey, numbers: Sequence[int], notes: tuple[str, ...], top: int
 ) -> Answer:
     """Return the goals of an answer that lie on some storeys; found where the first of them is likely enough."""
     storeys, found_at = avlmap.storeys, avlmap.settings.found_at

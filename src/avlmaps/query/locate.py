@@ -9,7 +9,7 @@ import time
 from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
-from typing import Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, UInt8
@@ -23,6 +23,9 @@ from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.pose import PoseSettings, agreement, estimate_pose, pose_deviation, refine_focal
 from avlmaps.perception.protocols import LocalFeatures, Pose
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
 
 FocalSource = Literal["map", "given", "exif", "assumed", "photo"]
 """Where a focal length is from: the map's camera, the caller, EXIF, a guess, or the photo itself with its pose."""
@@ -180,29 +183,26 @@ _AS_WELL, _ELSEWHERE_M, _MOST_ALIKE = 0.6, 2.0, 40
 _SAME_SIDE = 0.25  # cosine: no descriptor bears a change of view by more than 75 degrees
 
 
-@runtime_checkable
-class LocatableMap(Protocol):
-    """The parts of a stored map that ``locate`` needs."""
+@dataclass(frozen=True, slots=True)
+class LocatableMap:
+    """The parts of a map that ``locate`` needs.
 
-    @property
-    def keyframes(self) -> Keyframes:
-        """Its keyframes."""
-        ...
+    Attributes:
+        keyframes: stored pictures.
+        place_state: what the place encoder learned.
+        encoders: that made the keyframes.
+        rig: the recording's cameras.
+    """
 
-    @property
-    def place_state(self) -> dict[str, np.ndarray]:
-        """The state that the place encoder learned."""
-        ...
+    keyframes: Keyframes
+    place_state: dict[str, np.ndarray]
+    encoders: Encoders
+    rig: Rig
 
-    @property
-    def encoders(self) -> Encoders:
-        """The encoders that made the keyframes."""
-        ...
-
-    @property
-    def rig(self) -> Rig:
-        """The recording's cameras."""
-        ...
+    @classmethod
+    def of(cls, avlmap: "AVLMap") -> "LocatableMap":
+        """Return those of a map."""
+        return cls(avlmap.data.keyframes, avlmap.data.place_state, avlmap.encoders, avlmap.data.rig)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from avlmaps.perception.protocols import NamedPixelEncoder, ScaledEncoder
 from avlmaps.query.words import encoded_words
 
 if TYPE_CHECKING:
-    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.voxel_space import Space
     from avlmaps.query.words import ClosestWords
 
@@ -28,14 +28,14 @@ class VoxelNamer:
         calibrated: whether confidences are probabilities; else they are cosines.
     """
 
-    def __init__(self, stored: "StoredMap", vocabulary: Sequence[str] | None = None) -> None:
+    def __init__(self, stored: "AVLMap", vocabulary: Sequence[str] | None = None) -> None:
         """Take the encoder's names, or a vocabulary for one that has none of its own.
 
         Raises:
             BackendError: the map's profile has no pixel encoder.
             MapError: the map was built with another encoder than is installed.
         """
-        self._voxels = stored.voxels
+        self._voxels = stored.data.voxels
         encoder = stored.encoders.pixels
         stored.require_model(Kind.PIXELS)
         self._named = isinstance(encoder, NamedPixelEncoder)
@@ -94,16 +94,16 @@ class VoxelNamer:
         return number, confidence
 
 
-def keyframes_that_saw(stored: "StoredMap", space: "Space", row: int) -> Int[np.ndarray, " k"]:
+def keyframes_that_saw(stored: "AVLMap", space: "Space", row: int) -> Int[np.ndarray, " k"]:
     """Return the keyframes that had a voxel in view with nothing of the map in between, the nearest first."""
-    poses = np.asarray(stored.keyframes.world_from_camera, np.float64)
+    poses = np.asarray(stored.data.keyframes.world_from_camera, np.float64)
     if not len(poses):
         return np.zeros(0, np.int64)
     point = space.centres[row]
     away = point - poses[:, :3, 3]
     at = np.einsum("kji,kj->ki", poses[:, :3, :3], away)
     distance_m = np.linalg.norm(away, axis=1)
-    camera = stored.rig.depth
+    camera = stored.data.rig.depth
     with np.errstate(divide="ignore", invalid="ignore"):
         pixel = camera.project(at)
     inside = (at[:, 2] > _NEAR_M) & (distance_m < _FAR_M)

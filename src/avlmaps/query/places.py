@@ -131,7 +131,7 @@ def column_point(avlmap: "AVLMap", level_xy: Float[np.ndarray, "2"], radius_m: f
     space = avlmap.space
     level = space.level(space.centres)
     rows = np.flatnonzero(np.square(level[:, :2] - level_xy).sum(axis=1) <= radius_m**2)
-    cameras = space.level(np.asarray(avlmap.stored.keyframes.world_from_camera)[:, :3, 3])
+    cameras = space.level(np.asarray(avlmap.data.keyframes.world_from_camera)[:, :3, 3])
     if len(cameras) and len(rows):
         below = rows[level[rows, 2] <= cameras[:, 2].max() + 0.3]
         rows = below if len(below) else rows
@@ -154,7 +154,7 @@ def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: fl
     if not 0.0 < radius_m <= 5.0:
         raise QueryError(f"The radius is {radius_m:g} m; it must be over 0 and at most 5.")
     rows = voxels_near(avlmap, point, radius_m)
-    voxels, centres = avlmap.stored.voxels, avlmap.space.centres
+    voxels, centres = avlmap.data.voxels, avlmap.space.centres
     away = float(np.linalg.norm(centres[rows[0]] - point)) if len(rows) else None
     at = centres[rows[0]] if len(rows) else point
     seen = float(np.asarray(voxels.last_seen_s)[rows].max()) if len(rows) else None
@@ -175,9 +175,9 @@ def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: fl
 
 
 def _names(avlmap: "AVLMap", rows: Int[np.ndarray, " m"]) -> list[NameScore]:
-    if not len(rows) or "pixels" not in avlmap.stored.info.models:
+    if not len(rows) or "pixels" not in avlmap.data.info.models:
         return []
-    namer, said = VoxelNamer(avlmap.stored), avlmap.edited.named_at(rows)
+    namer, said = VoxelNamer(avlmap), avlmap.edited.named_at(rows)
     own: list[NameScore] = [] if said is None else [{"name": said, "confidence": 1.0}]
     confidence = namer.confidences(rows)
     some = confidence[confidence.any(axis=1)]
@@ -190,13 +190,13 @@ def _names(avlmap: "AVLMap", rows: Int[np.ndarray, " m"]) -> list[NameScore]:
 
 
 def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
-    stored = avlmap.stored
-    if "views" not in stored.info.models or not len(stored.keyframes):
+    stored = avlmap
+    if "views" not in stored.data.info.models or not len(stored.data.keyframes):
         return []
     encoder = stored.encoders.views
     field = avlmap.room_field
     names = area_names(encoder) if field is None else field.kinds
-    places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)
+    places = np.asarray(stored.data.keyframes.centre, np.float64).reshape(-1, 3)
     space = avlmap.space
     here, map_xy = space.level(point)[:2], space.level_centres()[:, :2]
     if (here < map_xy.min(axis=0) - _BESIDE_M).any() or (here > map_xy.max(axis=0) + _BESIDE_M).any():
@@ -206,14 +206,14 @@ def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
     if field is not None:
         share = field.at(point[None])[0].astype(np.float64)
     else:
-        view = np.asarray(stored.keyframes.view)
+        view = np.asarray(stored.data.keyframes.view)
         share = pooled_name_shares(view, encoder, avlmap.settings.areas, places)[near].mean(axis=0)
     order = np.argsort(-share, kind="stable")[:3]
     return [{"name": names[i], "confidence": round(float(np.clip(share[i], 0.0, 1.0)), 3)} for i in order]
 
 
 def _views(avlmap: "AVLMap", row: int) -> list[ViewOfPlace]:
-    keyframes = avlmap.stored.keyframes
+    keyframes = avlmap.data.keyframes
     point = avlmap.space.centres[row]
     cameras = np.asarray(keyframes.world_from_camera, np.float64)[:, :3, 3]
     return [
@@ -222,7 +222,7 @@ def _views(avlmap: "AVLMap", row: int) -> list[ViewOfPlace]:
             "camera": [float(value) for value in cameras[k]],
             "distance_m": float(np.linalg.norm(point - cameras[k])),
         }
-        for k in keyframes_that_saw(avlmap.stored, avlmap.space, row)[:_MOST_VIEWS]
+        for k in keyframes_that_saw(avlmap, avlmap.space, row)[:_MOST_VIEWS]
     ]
 
 
@@ -254,8 +254,8 @@ def last_seen(avlmap: "AVLMap", thing: str, top: int = 3) -> LastSeenAnswer:
     """
     heat = avlmap.heat(Part(Modality.OBJECT, thing, Role.PRIMARY))
     factor = heat.factors[0]
-    stamps = np.asarray(avlmap.stored.voxels.last_seen_s)
-    end_s = avlmap.stored.info.recording.duration_s
+    stamps = np.asarray(avlmap.data.voxels.last_seen_s)
+    end_s = avlmap.data.info.recording.duration_s
     places: list[SeenPlace] = []
     if isinstance(factor, NearThings) and len(factor.anchors):
         rows = np.flatnonzero(factor.mask)

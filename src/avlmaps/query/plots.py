@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Room, Thing
 
 # The view is cut this much over the highest place of the camera, so that a ceiling does not hide the room.
@@ -86,9 +86,9 @@ class TopDown:
 
 def camera_path(space: Space) -> Float[np.ndarray, "k 3"]:
     """Return where the keyframes' cameras were, level frame, in the order of time."""
-    if space.stored is None:
+    if space.data is None:
         return np.zeros((0, 3))
-    return space.level(np.asarray(space.stored.keyframes.world_from_camera)[:, :3, 3])
+    return space.level(np.asarray(space.data.keyframes.world_from_camera)[:, :3, 3])
 
 
 def _ceiling_m(space: Space, level: Float[np.ndarray, "n 3"]) -> float:
@@ -111,9 +111,9 @@ def _highest_colours(
     first = np.r_[True, column[1:] != column[:-1]] if len(rows) else np.zeros(0, bool)
     place = np.arange(len(rows)) - np.maximum.accumulate(np.where(first, np.arange(len(rows)), 0))
     skin = place < _SKIN
-    colours = (
-        np.full((len(space), 3), 150, np.uint8) if space.stored is None else np.asarray(space.stored.voxels.rgb)
-    )[rows[skin]]
+    colours = (np.full((len(space), 3), 150, np.uint8) if space.data is None else np.asarray(space.data.voxels.rgb))[
+        rows[skin]
+    ]
     count = np.bincount(column[skin], minlength=shape[0] * shape[1])
     total = [np.bincount(column[skin], weights=colours[:, k], minlength=len(count)) for k in range(3)]
     mean = np.stack(total, axis=-1) / np.maximum(count, 1)[:, None]
@@ -186,9 +186,7 @@ def png_of(figure: "Figure") -> bytes:
     return written.getvalue()
 
 
-def plot_map(
-    stored: "StoredMap", path: Path | str, things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = ()
-) -> Path:
+def plot_map(stored: "AVLMap", path: Path | str, things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = ()) -> Path:
     """Write a top-down picture of a map, with the camera's path, the sounds, and the names of things and rooms.
 
     Args:
@@ -204,14 +202,14 @@ def plot_map(
 
 
 def draw_map(
-    stored: "StoredMap", things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = (), title: str | None = None
+    stored: "AVLMap", things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = (), title: str | None = None
 ) -> "Figure":
     """Draw a map as ``plot_map`` does; by default its title is the folder's name."""
-    space = Space(stored.grid, stored.voxels.index, stored.up_in_world, stored)
+    space = Space(stored.data.grid, stored.data.voxels.index, stored.data.up_in_world, stored.data)
     view = TopDown.of(space)
     figure, axes = panels(view, 1)
     draw_ground(axes[0], view, space)
-    sounds = stored.sounds
+    sounds = stored.data.sounds
     for k in range(len(sounds)):
         track = space.level(sounds.track[sounds.track_offsets[k] : sounds.track_offsets[k + 1]])
         axes[0].plot(*track[:, :2].T, color=_SOUND, linewidth=5, alpha=0.45, solid_capstyle="round")

@@ -58,7 +58,7 @@ class MapLists:
         """
 
         def found() -> list[ThingAnswer]:
-            if "pixels" not in self.avlmap.stored.info.models:
+            if "pixels" not in self.avlmap.data.info.models:
                 return []
             require_known(self.avlmap.knows, names)
             things = self.avlmap.things(tuple(names) or None, least, structure, watch=self.watch, at=at)
@@ -82,7 +82,7 @@ class MapLists:
         avlmap = self.avlmap
 
         def found() -> list[RoomAnswer]:
-            return listed_rooms(avlmap.rooms() if "views" in avlmap.stored.info.models else [], avlmap.storeys)
+            return listed_rooms(avlmap.rooms() if "views" in avlmap.data.info.models else [], avlmap.storeys)
 
         rooms: list[RoomAnswer] = self.once("rooms", found)
         return [room for room in rooms if room["confidence"] >= least]
@@ -249,7 +249,7 @@ def map_answer(avlmap: AVLMap, note: Callable[[AvlmapsError], object] = lambda _
     from avlmaps.maps.store.reader import describe
     from avlmaps.query.settings import rules_of
 
-    described = describe(avlmap.stored)
+    described = describe(avlmap.path, avlmap.data)
     try:
         events = avlmap.sounds()
     except AvlmapsError as error:
@@ -261,7 +261,7 @@ def map_answer(avlmap: AVLMap, note: Callable[[AvlmapsError], object] = lambda _
         ]
     if avlmap.edited:
         described |= {"edits": len(avlmap.edited.edits), "notices": [*described["notices"], *_lost_edits(avlmap)]}
-    return {**described, "rules": rules_of(avlmap.stored.info.settings)}
+    return {**described, "rules": rules_of(avlmap.data.info.settings)}
 
 
 def _lost_edits(avlmap: AVLMap) -> list[str]:

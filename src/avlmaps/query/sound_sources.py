@@ -8,7 +8,7 @@ left out.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,12 +19,11 @@ from avlmaps.maps.sources.density import CandidateGrid, Density, Spread, log_sam
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.contents import Thing
-from avlmaps.query.queryable import Queryable
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.manifest import Visit
-    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.schema import HeardFromAnswer, SourceAnswer
 
 _MAKERS_SHARE = 0.5  # probability that a sound comes from a thing that usually makes it, where there is one
@@ -34,29 +33,12 @@ _MOST_HEARD, _LEAST_HEARD = 3, 0.1  # sounds of one thing
 _BELOW_THE_BEST = 0.999
 
 
-class Listening(Queryable, Protocol):
-    """A map that names its sounds, and may know where they came from."""
-
-    @cached_property
-    def source_map(self) -> "SourceMap":
-        """The evidence of where sounds came from."""
-        ...
-
-    def knows(self, phrase: str) -> bool:
-        """Return whether it can look for a phrase."""
-        ...
-
-    def sound_scores(self, text: str) -> Float[np.ndarray, " sounds"]:
-        """Return for each sound the probability that it is called so."""
-        ...
-
-
-def unknown_sources(stored: "StoredMap") -> str:
+def unknown_sources(stored: "AVLMap") -> str:
     """Return why a map does not know where sounds came from, and what to do."""
     what = f"{stored.path.name} does not know where sounds came from, only where the robot was"
     if stored.data.sources_wait:
         return f"Where the sounds came from is not found yet, {stored.data.sources_wait} wait; ask again in a moment."
-    if stored.info.visits:
+    if stored.data.info.visits:
         return (
             f"{what}: it is of several days, and not all of them say where the microphones are, or they have other "
             "microphones. Build each day's map from a recording that says it (microphones in recording.json) and merge "
@@ -68,9 +50,9 @@ def unknown_sources(stored: "StoredMap") -> str:
     )
 
 
-def no_sources(stored: "StoredMap") -> str:
+def no_sources(stored: "AVLMap") -> str:
     """Return why the robot's place stands for the source of a sound; "" where the map knows sources, or no sound."""
-    if stored.knows_sources or not len(stored.sounds):
+    if stored.data.sources is not None or not len(stored.data.sounds):
         return ""
     return f"The place is where the robot was when it heard it: {unknown_sources(stored)}"
 
@@ -164,18 +146,18 @@ class SourceMap:
     _priors: dict[tuple[str, ...], Float[np.ndarray, " c"]] = field(default_factory=dict, init=False)
 
     @classmethod
-    def of(cls, avlmap: Listening, evidence: SourceEvidence | None = None) -> "SourceMap":
+    def of(cls, avlmap: "AVLMap", evidence: SourceEvidence | None = None) -> "SourceMap":
         """Return the evidence of a map.
 
         Raises:
             QueryError: the map has none.
         """
-        evidence = avlmap.stored.sources() if evidence is None else evidence
+        evidence = avlmap.data.sources if evidence is None else evidence
         if evidence is None:
-            raise QueryError(unknown_sources(avlmap.stored))
+            raise QueryError(unknown_sources(avlmap))
 
         def things(names: Sequence[str]) -> "Sequence[Thing]":
-            if "pixels" not in avlmap.stored.info.models:
+            if "pixels" not in avlmap.data.info.models:
                 return ()
             known = [name for name in names if avlmap.knows(name)]
             return avlmap.things(known, 0.3) if known else ()
@@ -275,7 +257,7 @@ class SourceMap:
 
 
 def list_sources(
-    avlmap: Listening, names: Sequence[str] = (), prior: bool = True, *, least: float = 0.0
+    avlmap: "AVLMap", names: Sequence[str] = (), prior: bool = True, *, least: float = 0.0
 ) -> list[SoundSource]:
     """Return the sources of a map's sounds, or of those of some names, most confident first.
 
@@ -294,7 +276,7 @@ def list_sources(
     return sorted(found, key=lambda one: -one.confidence)
 
 
-def source_of(avlmap: Listening, number: int) -> SoundSource:
+def source_of(avlmap: "AVLMap", number: int) -> SoundSource:
     """Return the source of one sound by its likeliest name.
 
     Raises:
@@ -306,7 +288,7 @@ def source_of(avlmap: Listening, number: int) -> SoundSource:
 
 
 def list_joined(
-    avlmap: Listening,
+    avlmap: "AVLMap",
     names: Sequence[str] = (),
     prior: bool = True,
     *,
@@ -322,7 +304,7 @@ def list_joined(
             yield kind, max(scores[event] for event in one.events), one
 
 
-def _by_kind(avlmap: Listening, names: Sequence[str]) -> dict[str, dict[int, float]]:
+def _by_kind(avlmap: "AVLMap", names: Sequence[str]) -> dict[str, dict[int, float]]:
     kinds: dict[str, dict[int, float]] = {}
     if not names:
         for number, event in enumerate(avlmap.sounds()):
@@ -340,7 +322,7 @@ def _by_kind(avlmap: Listening, names: Sequence[str]) -> dict[str, dict[int, flo
 class _Places:
     """Names the rooms and things of places in a map."""
 
-    def __init__(self, avlmap: Listening) -> None:
+    def __init__(self, avlmap: "AVLMap") -> None:
         self._map = avlmap
 
     @cached_property
@@ -351,7 +333,7 @@ class _Places:
 
     @cached_property
     def _things(self) -> "list[Thing]":
-        return self._map.things() if "pixels" in self._map.stored.info.models else []
+        return self._map.things() if "pixels" in self._map.data.info.models else []
 
     def described(self, known: SourceMap, joined: Joined, kind: str, confidence: float) -> SoundSource:
         """Return a source with its region, rooms and things."""
@@ -410,7 +392,7 @@ def things_that_may_be(known: SourceMap, joined: Joined, things: "Sequence[Thing
     return [(one, float(share[one])) for one in order if share[one] >= _LEAST_NAMED]
 
 
-def with_heard(avlmap: Listening, things: Sequence[Thing], *, are_all: bool = True) -> list[Thing]:
+def with_heard(avlmap: "AVLMap", things: Sequence[Thing], *, are_all: bool = True) -> list[Thing]:
     """Return things with the sounds that may have come from them; as they are where the map does not know that.
 
     The probability is that of the name of the sound times that the thing is its source. Of several sounds of one source
@@ -421,12 +403,12 @@ def with_heard(avlmap: Listening, things: Sequence[Thing], *, are_all: bool = Tr
         things: of it.
         are_all: whether these are all that it lists; else a sound may have come from the others as well.
     """
-    if not things or not avlmap.stored.knows_sources:
+    if not things or not avlmap.data.sources is not None:
         return list(things)
     return _with_heard(avlmap, things, [] if are_all else _others(avlmap.things(), things))
 
 
-def with_heard_then(avlmap: Listening, visit: int, things: Sequence[Thing], every: Sequence[Thing]) -> list[Thing]:
+def with_heard_then(avlmap: "AVLMap", visit: int, things: Sequence[Thing], every: Sequence[Thing]) -> list[Thing]:
     """Return things that were there on a day with the sounds of that day; see ``with_heard``.
 
     Args:
@@ -435,18 +417,18 @@ def with_heard_then(avlmap: Listening, visit: int, things: Sequence[Thing], ever
         things: that were there.
         every: all that were there; a sound may have come from the others as well.
     """
-    if not things or not avlmap.stored.knows_sources:
+    if not things or not avlmap.data.sources is not None:
         return list(things)
     listed = {(thing.name, thing.position) for thing in things}
     return _with_heard(avlmap, things, [one for one in every if (one.name, one.position) not in listed], visit)
 
 
 def _with_heard(
-    avlmap: Listening, things: Sequence[Thing], rivals: Sequence[Thing], visit: int | None = None
+    avlmap: "AVLMap", things: Sequence[Thing], rivals: Sequence[Thing], visit: int | None = None
 ) -> list[Thing]:
     every = [*things, *rivals]
     heard: list[list[HeardFromAnswer]] = [[] for _ in every]
-    sounds, visits = avlmap.sounds(), avlmap.stored.info.visits
+    sounds, visits = avlmap.sounds(), avlmap.data.info.visits
 
     def counts(event: int) -> bool:
         return visit is None or _visit_of(visits, sounds[event].onset_s) == visit

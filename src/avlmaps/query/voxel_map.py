@@ -157,7 +157,7 @@ class VoxelMap:
     @property
     def doubts(self) -> tuple[str, ...]:
         """Why the map may be wrong, one sentence each: frames that contradict one another. Answers repeat them."""
-        return self.map.stored.info.doubts
+        return self.map.data.info.doubts
 
     def ask(self, question: Any = "", *args: Any, **parts: Any) -> "Answer":
         """Answer a query; see ``AVLMap.ask``."""

@@ -15,7 +15,7 @@ from avlmaps.core.poses import from_rotation, rotation_to_level
 from avlmaps.maps.grid import GridSpec, index_ends
 
 if TYPE_CHECKING:
-    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.maps.store.map_data import MapData
 
 # Pairs of a run and a neighbouring column that are compared at once: few voxels take one step, many little memory.
 _MOST_AT_ONCE = 1 << 17
@@ -200,12 +200,12 @@ class Space:
         grid: GridSpec,
         index: Int[np.ndarray, "n 3"],
         up_in_world: Float[np.ndarray, "3"],
-        stored: "StoredMap | None" = None,
+        data: "MapData | None" = None,
     ) -> None:
         self.grid = grid
         self.index = index
         self.level_from_world = rotation_to_level(np.asarray(up_in_world, np.float64))
-        self.stored = stored
+        self.data = data
 
     def __len__(self) -> int:
         return len(self.index)

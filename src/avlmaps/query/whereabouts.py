@@ -14,9 +14,9 @@ from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import AvlmapsError, QueryError
 
 if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Room, Thing
     from avlmaps.query.floor_plan import FloorPlan
-    from avlmaps.query.queryable import Queryable
     from avlmaps.query.room_regions import RoomRegions
     from avlmaps.query.rooms import RoomField
 
@@ -25,7 +25,7 @@ _UNITS = "m|cm|metres?|meters?|feet|steps?|times|degrees?|seconds?|minutes?"
 _NUMBERED = re.compile(rf"[^\W\d_] [1-9]\d{{0,2}}\b(?!\.\d| ?({_UNITS})\b)", re.IGNORECASE)
 
 
-def numbered_rooms(avlmap: "Queryable") -> dict[str, int]:
+def numbered_rooms(avlmap: "AVLMap") -> dict[str, int]:
     """Return the region of each room that shares its name with others, by the name that the lists of the map give it.
 
     A map whose rooms are not known, or are groups of views without walls, has none.
@@ -34,7 +34,7 @@ def numbered_rooms(avlmap: "Queryable") -> dict[str, int]:
     from avlmaps.query.edits import plain_name
 
     try:
-        rooms = avlmap.rooms() if "views" in avlmap.stored.info.models else []
+        rooms = avlmap.rooms() if "views" in avlmap.data.info.models else []
     except AvlmapsError:  # its encoder is not here: a question of something else needs none
         return {}
     names = numbered([room.name for room in rooms])
@@ -45,7 +45,7 @@ def numbered_rooms(avlmap: "Queryable") -> dict[str, int]:
     }
 
 
-def region_named(avlmap: "Queryable", phrase: str) -> int | None:
+def region_named(avlmap: "AVLMap", phrase: str) -> int | None:
     """Return the region of the room that a phrase names with its number; None where it names none so.
 
     What a person called so goes before what the lists number.
@@ -57,7 +57,7 @@ def region_named(avlmap: "Queryable", phrase: str) -> int | None:
     return avlmap.numbered_rooms.get(plain_name(phrase))
 
 
-def own_names(avlmap: "Queryable", sentence: str) -> tuple[tuple[str, bool], ...]:
+def own_names(avlmap: "AVLMap", sentence: str) -> tuple[tuple[str, bool], ...]:
     """Return the names that are this map's own, and whether each is that of a room.
 
     Args:
@@ -88,13 +88,13 @@ class Whereabouts:
 
     rooms: "tuple[Room, ...]"
     names: tuple[str, ...]
-    avlmap: "Queryable"
+    avlmap: "AVLMap"
     plan: "FloorPlan | None"
     field: "RoomField | None"
     regions: "RoomRegions | None" = None
 
     @classmethod
-    def of(cls, avlmap: "Queryable") -> "Whereabouts":
+    def of(cls, avlmap: "AVLMap") -> "Whereabouts":
         """Find the rooms of a map; none where it has no model of views.
 
         Raises:
@@ -102,7 +102,7 @@ class Whereabouts:
         """
         from avlmaps.query.contents import numbered
 
-        if "views" not in avlmap.stored.info.models:
+        if "views" not in avlmap.data.info.models:
             votes = avlmap.room_votes
             return cls((), (), avlmap, None if votes is None else votes.plan, None)
         rooms, field = tuple(avlmap.rooms()), avlmap.room_field

@@ -203,7 +203,7 @@ def full_picture(served: "ServedMap", answer: Answer) -> bytes:
 def map_picture(served: "ServedMap") -> bytes:
     """Return the PNG of a map from above, with its path and sounds."""
     with _drawing:
-        return _png(draw_map(served.avlmap.stored, title=plot_text(served.name)))
+        return _png(draw_map(served.avlmap, title=plot_text(served.name)))
 
 
 def _png(figure: "Figure") -> bytes:

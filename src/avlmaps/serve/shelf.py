@@ -21,7 +21,6 @@ from avlmaps.core.question import Modality, Part
 from avlmaps.language.questions import parse_sentence
 from avlmaps.maps.store.edits import EDITS
 from avlmaps.maps.store.folder import MANIFEST, stamp
-from avlmaps.maps.store.reader import open_stored
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import HeatCache
 from avlmaps.query.settings import QuerySettings
@@ -29,7 +28,6 @@ from avlmaps.serve.lanes import RequestError, watch_here
 from avlmaps.serve.settings import Limits, ServeError
 
 if TYPE_CHECKING:
-    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.navigate.paths import PathFinder
     from avlmaps.query.plots import TopDown
     from avlmaps.view.on_page import MapOnPage
@@ -67,7 +65,7 @@ class ServedMap:
     @property
     def voxels_version(self) -> str:
         """The same for the voxels and their order, which no edit changes."""
-        info = self.avlmap.stored.info
+        info = self.avlmap.data.info
         return f"{info.build_key[:16]}-{info.timings.finished}-{info.counts.sounds}".replace('"', "")
 
     def as_edited_now(self) -> "ServedMap":
@@ -86,12 +84,12 @@ class ServedMap:
         Raises:
             MapError: a large file of the map is damaged.
         """
-        avlmap, stored = self.avlmap, self.avlmap.stored
-        there = {"pixels": True, "views": bool(len(stored.keyframes)), "sounds": bool(len(stored.sounds))}
+        avlmap, data = self.avlmap, self.avlmap.data
+        there = {"pixels": True, "views": bool(len(data.keyframes)), "sounds": bool(len(data.sounds))}
         if len(avlmap.space):
             _ = avlmap.space.centres, avlmap.space.blocks, avlmap.space.horizontal
             for kind, modality, word in _WARM:
-                if there[kind] and kind in stored.info.models:
+                if there[kind] and kind in data.info.models:
                     with suppress(QueryError, BackendError):  # a model that is not here; its queries say so
                         avlmap.heat(Part(modality, word))
         with suppress(QueryError):
@@ -149,19 +147,19 @@ class MapSource:
 
     path: Path
     stamp: Callable[[], object | None]
-    open: "Callable[[], StoredMap]"
+    open: "Callable[[], AVLMap]"
     tells: bool = True
 
     @classmethod
     def of(cls, path: Path) -> "MapSource":
         """Return that of a map on the disk."""
-        return cls(path, lambda: stamp(path / MANIFEST), lambda: open_stored(path))
+        return cls(path, lambda: stamp(path / MANIFEST), lambda: AVLMap.open(path))
 
 
 class _Slot:
     """One name, the map that answers for it now, and the one that is being opened."""
 
-    def __init__(self, source: MapSource, make: "Callable[[StoredMap], ServedMap]", warm: bool) -> None:
+    def __init__(self, source: MapSource, make: "Callable[[AVLMap], ServedMap]", warm: bool) -> None:
         self.path, self._source, self._make = source.path, source, make
         self._lock = threading.Lock()
         self._opening: threading.Thread | None = None
@@ -251,9 +249,10 @@ class Shelf:
         cache_bytes = (limits or Limits()).cache_bytes
         self._note = note
 
-        def made(name: str, stored: "StoredMap") -> ServedMap:
+        def made(name: str, opened: AVLMap) -> ServedMap:
             cache = HeatCache(cache_bytes, lambda part: watch_here().step(f"heat of the {part.modality}"))
-            return ServedMap(name, AVLMap(stored, settings=settings, heats=cache), robot)
+            avlmap = AVLMap(opened.data, opened.encoders, path=opened.path, settings=settings, heats=cache)
+            return ServedMap(name, avlmap, robot)
 
         sources = {name: MapSource.of(one) if isinstance(one, Path) else one for name, one in maps.items()}
         self._slots = {name: _Slot(source, partial(made, name), warm) for name, source in sources.items()}

@@ -126,7 +126,7 @@ def list_maps(shelf: Shelf) -> MapsAnswer:
 
 
 def _entry(one: ServedMap, stale: bool) -> MapEntry:
-    info = one.avlmap.stored.info
+    info = one.avlmap.data.info
     return {
         "name": one.name,
         "voxels": info.counts.voxels,
@@ -170,7 +170,7 @@ Noted = TypeVar("Noted", ContentsAnswer, ListedThingsAnswer, SoundsAnswer, Rooms
 
 def _noted(task: WorkInput, answer: Noted) -> Noted:
     opened = task.map.avlmap
-    if doubts := opened.doubts_of_things if "things" in answer else opened.stored.info.doubts:
+    if doubts := opened.doubts_of_things if "things" in answer else opened.data.info.doubts:
         answer["notes"] = [without_folders(doubt) for doubt in doubts]
     return answer
 
@@ -242,11 +242,11 @@ def edit(task: WorkInput, query: requests.EditQuery) -> EditsAnswer:
 
 def sound_clip(task: WorkInput, query: requests.NoQuery) -> File:
     """Return the FLAC file of a sound."""
-    stored, number = task.map.avlmap.stored, task.path["sound"]
-    if number >= len(stored.sounds):
-        raise RequestError(f"The map has {len(stored.sounds)} sounds, counted from 0; there is no {number}.", 404)
+    sounds, number = task.map.avlmap.data.sounds, task.path["sound"]
+    if number >= len(sounds):
+        raise RequestError(f"The map has {len(sounds)} sounds, counted from 0; there is no {number}.", 404)
     try:
-        content = stored.clip_path(number).read_bytes()
+        content = sounds.clips[number].read_bytes()
     except FileNotFoundError:
         raise RequestError(
             "The map is being replaced and its old clips are gone; try again in a second.", 503
@@ -292,7 +292,7 @@ def locate(task: WorkInput, query: requests.LocateQuery) -> LocateAnswer:
     camera = None if query.intrinsics is None else Pinhole(*numbers_of(query.intrinsics), **size)
     task.watch.step("locating")
     found = task.map.avlmap.locate(photo.rgb, camera, None if camera is not None else photo.focal_35mm)
-    return locate_answer(found, task.map.avlmap.stored.info.doubts)
+    return locate_answer(found, task.map.avlmap.data.info.doubts)
 
 
 def place(task: WorkInput, query: requests.PlaceQuery) -> PlaceAnswer:
@@ -538,7 +538,7 @@ def drawn_voxel(task: WorkInput, query: NoQuery) -> dict[str, Any]:
 
 def keyframe(task: WorkInput, query: NoQuery) -> File:
     """Return the picture of a keyframe."""
-    number, keyframes = task.path["keyframe"], task.map.avlmap.stored.keyframes
+    number, keyframes = task.path["keyframe"], task.map.avlmap.data.keyframes
     jpeg = task.map.page.layout.thumbnail(number)
     if jpeg is None:
         raise RequestError(

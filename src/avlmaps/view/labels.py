@@ -36,7 +36,7 @@ def drawn_sources(avlmap: "AVLMap") -> list[dict[str, Any]]:
     Each is as ``avlmaps sources --json`` prints it, with ``regions``: for each of ``SHARES`` the outlines of its
     pieces, places of the level frame (metres, at the height of the source).
     """
-    if avlmap.stored.sources() is None:
+    if avlmap.data.sources is None:
         return []
     known = avlmap.source_map
     told: list[dict[str, Any]] = []
@@ -225,7 +225,7 @@ def _name_labels(
     """Give each of some voxels its likeliest name; where there are more than 255, the rarest are left out."""
     n = len(rows)
     try:
-        namer = VoxelNamer(avlmap.stored)
+        namer = VoxelNamer(avlmap)
         number, confidence = namer.best(rows, avlmap.closest_words())
     except AvlmapsError as fault:
         notes.append(str(fault))

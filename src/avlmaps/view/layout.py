@@ -57,7 +57,7 @@ class Layout:
         if int((self._high - self.low).max()) > _MOST_CELLS:
             span_m = float((self._high - self.low).max() * avlmap.space.grid.voxel_size_m)
             raise MapError(
-                f"{avlmap.stored.path} is {span_m:.0f} m wide, more than {_MOST_CELLS} voxels; build it with larger "
+                f"{avlmap.path} is {span_m:.0f} m wide, more than {_MOST_CELLS} voxels; build it with larger "
                 "voxels to view it."
             )
 
@@ -73,7 +73,7 @@ class Layout:
     @cached_property
     def records(self) -> bytes:
         """The voxels that are drawn as `RECORD`, in the order of drawing."""
-        voxels, records = self.avlmap.stored.voxels, np.zeros(len(self), RECORD)
+        voxels, records = self.avlmap.data.voxels, np.zeros(len(self), RECORD)
         records["cell"] = np.asarray(self.avlmap.space.index)[self.order] - self.low
         records["rgb"] = np.asarray(voxels.rgb)[self.order]
         share = np.asarray(voxels.last_seen_s, np.float64)[self.order] / self.duration_s
@@ -83,14 +83,14 @@ class Layout:
     @property
     def duration_s(self) -> float:
         """The last moment of the map, seconds from the start of the recording; never 0."""
-        stored = self.avlmap.stored
-        ends = [*np.asarray(stored.keyframes.stamp_s), *np.asarray(stored.sounds.offset_s)]
-        latest = float(np.asarray(stored.voxels.last_seen_s).max(initial=0.0))
+        stored = self.avlmap
+        ends = [*np.asarray(stored.data.keyframes.stamp_s), *np.asarray(stored.data.sounds.offset_s)]
+        latest = float(np.asarray(stored.data.voxels.last_seen_s).max(initial=0.0))
         return max(1e-3, latest, *map(float, ends)) if ends else max(1e-3, latest)
 
     def describe(self) -> dict[str, Any]:
         """Return all that the page needs before it draws the first voxel."""
-        stored, space = self.avlmap.stored, self.avlmap.space
+        stored, space = self.avlmap, self.avlmap.space
         # Of a very large map an even picture of it is measured.
         level = space.level(space.centres_of(self.order[:_MEASURED])) if len(space) else np.zeros((1, 3))
         low, high = np.percentile(level, [0.1, 99.9], axis=0)
@@ -99,7 +99,7 @@ class Layout:
         least, most = np.maximum(level.min(axis=0), low - reach), np.minimum(level.max(axis=0), high + reach)
         cameras = camera_path(space)
         ceiling = float(cameras[:, 2].max()) + _HEADROOM_M if len(cameras) else float(level[:, 2].max())
-        camera = stored.rig.rgb
+        camera = stored.data.rig.rgb
         storeys = {} if self.avlmap.storeys is None else {"storeys": _storeys(self.avlmap.storeys, low[2], high[2])}
         return {
             "name": stored.path.name,
@@ -119,7 +119,7 @@ class Layout:
             "ceiling_m": ceiling,
             "duration_s": self.duration_s,
             "frame": FRAME,
-            "profile": stored.info.profile,
+            "profile": stored.data.info.profile,
             "field_of_view": [camera.width / camera.fx, camera.height / camera.fy],
             "keyframes": self._keyframes(),
             **storeys,
@@ -127,7 +127,7 @@ class Layout:
 
     def _keyframes(self) -> list[dict[str, Any]]:
         """Return where each keyframe's camera was, and when; level frame."""
-        keyframes, turn = self.avlmap.stored.keyframes, self.avlmap.space.level_from_world
+        keyframes, turn = self.avlmap.data.keyframes, self.avlmap.space.level_from_world
         poses = np.asarray(keyframes.world_from_camera, np.float64)
         return [
             {
@@ -142,7 +142,7 @@ class Layout:
 
     def thumbnail(self, number: int) -> bytes | None:
         """Return the JPEG of a keyframe, None where there is none."""
-        keyframes = self.avlmap.stored.keyframes
+        keyframes = self.avlmap.data.keyframes
         if not 0 <= number < len(keyframes):
             return None
         return keyframes.jpeg(number).tobytes() or None

@@ -45,7 +45,7 @@ class MapOnPage:
 
     @cached_property
     def _namer(self) -> VoxelNamer:
-        return VoxelNamer(self.avlmap.stored)
+        return VoxelNamer(self.avlmap)
 
     def heat_of(self, answer: "Answer") -> bytes:
         """Return the heat of an answer at each voxel that is drawn, a byte each, in the order of drawing."""
@@ -69,8 +69,8 @@ class MapOnPage:
             note = str(fault)
         if (said := avlmap.edited.named_at(np.array([row]))) is not None:
             names = [(said, 1.0), *names]
-        views = keyframes_that_saw(avlmap.stored, avlmap.space, row)
-        voxels = avlmap.stored.voxels
+        views = keyframes_that_saw(avlmap, avlmap.space, row)
+        voxels = avlmap.data.voxels
         thing = self._thing_at(row)
         return {
             "position": [round(float(value), 4) for value in avlmap.points[row]],

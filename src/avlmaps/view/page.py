@@ -83,7 +83,7 @@ def write_page(
         heat = b"".join(on_page.heat_of(answer) for on_page, answer in zip(shown, answers, strict=True))
         told = [answer.to_dict() for answer in answers]
         data["questions"].append({"question": sentence, "answers": told, "heat": _packed(heat)})
-    names = " and ".join(one.layout.avlmap.stored.path.name.removesuffix(".avlmap") for one in shown)
+    names = " and ".join(one.layout.avlmap.path.name.removesuffix(".avlmap") for one in shown)
     content = _page(names, data).encode("utf-8")
     try:
         write_bytes_atomically(out, content)
@@ -146,14 +146,12 @@ def _packed(content: bytes) -> str:
 
 
 def _pictures(one: MapOnPage) -> dict[str, str]:
-    count = len(one.avlmap.stored.keyframes)
+    count = len(one.avlmap.data.keyframes)
     chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_PICTURES)).round().astype(int)) if count else ()
     pictures = {str(number): one.layout.thumbnail(int(number)) for number in chosen}
     return {number: base64.b64encode(jpeg).decode("ascii") for number, jpeg in pictures.items() if jpeg}
 
 
 def _clips(one: MapOnPage) -> list[str]:
-    stored = one.avlmap.stored
-    return [
-        base64.b64encode(stored.clip_path(number).read_bytes()).decode("ascii") for number in range(len(stored.sounds))
-    ]
+    clips = one.avlmap.data.sounds.clips
+    return [base64.b64encode(clip.read_bytes()).decode("ascii") for clip in clips]

@@ -149,7 +149,7 @@ class Guide:
         if not len(places):
             raise NavigationError("Nowhere in the map is there room for the robot; map more of the floor.")
         level = np.asarray(obstacles.level_from_world)
-        cameras = np.asarray(self.avlmap.stored.keyframes.world_from_camera)
+        cameras = np.asarray(self.avlmap.data.keyframes.world_from_camera)
         begin, heading = places.mean(axis=0), 0.0
         if len(cameras):
             begin = (level @ cameras[0, :3, 3])[:2]

@@ -50,7 +50,7 @@ def _imported(verb: ImportMap) -> dict[str, Any]:
     from avlmaps_models.import_reference.convert import ImportSettings, import_reference_map
 
     settings = ImportSettings(verb.cell_size_m, verb.max_bad_share, verb.sounds, verb.hear_with)
-    stored = import_reference_map(
+    imported = import_reference_map(
         verb.source, verb.out, settings, areas=verb.areas, poses=verb.poses, overwrite=verb.overwrite
     )
-    return describe_map(stored)
+    return describe_map(imported)

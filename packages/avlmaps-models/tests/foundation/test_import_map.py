@@ -35,7 +35,6 @@ from avlmaps.core import poses, registry
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Backend, Kind
 from avlmaps.maps.build import BuildSettings, build_map
-from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.perception.profiles import Profile, register_profile
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.formats.avlmaps_layout import base_poses
@@ -66,7 +65,7 @@ def scene(seen: list[Seen], arrays: dict[str, np.ndarray], tmp_path_factory: pyt
 
 
 @pytest.fixture(scope="module")
-def imported(scene: Path) -> StoredMap:
+def imported(scene: Path) -> AVLMap:
     return import_reference_map(scene, scene.parent / "theirs.avlmap", SETTINGS, progress=False)
 
 
@@ -81,33 +80,34 @@ def room_words(seen: list[Seen], monkeypatch: pytest.MonkeyPatch) -> Iterator[No
     registry.forget_loaded()
 
 
-def _own(scene: Path, path: Path) -> StoredMap:
+def _own(scene: Path, path: Path) -> AVLMap:
     register_profile(Profile(name="room words", pixels="lseg"))
     recording = avlmaps.open_recording(scene)
-    return build_map(recording, path, "room words", BuildSettings(voxel_size_m=CELL_M), progress=False)
+    made = build_map(recording, path, "room words", BuildSettings(voxel_size_m=CELL_M), progress=False)
+    return AVLMap(made, path=path)
 
 
-def test_the_map_is_whole_and_tells_what_it_is(imported: StoredMap, arrays: dict[str, np.ndarray]) -> None:
-    stored = open_stored(imported.path)
-    counts = stored.info.counts
+def test_the_map_is_whole_and_tells_what_it_is(imported: AVLMap, arrays: dict[str, np.ndarray]) -> None:
+    stored = AVLMap.open(imported.path)
+    counts = stored.data.info.counts
     assert (counts.frames, counts.keyframes, counts.sounds) == (14, 14, 0)
     assert len(arrays["grid_pos"]) < counts.voxels < 1.2 * len(arrays["grid_pos"])
-    assert stored.encoders.name == "paper" and stored.grid.voxel_size_m == CELL_M
-    assert {kind: (m.id, m.dim, m.checksum) for kind, m in stored.info.models.items()} == {
+    assert stored.encoders.name == "paper" and stored.data.grid.voxel_size_m == CELL_M
+    assert {kind: (m.id, m.dim, m.checksum) for kind, m in stored.data.info.models.items()} == {
         "pixels": ("demo_e200.ckpt", 512, ""),
         "views": ("openai/clip-vit-large-patch14", 768, ""),
     }
-    assert any("from which weights its features are is not recorded" in notice for notice in stored.info.notices)
-    assert stored.info.recording.name == "5LpN3gDmAk7_1" and stored.info.recording.format == "vlmaps.h5df"
-    norm = np.linalg.norm(stored.voxels.feature.astype(np.float64), axis=1)
+    assert any("from which weights its features are is not recorded" in notice for notice in stored.data.info.notices)
+    assert stored.data.info.recording.name == "5LpN3gDmAk7_1" and stored.data.info.recording.format == "vlmaps.h5df"
+    norm = np.linalg.norm(stored.data.voxels.feature.astype(np.float64), axis=1)
     assert np.allclose(norm, 1.0, atol=2e-3)
-    assert stored.up_in_world.tolist() == [0.0, 0.0, 1.0]
+    assert stored.data.up_in_world.tolist() == [0.0, 0.0, 1.0]
 
 
-def test_each_voxel_lies_on_the_thing_that_its_feature_names(imported: StoredMap) -> None:
-    centres = imported.grid.centre_of(imported.voxels.index)
+def test_each_voxel_lies_on_the_thing_that_its_feature_names(imported: AVLMap) -> None:
+    centres = imported.data.grid.centre_of(imported.data.voxels.index)
     in_room = poses.apply(poses.inverse(WORLD_FROM_ROOM), centres)
-    named = np.argmax(imported.voxels.feature.astype(np.float32) @ CODES.T, axis=1)
+    named = np.argmax(imported.data.voxels.feature.astype(np.float32) @ CODES.T, axis=1)
     off = np.full(len(centres), np.inf)
     for name, box in zip(NAMES, ROOM_3D.scene.boxes, strict=True):
         mine = named == WORDS.index(name)
@@ -121,10 +121,10 @@ def test_each_voxel_lies_on_the_thing_that_its_feature_names(imported: StoredMap
 
 
 def test_voxels_lie_where_our_own_build_of_the_recording_has_them(
-    scene: Path, imported: StoredMap, room_words: None, tmp_path: Path
+    scene: Path, imported: AVLMap, room_words: None, tmp_path: Path
 ) -> None:
     own = _own(scene, tmp_path / "own.avlmap")
-    ours, theirs = (stored.grid.centre_of(stored.voxels.index) for stored in (own, imported))
+    ours, theirs = (stored.data.grid.centre_of(stored.data.voxels.index) for stored in (own, imported))
     assert KDTree(ours).query(theirs)[0].max() < 3 * FAR_M + 0.5 * CELL_M
     # What the reference keeps: from the first base's height (and a cell below it) to the camera's.
     height = ours[:, 2] - WORLD_FROM_ROOM[2, 3]
@@ -136,7 +136,7 @@ def test_voxels_lie_where_our_own_build_of_the_recording_has_them(
     assert np.abs(shift).max() < 0.15 * CELL_M
 
 
-def test_goals_are_those_of_our_own_map(scene: Path, imported: StoredMap, room_words: None, tmp_path: Path) -> None:
+def test_goals_are_those_of_our_own_map(scene: Path, imported: AVLMap, room_words: None, tmp_path: Path) -> None:
     own = AVLMap(_own(scene, tmp_path / "own.avlmap"))
     theirs = AVLMap.open(imported.path)
     for word in ("sofa", "fridge", "sideboard"):
@@ -146,13 +146,13 @@ def test_goals_are_those_of_our_own_map(scene: Path, imported: StoredMap, room_w
 
 
 @pytest.mark.parametrize("dim", [512, 32])
-def test_lseg_itself_is_taken_though_its_weights_are_not_known(dim: int, imported: StoredMap, models: Path) -> None:
+def test_lseg_itself_is_taken_though_its_weights_are_not_known(dim: int, imported: AVLMap, models: Path) -> None:
     layout = lseg_layout(LSegSizes(dim=dim))
     write_checkpoint(models / "demo_e200.ckpt", random_weights(layout, half=("clip_pretrained.",)))
     registry.forget_loaded()
-    stored = open_stored(imported.path)
+    stored = AVLMap.open(imported.path)
     if dim == 512:
-        heat = AVLMap(stored).object("sofa", primary=True)
+        heat = stored.object("sofa", primary=True)
         assert heat.values.min() >= 0.0 and np.isfinite(heat.values).all()
     else:
         with pytest.raises(MapError, match=r"was built with demo_e200.ckpt \(checksum unknown\), this avlmaps has"):
@@ -161,11 +161,11 @@ def test_lseg_itself_is_taken_though_its_weights_are_not_known(dim: int, importe
 
 
 def test_a_voxel_has_the_feature_colour_and_weight_of_the_cell_that_holds_its_middle(
-    imported: StoredMap, arrays: dict[str, np.ndarray], seen: list[Seen]
+    imported: AVLMap, arrays: dict[str, np.ndarray], seen: list[Seen]
 ) -> None:
     """The published formulas again, from the middle of each of our voxels to the reference's cell."""
-    voxels, first = imported.voxels, base_poses(seen[0].habitat_from_base)
-    in_map = poses.apply(poses.inverse(first), imported.grid.centre_of(voxels.index)) / CELL_M
+    voxels, first = imported.data.voxels, base_poses(seen[0].habitat_from_base)
+    in_map = poses.apply(poses.inverse(first), imported.data.grid.centre_of(voxels.index)) / CELL_M
     alike = held = 0
     for i, (x, y, z) in enumerate(in_map.tolist()):
         number = arrays["occupied_ids"][int(GRID / 2 - int(x)), int(GRID / 2 - int(y)), int(z)] if z >= 0.0 else -1
@@ -183,13 +183,13 @@ def test_a_voxel_has_the_feature_colour_and_weight_of_the_cell_that_holds_its_mi
     assert alike > 0.9 * held  # the others hold such a cell besides
 
 
-def test_keyframes_have_the_cameras_poses_and_the_views(scene: Path, imported: StoredMap, seen: list[Seen]) -> None:
+def test_keyframes_have_the_cameras_poses_and_the_views(scene: Path, imported: AVLMap, seen: list[Seen]) -> None:
     recording = avlmaps.open_recording(scene)
-    keyframes = imported.keyframes
+    keyframes = imported.data.keyframes
     assert np.allclose(keyframes.world_from_camera, recording.world_from_camera, atol=1e-6)
     assert np.allclose(keyframes.stamp_s, recording.stamps_s)
     assert np.allclose(keyframes.view, area_arrays(seen)["clip_sparse_map"], atol=1e-6)
-    assert (imported.rig.rgb, imported.rig.depth) == (recording.rig.rgb, recording.rig.depth)
+    assert (imported.data.rig.rgb, imported.data.rig.depth) == (recording.rig.rgb, recording.rig.depth)
     for index, centre in enumerate(keyframes.centre):
         depth, pose = recording.frame(index).depth_m, recording.world_from_camera[index]
         rays = recording.rig.depth.backproject(depth).reshape(-1, 3)
@@ -198,10 +198,10 @@ def test_keyframes_have_the_cameras_poses_and_the_views(scene: Path, imported: S
         assert (poses.inverse(pose) @ [*centre, 1.0])[2] > 0.3, "ahead of the camera"
 
 
-def test_photos_are_refused_in_a_sentence(imported: StoredMap, scene: Path) -> None:
+def test_photos_are_refused_in_a_sentence(imported: AVLMap, scene: Path) -> None:
     with pytest.raises(MapError, match="was built without a model for local"):
-        AVLMap(imported).image(scene / "rgb/000003.png")
-    assert not AVLMap(imported).sound("dog").found
+        imported.image(scene / "rgb/000003.png")
+    assert not imported.sound("dog").found
 
 
 def test_a_single_cell_goes_where_the_golden_vector_says(tmp_path: Path) -> None:
@@ -210,38 +210,38 @@ def test_a_single_cell_goes_where_the_golden_vector_says(tmp_path: Path) -> None
     write_h5(tmp_path / "vlmap/vlmaps.h5df", one_voxel(grid=1000, layers=30, cell=(500 - 40, 500 - 20, 10)))
     stored = import_reference_map(tmp_path, tmp_path / "m.avlmap", progress=False)
     place = np.array([0.11747979 + 2.025, -11.92911911 + 1.025, -1.28434992 + 0.525])
-    assert stored.voxels.index.tolist() == [np.floor(place / 0.05).astype(int).tolist()]
-    assert stored.voxels.rgb.tolist() == [[200, 200, 200]]
-    assert np.allclose(stored.voxels.feature, 512**-0.5, atol=1e-4)
+    assert stored.data.voxels.index.tolist() == [np.floor(place / 0.05).astype(int).tolist()]
+    assert stored.data.voxels.rgb.tolist() == [[200, 200, 200]]
+    assert np.allclose(stored.data.voxels.feature, 512**-0.5, atol=1e-4)
 
 
-def test_the_same_files_give_the_same_map_and_are_not_read_twice(scene: Path, imported: StoredMap, capsys) -> None:
+def test_the_same_files_give_the_same_map_and_are_not_read_twice(scene: Path, imported: AVLMap, capsys) -> None:
     before = (imported.path / "map.json").read_bytes()
     again = import_reference_map(scene, imported.path, SETTINGS)
     assert (imported.path / "map.json").read_bytes() == before and "nothing to do" in capsys.readouterr().err
     anew = import_reference_map(scene, imported.path, SETTINGS, overwrite=True, progress=False)
-    files = {name.replace(".2.", "."): file for name, file in anew.info.files.items()}  # of the second time
-    assert files == again.info.files
+    files = {name.replace(".2.", "."): file for name, file in anew.data.info.files.items()}  # of the second time
+    assert files == again.data.info.files
     with pytest.raises(MapError, match="is a finished map already, of 5LpN3gDmAk7_1; give another path"):
         import_reference_map(scene, imported.path, ImportSettings(cell_size_m=0.2))
 
 
 def test_without_areas_the_walk_stays_and_areas_are_refused(scene: Path, tmp_path: Path) -> None:
     stored = import_reference_map(scene / "vlmap/vlmaps.h5df", tmp_path / "m.avlmap", SETTINGS, progress=False)
-    assert len(stored.keyframes) == 14 and stored.keyframes.view.shape == (14, 768)  # found beside
+    assert len(stored.data.keyframes) == 14 and stored.data.keyframes.view.shape == (14, 768)  # found beside
     alone = tmp_path / "alone"
     alone.mkdir()
     (alone / "vlmaps.h5df").symlink_to(scene / "vlmap/vlmaps.h5df")
     stored = import_reference_map(
         alone / "vlmaps.h5df", tmp_path / "n.avlmap", SETTINGS, poses=scene / "poses.txt", progress=False
     )
-    assert len(stored.keyframes) == 14 and stored.keyframes.view.shape == (14, 0)
-    assert "views" not in stored.info.models
+    assert len(stored.data.keyframes) == 14 and stored.data.keyframes.view.shape == (14, 0)
+    assert "views" not in stored.data.info.models
     with pytest.raises(avlmaps.core.errors.AvlmapsError, match="views"):
-        AVLMap(stored).area("kitchen")
+        stored.area("kitchen")
 
 
-def test_the_first_pose_may_come_from_the_area_map(scene: Path, imported: StoredMap, tmp_path: Path) -> None:
+def test_the_first_pose_may_come_from_the_area_map(scene: Path, imported: AVLMap, tmp_path: Path) -> None:
     stored = import_reference_map(
         _copy(scene / "vlmap/vlmaps.h5df", tmp_path / "vlmaps.h5df"),
         tmp_path / "m.avlmap",
@@ -249,7 +249,7 @@ def test_the_first_pose_may_come_from_the_area_map(scene: Path, imported: Stored
         areas=scene / "area_map/clip_sparse_map.h5df",
         progress=False,
     )
-    assert np.array_equal(stored.voxels.index, imported.voxels.index)
+    assert np.array_equal(stored.data.voxels.index, imported.data.voxels.index)
 
 
 def _copy(source: Path, target: Path) -> Path:
@@ -290,9 +290,9 @@ def test_grids_over_a_cloud_need_no_pose(
     made, points = _cloud(arrays, order)
     write_h5(tmp_path / name, made)
     stored = import_reference_map(tmp_path, tmp_path / "m.avlmap", progress=False)
-    assert stored.grid.voxel_size_m == CELL_M and len(stored.keyframes) == 0
+    assert stored.data.grid.voxel_size_m == CELL_M and len(stored.data.keyframes) == 0
     expected = np.stack([-points[:, 2], -points[:, 0], points[:, 1]], axis=1)  # x right, y up, z backward, turned
-    away = KDTree(stored.grid.centre_of(stored.voxels.index)).query(expected)[0]
+    away = KDTree(stored.data.grid.centre_of(stored.data.voxels.index)).query(expected)[0]
     assert away.max() < 2 * FAR_M
 
 
@@ -301,10 +301,10 @@ def test_features_of_nothing_stay_nothing(arrays: dict[str, np.ndarray], scene: 
     feat[:50] = 0.0
     source = write_h5(tmp_path / "vlmaps.h5df", {**arrays, "grid_feat": feat})
     stored = import_reference_map(source, tmp_path / "m.avlmap", SETTINGS, poses=scene / "poses.txt", progress=False)
-    norm = np.linalg.norm(stored.voxels.feature.astype(np.float64), axis=1)
+    norm = np.linalg.norm(stored.data.voxels.feature.astype(np.float64), axis=1)
     nothing = norm == 0.0
     assert 0 < nothing.sum() <= 80 and np.allclose(norm[~nothing], 1.0, atol=2e-3)
-    assert (np.asarray(stored.voxels.weight)[nothing] == 0.0).all()
+    assert (np.asarray(stored.data.voxels.weight)[nothing] == 0.0).all()
 
 
 def test_weights_that_vanish_do_not_take_the_feature_with_them(
@@ -313,7 +313,7 @@ def test_weights_that_vanish_do_not_take_the_feature_with_them(
     made = {**arrays, "weight": np.zeros_like(arrays["weight"]), "grid_feat": arrays["grid_feat"] * np.float32(1e-15)}
     source = write_h5(tmp_path / "vlmaps.h5df", made)
     stored = import_reference_map(source, tmp_path / "m.avlmap", SETTINGS, poses=scene / "poses.txt", progress=False)
-    assert np.allclose(np.linalg.norm(stored.voxels.feature.astype(np.float64), axis=1), 1.0, atol=2e-3)
+    assert np.allclose(np.linalg.norm(stored.data.voxels.feature.astype(np.float64), axis=1), 1.0, atol=2e-3)
 
 
 def _without(arrays: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
@@ -361,8 +361,8 @@ def test_few_bad_voxels_can_be_left_out(arrays: dict[str, np.ndarray], scene: Pa
     source = write_h5(tmp_path / "vlmaps.h5df", _with_nan(arrays))
     settings = ImportSettings(CELL_M, max_bad_share=0.01)
     stored = import_reference_map(source, tmp_path / "m.avlmap", settings, poses=scene / "poses.txt", progress=False)
-    assert np.isfinite(stored.voxels.feature).all()
-    assert any(notice.startswith("1 of") and "left out" in notice for notice in stored.info.notices)
+    assert np.isfinite(stored.data.voxels.feature).all()
+    assert any(notice.startswith("1 of") and "left out" in notice for notice in stored.data.info.notices)
 
 
 @pytest.mark.parametrize(
@@ -463,22 +463,22 @@ def test_the_walks_below_are_heard_anew_where_they_were_walked(
 ) -> None:
     settings = ImportSettings(CELL_M, track="output_level_1.wav", hear_with="pitch")
     stored = import_reference_map(with_walks, tmp_path / "m.avlmap", settings, progress=False)
-    sounds = open_stored(stored.path).sounds
-    begin_s = stored.info.recording.duration_s
+    sounds = AVLMap.open(stored.path).sounds
+    begin_s = stored.data.info.recording.duration_s
     second_s = begin_s + (14 * 12 - 1) / 25
     assert np.allclose(sounds.onset_s, [begin_s + 1.0, begin_s + 4.0, second_s + 2.0], atol=0.1)
     assert np.allclose(sounds.offset_s - sounds.onset_s, 1.0, atol=0.15)
     assert sounds.feature.tolist() == [[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
-    assert len({stored.clip_path(i) for i in range(3)}) == 3 and all(stored.clip_path(i).is_file() for i in range(3))
+    assert len(set(stored.data.sounds.clips)) == 3 and all(clip.is_file() for clip in stored.data.sounds.clips)
     assert not (stored.path / "parts").exists()
-    assert (stored.info.models["sounds"].backend, stored.info.models["sounds"].checksum) == (
+    assert (stored.data.info.models["sounds"].backend, stored.data.info.models["sounds"].checksum) == (
         "pitch",
         "fedcba9876543210",
     )
     walked = avlmaps.open_recording(with_walks / "audio_video/000007").world_from_camera[:, :3, 3]
     track = sounds.track[sounds.track_offsets[2] : sounds.track_offsets[3]]
     assert np.allclose(track[0], walked[50], atol=0.3) and KDTree(walked).query(track)[0].max() < 0.3
-    heat = AVLMap(stored).sound("high")
+    heat = stored.sound("high")
     assert heat.found
     first = seen[4 * 25 // 12].habitat_from_base
     expected = np.array([-first[2, 3], -first[0, 3]])

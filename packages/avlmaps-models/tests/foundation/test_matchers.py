@@ -24,7 +24,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.registry import Kind, load
 from avlmaps.maps.build import build_map
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.perception.conformance import check
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.settings import ModelSettings, using_models
@@ -393,7 +393,7 @@ def test_a_map_on_the_disk_locates_by_superglue_and_says_so_where_it_has_no_scor
     used = Profile("kept", pixels="colours", local="superpoint", matcher="superglue", place="netvlad")
     path = models.parent / "room.avlmap"
     build_map(walk, path, used, progress=False)
-    stored = open_stored(path)
+    stored = read(path)
     assert stored.keyframes.score.dtype == np.float16 and len(stored.keyframes.score) == len(stored.keyframes.xy) > 0
     found = locate(stored, walk.frame(0).rgb, None, np.random.default_rng(0))
     assert found.world_from_camera is not None

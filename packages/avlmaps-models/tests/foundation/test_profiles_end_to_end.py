@@ -37,7 +37,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import install_command
 from avlmaps.core.registry import Backend, Kind, backends, load
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.perception.models.published_models import availability
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
@@ -146,7 +146,7 @@ def test_the_map_is_whole_and_names_its_models(name: str, maps: Maps, answer) ->
     assert told["frames"] == 6
     assert set(told["models"]) == {"pixels", "views", "sounds", "local", "place", "matcher"}
     assert len(told["sounds"]) == 1
-    stored = open_stored(maps[name])
+    stored = read(maps[name])
     assert np.asarray(stored.voxels.feature).any(axis=1).mean() > 0.5, "features lie on most of the surface"
     assert stored.keyframes.view.shape[1] == stored.info.models["views"].dim
     for model in stored.info.models.values():
@@ -183,7 +183,7 @@ def test_the_same_build_again_makes_the_same_map_and_another_voxel_size_encodes_
 ) -> None:
     words = ("--profile", name, *here(folders[name]), "--feature-cache")
     assert run("build", walk, "--out", tmp_path / "again", "--voxel-size-m", 0.1, *words, "off")[0] == 0
-    first, again = open_stored(maps[name]), open_stored(tmp_path / "again")
+    first, again = read(maps[name]), read(tmp_path / "again")
     for one, other in ((first.voxels.feature, again.voxels.feature), (first.keyframes.view, again.keyframes.view)):
         np.testing.assert_allclose(one.astype(np.float32), other, atol=2e-3, err_msg="with the cache and without")
     before = {file: file.stat().st_mtime_ns for file in cache.rglob("*.npy")}
@@ -332,4 +332,4 @@ def test_the_red_kitchen_runs_through(
     assert told["frames"] == 2 and told["voxels"] > 1000
     assert answer("query", out, "--object", "red cabinet", *here(folders[name]))["goals"] is not None
     assert "inliers" in answer("locate", out, kitchen / "frame-000000.color.jpg", *here(folders[name]))
-    assert open_stored(out).info.models[Kind.PIXELS.value].dim == open_stored(out).voxels.feature.shape[1]
+    assert read(out).info.models[Kind.PIXELS.value].dim == read(out).voxels.feature.shape[1]

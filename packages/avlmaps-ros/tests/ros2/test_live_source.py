@@ -94,7 +94,7 @@ def test_the_live_map_of_a_robot_is_that_of_its_recording_and_answers(
     assert one.found == other.found
     assert min(np.linalg.norm(np.subtract(one.goals[0].position, goal.position)) for goal in other.goals) < 0.5
     assert counts["sounds"] >= 1
-    assert live.stored.info.up.vector() == pytest.approx([0.0, 0.0, 1.0])
+    assert live.data.info.up.vector() == pytest.approx([0.0, 0.0, 1.0])
 
 
 def test_two_channels_and_the_directions_of_a_device_show_where_a_sound_came_from(walk: Path, tmp_path: Path) -> None:
@@ -104,7 +104,7 @@ def test_two_channels_and_the_directions_of_a_device_show_where_a_sound_came_fro
     assert "directions /sound_direction" in noted and "/sound_direction are taken as degrees" in noted
     assert "mixed into one" not in noted and "came before the first picture" not in noted
     assert json.loads(said)["live"]["refused"] == 0
-    sources = AVLMap.open(tmp_path / "live.avlmap").stored.sources()
+    sources = AVLMap.open(tmp_path / "live.avlmap").data.sources
     assert sources is not None and sources.channels[0] == 2 and np.ptp(sources.heard.astype(float)) > 1.0
     assert len(sources.device) == 1 and Device.of(sources.device[0]).sounds >= 1
 

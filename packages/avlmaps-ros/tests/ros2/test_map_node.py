@@ -77,7 +77,7 @@ def client(room, tmp_path_factory):
     robot = tmp_path_factory.mktemp("robot") / "robot.json"
     Frames("earth", "base_link", LIE).write(robot)
     words = [
-        "--ros-args", "-p", f"map:={room.stored.path}", "-p", f"robot_file:={robot}", "-p", "block_m:=1.0",
+        "--ros-args", "-p", f"map:={room.path}", "-p", f"robot_file:={robot}", "-p", "block_m:=1.0",
         "-p", "most_points:=200",
     ]  # fmt: skip
     process = subprocess.Popen([sys.executable, "-m", "avlmaps_node.node", *words], cwd=PACKAGE)
@@ -211,7 +211,7 @@ def test_what_cannot_be_answered_says_so_in_one_sentence(client):
 
 
 def test_a_picture_of_the_recording_is_located_where_it_was_taken(client, room):
-    frame = next(iter(open_recording(room.stored.path.parent / "rec").frames()))
+    frame = next(iter(open_recording(room.path.parent / "rec").frames()))
     image = Image(encoding="rgb8", width=frame.rgb.shape[1], height=frame.rgb.shape[0], step=3 * frame.rgb.shape[1])
     image.data.frombytes(frame.rgb.tobytes())
     answer, expected = client.call(Locate, "/avlmaps/locate", image=image), room.locate(frame.rgb)

@@ -6,7 +6,7 @@ import pytest
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording, Subset
-from avlmaps_sim.bench.locate import COLUMNS, MapOfPictures, errors_of, foreign_errors, map_of, run
+from avlmaps_sim.bench.locate import COLUMNS, LocatableMap, errors_of, foreign_errors, map_of, run
 from helpers.picture_room import RoomWalk
 
 
@@ -32,7 +32,7 @@ def test_photos_of_other_places_can_be_given() -> None:
 
 
 @pytest.fixture(scope="module")
-def red_kitchen(shared_data: Path) -> tuple[Recording, MapOfPictures]:
+def red_kitchen(shared_data: Path) -> tuple[Recording, LocatableMap]:
     """Return a walk, and the map of every other frame of its first part."""
     recording = open_recording(shared_data / "data" / "redkitchen")
     return recording, map_of(
@@ -42,7 +42,7 @@ def red_kitchen(shared_data: Path) -> tuple[Recording, MapOfPictures]:
 
 @pytest.mark.nightly
 @pytest.mark.shared
-def test_half_of_the_red_kitchen_locates_the_other_half(red_kitchen: tuple[Recording, MapOfPictures]) -> None:
+def test_half_of_the_red_kitchen_locates_the_other_half(red_kitchen: tuple[Recording, LocatableMap]) -> None:
     """The issue's figures, in the first part of the walk; `avlmaps bench locate` asks everywhere."""
     recording, stored = red_kitchen
     asked = np.arange(1, 60, 12)
@@ -57,7 +57,7 @@ def test_half_of_the_red_kitchen_locates_the_other_half(red_kitchen: tuple[Recor
 @pytest.mark.nightly
 @pytest.mark.shared
 def test_the_depth_cameras_intrinsics_do_not_spoil_the_red_kitchen(
-    red_kitchen: tuple[Recording, MapOfPictures],
+    red_kitchen: tuple[Recording, LocatableMap],
 ) -> None:
     recording, stored = red_kitchen
     errors = errors_of(stored, recording, np.arange(25, 60, 9), 0, camera=recording.rig.depth)

@@ -60,7 +60,7 @@ class AskedMap:
 
     @property
     def encoders(self):
-        return self.stored.encoders
+        return self.encoders
 
     @property
     def stored(self):

@@ -9,7 +9,6 @@ import pytest
 from avlmaps.core.errors import MapError
 from avlmaps.days.find import NotTheSamePlaceError
 from avlmaps.days.merge import merge_maps
-from avlmaps.maps.store.reader import open_stored
 from avlmaps.query.asking import Asked, ask
 from avlmaps.query.avlmap import AVLMap
 from avlmaps_sim.bench.change.scores import Happened, judged, judged_list, true_changes
@@ -89,12 +88,13 @@ def test_a_merged_map_is_a_map_and_bad_merges_are_refused(bench: tuple[Path, dic
     (first,) = work.glob("house-7-*/synthetic.avlmap")
     (second,) = work.glob("house-7-day-1-*/turned-synthetic.avlmap")
     (merged,) = work.glob("house-7-day-1-*/merged-true-1.avlmap")
-    one, other, both = (open_stored(path) for path in (first, second, merged))
-    assert len(both.info.visits) == 2 and both.life() is not None
-    assert len(both.keyframes) == len(both.keyframes.clear_mm) <= len(one.keyframes) + len(other.keyframes)
+    one, other, both = (AVLMap.open(path) for path in (first, second, merged))
+    assert len(both.data.info.visits) == 2 and both.data.life is not None
+    most = len(one.data.keyframes) + len(other.data.keyframes)
+    assert len(both.data.keyframes) == len(both.data.keyframes.clear_mm) <= most
     # The second world is another one: the transform is far from none.
-    assert np.abs(np.array(both.info.visits[1].map_from_recording) - np.eye(4)).max() > 0.5
-    avlmap = AVLMap(both)
+    assert np.abs(np.array(both.data.info.visits[1].map_from_recording) - np.eye(4)).max() > 0.5
+    avlmap = both
     assert len(avlmap.things(at=1)) > 10 and avlmap.changes()["days"][1]["visit"] == 2
     answer = ask(avlmap, Asked(sentence="what is new?"))
     assert answer.text and len(answer.when) == len(answer.goals)
@@ -114,4 +114,4 @@ def test_another_home_is_refused_with_numbers(
     (first,) = (bench[0] / "work").glob("house-7-*/synthetic.avlmap")
     _, other = heard_flat(tmp_path_factory)
     with pytest.raises(NotTheSamePlaceError, match=r"of \d+ keyframes .* \d+ were located"):
-        merge_maps(open_stored(first), open_stored(other), tmp_path / "no.avlmap")
+        merge_maps(AVLMap.open(first), AVLMap.open(other), tmp_path / "no.avlmap")

@@ -236,11 +236,11 @@ def test_ones_own_recording_with_boxes_runs_through_the_tables(own: Path, tmp_pa
     assert kinds
     ceiling = [one for kind in kinds for one in outcome.answers(kind, "true perception")]
     assert np.median([one.off_m for one in ceiling]) < 0.5
-    from avlmaps.maps.store.reader import open_stored
+    from avlmaps.maps.store.folder import read
     from avlmaps.query.settings import rules_of
 
     (path,) = (tmp_path / "work").rglob("colours-paper.avlmap")
-    assert rules_of(open_stored(path).info.settings) == "paper"
+    assert rules_of(read(path).info.settings) == "paper"
 
 
 def test_robots_are_not_sent_through_a_recording(own: Path, tmp_path: Path):

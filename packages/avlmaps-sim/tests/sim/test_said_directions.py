@@ -12,7 +12,7 @@ from avlmaps.live.replay import replay
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.build import build_map
 from avlmaps.maps.located import take_device
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.recordings.open import open_recording
 from avlmaps_sim.hearing.directions import ERROR_DEG, said_directions
 from avlmaps_sim.mesh import Triple
@@ -102,7 +102,7 @@ def test_the_next_map_begins_with_the_offset_that_the_first_one_stored(tmp_path:
     first = build_map(open_recording(tmp_path / "rec"), tmp_path / "first.avlmap", "colours", progress=False)
     found = first.sources()
     assert found is not None and found.device.shape == (1, 4)
-    again = open_stored(first.path).sources()
+    again = read(first.path).sources()
     assert again is not None and np.array_equal(again.device, found.device)
     record_scene(flat(), tmp_path / "next", settings, seed=2)
     recording = open_recording(tmp_path / "next")
@@ -116,7 +116,7 @@ def test_the_next_map_begins_with_the_offset_that_the_first_one_stored(tmp_path:
         same_device=first.path,
     )  # fmt: skip
     replay(open_recording(tmp_path / "next"), live, rate=None)
-    ended = live.close().stored.sources()
+    ended = live.close().data.sources
     assert ended is not None
     np.testing.assert_allclose(ended.device, after.device, atol=1e-3)
     recording.audio = replace(recording.audio, directions=None)

@@ -14,11 +14,10 @@ from avlmaps.days.merge import joined_sources, merge_maps
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import replay
 from avlmaps.live.settings import LiveSettings
-from avlmaps.maps.corrected import correct_stored
+from avlmaps.maps.corrected import correct_map
 from avlmaps.maps.sources.density import CandidateGrid, Density
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.store.folder import write
-from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
@@ -34,10 +33,10 @@ def heard(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.fixture
-def copy(heard: tuple[Path, Path], tmp_path: Path) -> StoredMap:
+def copy(heard: tuple[Path, Path], tmp_path: Path) -> AVLMap:
     """Return the map in a folder of its own."""
     shutil.copytree(heard[1], tmp_path / "copy.avlmap")
-    return open_stored(tmp_path / "copy.avlmap")
+    return AVLMap.open(tmp_path / "copy.avlmap")
 
 
 def places(sources: SourceEvidence | None) -> np.ndarray:
@@ -52,13 +51,13 @@ def places(sources: SourceEvidence | None) -> np.ndarray:
     return np.array(found).reshape(-1, 2)
 
 
-def without_sources(stored: StoredMap) -> StoredMap:
+def without_sources(stored: AVLMap) -> AVLMap:
     write(stored.path, replace(stored.data, sources=None))
-    return open_stored(stored.path)
+    return AVLMap.open(stored.path)
 
 
 def test_a_live_map_ends_with_the_sources_of_the_build(heard: tuple[Path, Path], tmp_path: Path) -> None:
-    recording, built = open_recording(heard[0]), open_stored(heard[1])
+    recording, built = open_recording(heard[0]), AVLMap.open(heard[1])
     assert recording.audio is not None
     live = LiveMap(
         tmp_path / "live.avlmap", "synthetic", up_in_world=recording.up_in_world, live=LiveSettings(gates=False),
@@ -68,11 +67,11 @@ def test_a_live_map_ends_with_the_sources_of_the_build(heard: tuple[Path, Path],
     meanwhile = sources_of_all_sounds(live)
     saved = sources_of_a_save(live)
     live.close()
-    after = open_stored(live.path)
-    assert np.array_equal(after.sounds.onset_s, built.sounds.onset_s)
-    assert np.allclose(places(after.sources()), places(built.sources()), atol=0.05), "within a voxel"
+    after = AVLMap.open(live.path)
+    assert np.array_equal(after.data.sounds.onset_s, built.data.sounds.onset_s)
+    assert np.allclose(places(after.data.sources), places(built.data.sources), atol=0.05), "within a voxel"
     # The last sound may end with the track, and is listed only then.
-    apart = [np.linalg.norm(places(after.sources()) - place, axis=1).min() for place in places(meanwhile)]
+    apart = [np.linalg.norm(places(after.data.sources) - place, axis=1).min() for place in places(meanwhile)]
     assert np.median(apart) < 0.3
     assert len(saved) > 0 and saved.channels[0] == 4
 
@@ -81,7 +80,7 @@ def sources_of_all_sounds(live: LiveMap, seconds: float = 120.0) -> SourceEviden
     """Wait until a snapshot has located all of its sounds."""
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
-        arrays = live.map.stored.data if live.generation else None
+        arrays = live.map.data if live.generation else None
         found = None if arrays is None or arrays.sources_wait else arrays.sources
         if found is not None and found.heard.any(axis=1).all():
             return found
@@ -93,23 +92,25 @@ def sources_of_a_save(live: LiveMap, seconds: float = 120.0) -> SourceEvidence:
     """Wait until the folder, which a kill would leave, has sources."""
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
-        if (live.path / "map.json").is_file() and (found := open_stored(live.path).sources()) is not None:
+        if (live.path / "map.json").is_file() and (found := AVLMap.open(live.path).data.sources) is not None:
             return found
         time.sleep(0.05)
     raise AssertionError("no save has sources")
 
 
-def test_sources_move_with_corrected_poses(heard: tuple[Path, Path], copy: StoredMap) -> None:
-    recording, before = open_recording(heard[0]), places(copy.sources())
+def test_sources_move_with_corrected_poses(heard: tuple[Path, Path], copy: AVLMap) -> None:
+    recording, before = open_recording(heard[0]), places(copy.data.sources)
     turn = np.eye(4)
     turn[:2, :2], turn[:2, 3] = [[0.0, -1.0], [1.0, 0.0]], [3.0, 1.0]
     poses = turn @ np.asarray(recording.world_from_camera)
-    moved, _ = correct_stored(copy, recording.stamps_s, poses, recording)
+    correct_map(copy.path, recording.stamps_s, poses, recording)
+    moved = AVLMap.open(copy.path)
     wanted = apply(turn, np.column_stack([before, np.zeros(len(before))]))[:, :2]
-    apart = np.linalg.norm(places(moved.sources()) - wanted, axis=1)
+    apart = np.linalg.norm(places(moved.data.sources) - wanted, axis=1)
     assert np.median(apart) < 0.2
-    lost, _ = correct_stored(moved, recording.stamps_s, poses)
-    assert lost.sources() is None, "old evidence does not fit new poses"
+    correct_map(copy.path, recording.stamps_s, poses)
+    lost = AVLMap.open(copy.path)
+    assert lost.data.sources is None, "old evidence does not fit new poses"
 
 
 @pytest.fixture
@@ -119,21 +120,21 @@ def another_day(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("another_day")
-def test_a_merged_map_has_the_sources_of_both_days(heard: tuple[Path, Path], copy: StoredMap, tmp_path: Path) -> None:
-    first = open_stored(heard[1])
+def test_a_merged_map_has_the_sources_of_both_days(heard: tuple[Path, Path], copy: AVLMap, tmp_path: Path) -> None:
+    first = AVLMap.open(heard[1])
     merged = merge_maps(first, copy, tmp_path / "both.avlmap", day="2026-11-24", first_day="2026-11-23")
-    both, one = merged.sources(), places(first.sources())
-    assert both is not None and len(both) == 2 * len(one) == len(merged.sounds)
+    both, one = merged.data.sources, places(first.data.sources)
+    assert both is not None and len(both) == 2 * len(one) == len(merged.data.sounds)
     apart = np.linalg.norm(places(both) - np.concatenate([one, one]), axis=1)
     assert np.median(apart) < 0.2
-    rows = [row for thing in AVLMap(merged).contents().things for row in thing.heard]
+    rows = [row for thing in merged.contents().things for row in thing.heard]
     assert all(row.get("when", {}).get("day") in ("2026-11-23", "2026-11-24") for row in rows)
-    known = AVLMap(merged)
+    known = merged
     for visit, day in enumerate(("2026-11-23", "2026-11-24"), 1):
         then = known.things(at=day)
         rows = [row for thing in then for row in thing.heard]
         assert rows and all(row.get("when") == {"visit": visit, "day": day} for row in rows)
-        onsets = np.asarray(merged.sounds.onset_s)
+        onsets = np.asarray(merged.data.sounds.onset_s)
         assert all(np.abs(onsets - row["onset_s"]).min() < 1e-6 for row in rows)
         speaking = next(thing for thing in then if thing.heard)
         (alone, *_) = (one for one in known.things([speaking.name], at=day) if one.position == speaking.position)
@@ -141,18 +142,18 @@ def test_a_merged_map_has_the_sources_of_both_days(heard: tuple[Path, Path], cop
 
 
 @pytest.mark.usefixtures("another_day")
-def test_a_merge_says_why_it_does_not_know(heard: tuple[Path, Path], copy: StoredMap, tmp_path: Path) -> None:
-    first = open_stored(heard[1])
+def test_a_merge_says_why_it_does_not_know(heard: tuple[Path, Path], copy: AVLMap, tmp_path: Path) -> None:
+    first = AVLMap.open(heard[1])
     bare = without_sources(copy)
-    found, why = joined_sources(first, bare, np.eye(4), first.voxels, first.keyframes)
+    found, why = joined_sources(first, bare, np.eye(4), first.data.voxels, first.data.keyframes)
     assert found is None and "copy.avlmap" in why and "microphones in recording.json" in why
-    own = first.sources()
+    own = first.data.sources
     assert own is not None
     stereo = replace(own, channels=np.array([2], np.int64))
     write(copy.path, replace(bare.data, sources=stereo))
-    found, why = joined_sources(first, open_stored(copy.path), np.eye(4), first.voxels, first.keyframes)
+    found, why = joined_sources(first, AVLMap.open(copy.path), np.eye(4), first.data.voxels, first.data.keyframes)
     assert found is None and "4 microphones" in why and "2" in why
-    merged = merge_maps(first, open_stored(copy.path), tmp_path / "both.avlmap", things_of=lambda _: [])
-    assert why in merged.info.notices
+    merged = merge_maps(first, AVLMap.open(copy.path), tmp_path / "both.avlmap", things_of=lambda _: [])
+    assert why in merged.data.info.notices
     with pytest.raises(QueryError, match="merge them again"):
-        AVLMap(merged).sources()
+        merged.sources()

@@ -13,7 +13,7 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.maps.build import build_map
 from avlmaps.maps.sources.find import find_sources
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.navigate.instances import things_in
 from avlmaps.navigate.instruct import given_by
 from avlmaps.navigate.skills import Robot
@@ -112,8 +112,8 @@ def test_a_map_says_where_its_sounds_came_from(mapped: tuple[Path, Path]) -> Non
     recording, path = mapped
     avlmap, truth = AVLMap.open(path), read_truth(recording)
     sources = avlmap.sources()
-    assert sources and {event for one in sources for event in one.events} == set(range(len(avlmap.stored.sounds)))
-    onsets = np.asarray(avlmap.stored.sounds.onset_s)
+    assert sources and {event for one in sources for event in one.events} == set(range(len(avlmap.data.sounds)))
+    onsets = np.asarray(avlmap.data.sounds.onset_s)
     errors = []
     for event in truth.events:
         number = int(np.argmin(np.abs(onsets - event.onset_s)))
@@ -147,7 +147,7 @@ def test_an_answer_at_the_source_believes_no_more_than_its_region(mapped: tuple[
         assert near.probability == pytest.approx(same.probability, abs=2e-3) and near.probability < same.confidence
         assert near.spread is not None and "comes from" in answer.text
     assert avlmap.ask(sound=best.name).goals[0].spread is None
-    heat = AVLMap(avlmap.stored, settings=QuerySettings(found_at=1.0)).sound(best.name, primary=True, at="source")
+    heat = AVLMap(avlmap, settings=QuerySettings(found_at=1.0)).sound(best.name, primary=True, at="source")
     with pytest.raises(GoalNotFoundError, match="the source of"):
         things_in(heat)
     assert things_in(heat, guess=True)[0].spread is not None
@@ -171,7 +171,7 @@ def test_commands_and_questions_choose_the_same_place(mapped: tuple[Path, Path])
     for known, at in (
         (avlmap, "source"),
         (paper, None),
-        (AVLMap(avlmap.stored, settings=QuerySettings(sounds=ROBOT)), None),
+        (AVLMap(avlmap, settings=QuerySettings(sounds=ROBOT)), None),
     ):
         said = f"where the sound of {name} comes from"
         plan = LearnedTranslator(given_by(known)).program_for(f"go to {said}")
@@ -208,7 +208,7 @@ def test_things_list_what_was_heard_from_them(mapped: tuple[Path, Path]) -> None
         if source.confidence * share >= 0.1
     }
     assert likely and {key: row["probability"] for key, row in heard.items()} == pytest.approx(likely, abs=1e-3)
-    ends = np.asarray(avlmap.stored.sounds.onset_s)
+    ends = np.asarray(avlmap.data.sounds.onset_s)
     assert all(np.abs(ends - row["onset_s"]).min() < 1e-6 and "when" not in row for row in heard.values())
     assert "heard from it" in thing_lines([ListedThing(**row) for row in listed])[0]
     assert "heard" not in avlmap.things()[0].to_json()
@@ -237,10 +237,10 @@ def test_a_map_of_one_microphone_says_what_it_lacks(tmp_path: Path) -> None:
     record_scene(flat(), tmp_path / "rec", settings, seed=1)
     build_map(open_recording(tmp_path / "rec"), tmp_path / "one.avlmap", "colours", progress=False)
     avlmap = AVLMap.open(tmp_path / "one.avlmap")
-    assert avlmap.stored.sources() is None
+    assert avlmap.data.sources is None
     with pytest.raises(QueryError, match="where the microphones are"):
         avlmap.sources()
-    if len(avlmap.stored.sounds):
+    if len(avlmap.data.sounds):
         answer = avlmap.ask("where did the noise come from?")
         assert answer.goals[0].position == avlmap.ask("the last sound").goals[0].position
         assert "where the robot was" in answer.notes[0] and "where the microphones are" in answer.notes[0]
@@ -254,4 +254,4 @@ def test_damaged_evidence_is_refused(mapped: tuple[Path, Path], tmp_path: Path) 
     file = next((copy / "sources").glob("heard*"))
     file.write_bytes(file.read_bytes()[:-64])
     with pytest.raises(MapError):
-        open_stored(copy)
+        read(copy)

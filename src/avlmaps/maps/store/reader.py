@@ -1,113 +1,22 @@
-"""A map's folder opened with the encoders that it names."""
+"""What a map says of itself: its report, and the encoders that it was built with."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from avlmaps.core.arrays import Float
-from avlmaps.core.camera import Rig
 from avlmaps.core.errors import MapError
-from avlmaps.core.files import user_path
 from avlmaps.core.poses import FRAME, from_rotation, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
-from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.store.folder import read
-from avlmaps.maps.store.life import Life
 from avlmaps.maps.store.manifest import GroundInfo, MapInfo
 from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps, Voxels
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.published_models import public_choice, public_name
 
 GIVEN_FEATURES = "given:features"  # backend of features that came without an encoder
-
-
-@dataclass(frozen=True, slots=True, repr=False)
-class StoredMap:
-    """A map, its folder and its encoders; it goes when all that takes one takes ``MapData`` or an ``AVLMap``.
-
-    Attributes:
-        path: the folder; of a map in memory, that of its clips.
-        data: the map.
-        encoders: which models perceived.
-    """
-
-    path: Path
-    data: MapData
-    encoders: Encoders
-
-    @property
-    def info(self) -> MapInfo:
-        """All that ``map.json`` says."""
-        return self.data.info
-
-    @property
-    def grid(self) -> GridSpec:
-        """Turns metres into voxels."""
-        return self.data.grid
-
-    @property
-    def up_in_world(self) -> Float[np.ndarray, "3"]:
-        """Unit vector."""
-        return self.data.up_in_world
-
-    @property
-    def rig(self) -> Rig:
-        """The recording's cameras."""
-        return self.data.rig
-
-    @property
-    def voxels(self) -> Voxels:
-        """Occupied voxels."""
-        return self.data.voxels
-
-    @property
-    def keyframes(self) -> Keyframes:
-        """Stored pictures."""
-        return self.data.keyframes
-
-    @property
-    def place_state(self) -> dict[str, np.ndarray]:
-        """What the place encoder learned from the keyframes."""
-        return self.data.place_state
-
-    @property
-    def sounds(self) -> HeardSounds:
-        """What was heard."""
-        return self.data.sounds
-
-    def __repr__(self) -> str:
-        return f"StoredMap({self.path.name!r}: {self.info.counts.voxels:,} voxels)"
-
-    def clip_path(self, sound: int) -> Path:
-        """Return the FLAC file of a sound, by its number in ``sounds``."""
-        return self.sounds.clips[sound]
-
-    def life(self) -> Life | None:
-        """Return what became of its things over several days; None of a map of one day."""
-        return self.data.life
-
-    def submaps(self) -> Submaps | None:
-        """Return the submaps by which it can follow corrected poses; None where it has none."""
-        return self.data.submaps
-
-    @property
-    def knows_sources(self) -> bool:
-        """Whether the map knows where its sounds came from."""
-        return self.data.sources is not None
-
-    def sources(self) -> SourceEvidence | None:
-        """Return what the microphones say of where each sound began; None where their places are not known."""
-        return self.data.sources
-
-    def require_model(self, kind: Kind) -> None:
-        """See the function of this name."""
-        require_model(self.info, self.encoders, kind, self.path)
 
 
 def require_model(info: MapInfo, encoders: Encoders, kind: Kind, path: Path) -> None:
@@ -135,13 +44,6 @@ def require_model(info: MapInfo, encoders: Encoders, kind: Kind, path: Path) -> 
         )
 
 
-def open_stored(path: Path | str) -> StoredMap:
-    """Open a map with the encoders that it names; see ``folder.read``."""
-    path = user_path(path)
-    data = read(path)
-    return StoredMap(path, data, encoders_of_map(data.info))
-
-
 def encoders_of_map(info: MapInfo) -> Encoders:
     """Return the encoders that a map was built with; none of them need be known here until it is used."""
     return Encoders.remembered(
@@ -149,15 +51,15 @@ def encoders_of_map(info: MapInfo) -> Encoders:
     )
 
 
-def describe(stored: StoredMap) -> dict[str, Any]:
+def describe(path: Path, data: MapData) -> dict[str, Any]:
     """Return the report of ``avlmaps build`` and ``avlmaps info`` on a map; ready for JSON.
 
     The position of a sound is the middle of the places from which the robot heard it, metres, world.
     """
-    info, sounds = stored.info, stored.sounds
+    info, sounds = data.info, data.sounds
     tracks = np.split(np.asarray(sounds.track, np.float64), sounds.track_offsets[1:-1]) if len(sounds) else []
     return {
-        "path": str(stored.path),
+        "path": str(path),
         "frames": info.counts.frames,
         "keyframes": info.counts.keyframes,
         "voxels": info.counts.voxels,

@@ -34,8 +34,8 @@ from avlmaps.maps.store.manifest import (
     UpInfo,
 )
 from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.types import Voxels
+from avlmaps.query.avlmap import AVLMap
 from avlmaps_models.import_reference.frames import Walk, read_walk
 from avlmaps_models.import_reference.hdf5 import open_hdf5
 from avlmaps_models.import_reference.places import voxels_filled
@@ -81,7 +81,7 @@ def import_reference_map(
     poses: Path | None = None,
     overwrite: bool = False,
     progress: bool = True,
-) -> StoredMap:
+) -> AVLMap:
     """Convert a map of the reference code.
 
     Args:
@@ -111,10 +111,10 @@ def import_reference_map(
         source_key = (voxels.fingerprint, walk.fingerprint(), ears.ingredients())
         key = key_of("import", IMPORT_VERSION, source_key, settings.cell_size_m)
         if _finished(path, key, overwrite):
-            return open_stored(path)
+            return AVLMap.open(path)
         with lock_folder(path):
             _write(path, Source(scene, voxels, walk, ears), settings, key, begin)
-    return open_stored(path)
+    return AVLMap.open(path)
 
 
 def _with_own_cell_size(settings: ImportSettings, voxels: ReferenceVoxels) -> ImportSettings:

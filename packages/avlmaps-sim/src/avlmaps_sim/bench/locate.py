@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.album import perceive_keyframes
 from avlmaps.maps.keyframes.choose import KeyframeSettings, select_keyframes
-from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
-from avlmaps.query.locate import Located, LocateSettings, locate
+from avlmaps.query.locate import LocatableMap, Located, LocateSettings, locate
 from avlmaps.recordings.types import Recording, Subset
 from avlmaps_sim.bench.harness.figures import in_percent, wilson
 
@@ -37,16 +36,6 @@ COLUMNS = (
 )
 NEAR_CM, NEAR_DEG = 5.0, 5.0
 _LOCATING, _KEYFRAMES = LocateSettings(), KeyframeSettings()
-
-
-@dataclass(frozen=True, slots=True)
-class MapOfPictures:
-    """The parts of a map that locating needs."""
-
-    keyframes: Keyframes
-    place_state: dict[str, np.ndarray]
-    encoders: Encoders
-    rig: Rig
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,17 +89,17 @@ def run(
     return {"columns": list(COLUMNS), "rows": rows}
 
 
-def map_of(recording: Recording, used: Encoders, rng: np.random.Generator) -> MapOfPictures:
+def map_of(recording: Recording, used: Encoders, rng: np.random.Generator) -> LocatableMap:
     """Return the pictures of a map of a recording, without its voxels, its sounds and the features of its views."""
     used = used.without(Kind.VIEWS)
     keyframes, place_state = perceive_keyframes(
         recording, select_keyframes(recording, _KEYFRAMES), used, rng, settings=_KEYFRAMES
     )
-    return MapOfPictures(keyframes, place_state, used, recording.rig)
+    return LocatableMap(keyframes, place_state, used, recording.rig)
 
 
 def errors_of(
-    stored: MapOfPictures,
+    stored: LocatableMap,
     recording: Recording,
     asked: Int[np.ndarray, " n"],
     seed: int,
@@ -127,7 +116,7 @@ def errors_of(
 
 
 def foreign_errors(
-    stored: MapOfPictures,
+    stored: LocatableMap,
     pictures: Iterable[UInt8[np.ndarray, "h w 3"]],
     seed: int,
     settings: LocateSettings = _LOCATING,

@@ -138,7 +138,7 @@ def _named(
 
     Things whose name the map's encoder does not know count no voxel.
     """
-    namer = VoxelNamer(avlmap.stored, words)
+    namer = VoxelNamer(avlmap, words)
     likeliest, _ = namer.best()
     centres = avlmap.space.centres
     inside = [_inside(centres, thing, NARROW_M) for thing, _ in things]

@@ -60,7 +60,8 @@ def run_demo(
     Raises:
         MapError: the folder holds something that is not a demonstration.
     """
-    from avlmaps.maps.build import build_map, describe
+    from avlmaps.maps.build import build_map
+    from avlmaps.maps.store.reader import describe
     from avlmaps.query.avlmap import AVLMap
     from avlmaps_sim.demo.drive import drive
     from avlmaps_sim.demo.evidence import Evidence
@@ -76,13 +77,13 @@ def run_demo(
     with _stage("record", seconds, f"A robot with a depth camera and a microphone drives through {_rooms(scene)}."):
         recording = _record(scene, out, settings, seed)
     with _stage("build", seconds, "The recording becomes a map."):
-        stored = build_map(recording, out / MAP)
+        data = build_map(recording, out / MAP)
     with _stage("choose", seconds, "Questions are chosen by what is truly there."):
         evidence = Evidence.of(recording)
         asks, photo = _choose(scene, recording, evidence, out, for_questions, for_photos)
         _write_clip(asks, out, for_clip)
     with _stage("ask", seconds, "The map is queried."):
-        avlmap = AVLMap(stored)
+        avlmap = AVLMap(data, path=out / MAP)
         answered = [
             _answer(avlmap, ask, number, out) for number, ask in enumerate(progress(asks, "asking", unit="question"), 1)
         ]
@@ -90,7 +91,7 @@ def run_demo(
     steps = tuple(step for step, _ in answered)
     with _stage("drive", seconds, "A robot drives to goals by one command."):
         driven = drive(asks, avlmap, scene, out, say)
-    report = DemoReport(out, scene.name, steps, describe(stored), located, seconds, driven)
+    report = DemoReport(out, scene.name, steps, describe(avlmap.path, data), located, seconds, driven)
     with _stage("page", seconds, "The map becomes a page to walk through."):
         _write_page(avlmap, [step.ask for step in steps], out)
     with _stage("report", seconds, "A page with pictures is written."):

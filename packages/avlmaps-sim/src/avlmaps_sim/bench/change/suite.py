@@ -230,14 +230,14 @@ def _lived(
 ) -> HomeResult:
     """Merge the days of a home and judge what is said on each."""
     result = HomeResult(scene, area_m2=_floor_m2(places[0]))
-    merged = places[0].avlmap.stored
+    merged = places[0].avlmap
     names_before, hidden = set(seen[0]), list[Happened]()
     for day, place in enumerate(places[1:], 1):
         begin_s = perf_counter()
         folder = place.job.folder / f"merged-{'true' if way == TRUE else 'ours'}-{day}.avlmap"
         try:
             after = merge_maps(
-                merged, place.avlmap.stored, folder, overwrite=True, things_of=things_of if way == TRUE else None
+                merged, place.avlmap, folder, overwrite=True, things_of=things_of if way == TRUE else None
             )
         except NotTheSamePlaceError:
             result.refused += 1
@@ -245,10 +245,10 @@ def _lived(
             continue
         result.merge_s.append(perf_counter() - begin_s)
         merged = after
-        off_m, off_deg = _misplaced(merged.info.visits[-1].map_from_recording, place)
+        off_m, off_deg = _misplaced(merged.data.info.visits[-1].map_from_recording, place)
         result.off_m.append(off_m)
         result.off_deg.append(off_deg)
-        said = said_changes(Days.of(merged), len(merged.info.visits) - 1)
+        said = said_changes(Days.of(merged), len(merged.data.info.visits) - 1)
         true = true_changes(changes, day, sorted(names_before), sorted(seen[day]))
         result.happened.update(one.kind for one in true)
         noticeable = noticeable_on(day, tuple(true))
@@ -257,7 +257,7 @@ def _lived(
         result.counts.add(judged(said, noticeable, doors, hidden))
         result.unnamed.add(judged(said, noticeable, doors, hidden, named=False))
         names_before |= seen[day]
-    if merged.info.visits:
+    if merged.data.info.visits:
         _judge_lists(result, Days.of(merged), places, changes, names_before, things_of)
     return result
 

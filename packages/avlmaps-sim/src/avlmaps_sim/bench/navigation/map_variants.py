@@ -72,7 +72,8 @@ class Perceived(AVLMap):
     """
 
     def __init__(self, scene: KnownScene, senses: Senses) -> None:
-        super().__init__(scene.avlmap.stored, settings=scene.avlmap.settings)
+        known = scene.avlmap
+        super().__init__(known.data, known.encoders, path=known.path, settings=known.settings)
         self.space = scene.avlmap.space  # so that heat of all senses multiplies
         self._scene, self._senses = scene, senses
 
