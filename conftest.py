@@ -64,8 +64,22 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that hold a slow test: a long one that begins last leaves the other cores idle."""
+    """Leave all but a few cases of a test to the night, and begin with the files that hold a slow test.
+
+    A long test that begins last leaves the other cores idle.
+    """
+    cases: dict[tuple[object, int], list[pytest.Item]] = {}
+    for item in items:
+        few = item.get_closest_marker("few")
+        if few is not None:
+            cases.setdefault((getattr(item, "function", None), few.args[0]), []).append(item)
+    for (_, count), every in cases.items():
+        kept = {round(number * (len(every) - 1) / max(count - 1, 1)) for number in range(count)}
+        for number, item in enumerate(every):
+            if number not in kept:
+                item.add_marker("nightly")
     slow = {item.path for item in items if item.get_closest_marker("slow") is not None}
     items.sort(key=lambda item: (item.path not in slow, item.path))
 

@@ -86,7 +86,7 @@ ENTRIES = (
     Entry("fusion", "python benchmarks/fusion.py", (
         Figure("fusion alone, 640x480 depth, 512-d features, one core", "",
                r"every pixel, depth registered to colour +(\S+) +\S+ +\S+ +(\S+)",
-               "{2} times the per-point loop of the same run ({1} ms a frame on a busy machine)"),)),
+               "{2} times the per-point loop of the same run ({1} processor ms a frame)"),)),
     Entry("geometry", "python benchmarks/geometry.py --scenes house:4 house:5 HOUSE", (
         Figure("voxels within 5 cm of the true surface, Kinect, house:5", "",
                r"house:5 kinect before +\S+ +(\S+)[^\n]+\n +house:5 kinect after \(kinect\) +\S+ +(\S+)",
@@ -97,7 +97,7 @@ ENTRIES = (
     Entry("queries", "python benchmarks/queries.py", (
         Figure("a word queried over 1,000,000 x 512 features", "",
                r"one word over 1,000,000 x 512 float16 +(\S+) +\S+ +(\S+)",
-               "{2} times numpy's float16 product of the same run ({1} ms on a busy machine)"),)),
+               "{2} times numpy's float16 product of the same run ({1} processor ms)"),)),
     Entry("cold-start", "python benchmarks/cold_start.py", (
         Figure("`avlmaps query MAP bed` from the shell", "", r"query MAP bed +(\S+)", "{1} s of the processor"),)),
     Entry("scale", "python benchmarks/scale.py --folder OUT --voxels 1000000 5000000 10000000 --against decabd78", (

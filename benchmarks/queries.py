@@ -45,17 +45,17 @@ def best_ms(work: Callable[[], object], repeats: int = 25) -> float:
     work()
     times = []
     for _ in range(repeats):
-        begin = time.perf_counter()
+        begin = time.process_time()
         work()
-        times.append(time.perf_counter() - begin)
+        times.append(time.process_time() - begin)
     return 1e3 * min(times)
 
 
 def once_ms(work: Callable[[], T]) -> tuple[float, T]:
     """Return the time of one call and its result."""
-    begin = time.perf_counter()
+    begin = time.process_time()
     result = work()
-    return 1e3 * (time.perf_counter() - begin), result
+    return 1e3 * (time.process_time() - begin), result
 
 
 def brute_force_object(space: Space, mask: np.ndarray, falloff_per_m: float, rows: np.ndarray) -> np.ndarray:
@@ -80,9 +80,9 @@ def brute_force_anchors(space: Space, anchors: np.ndarray, scores: np.ndarray, f
 def heat_rows(voxels: int, rng: np.random.Generator) -> list[tuple[str, float, float, float]]:
     """Time object and area heatmaps; rows of (what, ms, ms of brute force, largest difference)."""
     space = Space(GridSpec(VOXEL_SIZE_M), building(voxels, rng), UP)
-    begin = time.perf_counter()
+    begin = time.process_time()
     assert len(space.blocks) and len(space.horizontal)
-    rows = [(f"blocks of {len(space):,} voxels (once a map)", 1e3 * (time.perf_counter() - begin), np.nan, 0.0)]
+    rows = [(f"blocks of {len(space):,} voxels (once a map)", 1e3 * (time.process_time() - begin), np.nan, 0.0)]
     mask = np.zeros(len(space), bool)
     for centre in space.index[rng.integers(0, len(space), 12)]:
         mask |= np.abs(space.index - centre).max(axis=1) <= 10

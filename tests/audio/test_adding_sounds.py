@@ -34,7 +34,7 @@ def digest(folder: Path) -> str:
     return hashlib.sha256((folder / "audio.flac").read_bytes() + (folder / "events.csv").read_bytes()).hexdigest()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, clips: Path) -> None:
     walk = straight_walk(60.0, 0.5)
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
@@ -80,6 +80,7 @@ def test_what_is_segmented_is_what_was_put_in(tmp_path: Path, clips: Path) -> No
         assert (said.onset_s, said.offset_s) == pytest.approx((event.onset_s, event.offset_s), abs=0.1)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", ["white", "pink", "room", "file"])
 def test_the_background_lies_so_much_below_every_sound(tmp_path: Path, clips: Path, kind: str) -> None:
     path = tmp_path / "hum.wav"
@@ -210,6 +211,7 @@ def test_a_recording_is_never_overwritten(tmp_path: Path, clips: Path) -> None:
     assert digest(tmp_path / "out") == before
 
 
+@pytest.mark.nightly
 @pytest.mark.shared
 def test_the_kitchen_gets_four_sounds_without_options(shared_data: Path, tmp_path: Path) -> None:
     kitchen = open_recording(shared_data / "data" / "redkitchen")

@@ -38,6 +38,7 @@ def track_of(folder: Path, sound: ChannelSound, array: Microphones) -> AudioTrac
     return with_microphones(AudioTrack.open(folder / "track.wav"), array)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "seed"), [("square4", 0), ("square4", 1), ("stereo", 2)])
 def test_places_off_by_centimetres_and_a_delay_are_recovered(name: str, seed: int, tmp_path: Path) -> None:
     rng, true, walk = np.random.default_rng(seed), microphones_named(name), curved_drive(25.0, 2.0)
@@ -56,6 +57,7 @@ def test_places_off_by_centimetres_and_a_delay_are_recovered(name: str, seed: in
         assert np.array_equal(found.microphones.position_m[:, 2], given.position_m[:, 2])
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("turned", [(0,), (1, 3)])
 def test_turned_signs_are_taken_back_and_the_array_is_found_as_without(turned: tuple[int, ...], tmp_path: Path) -> None:
     rng, true, walk = np.random.default_rng(0), microphones_named("square4"), curved_drive(25.0, 2.0)
@@ -69,6 +71,7 @@ def test_turned_signs_are_taken_back_and_the_array_is_found_as_without(turned: t
     assert np.allclose(found.microphones.position_m, plain.microphones.position_m, atol=1e-3)
 
 
+@pytest.mark.nightly
 def test_a_right_array_stays(tmp_path: Path) -> None:
     rng, true, walk = np.random.default_rng(4), microphones_named("square4"), curved_drive(20.0)
     found = calibrate(track_of(tmp_path, heard(true, walk, np.zeros(4), rng), true), walk)
@@ -102,7 +105,7 @@ def test_too_little_sound_is_refused(
         calibrate(*straight, between)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_several_sources_are_refused(tmp_path: Path) -> None:
     rng, true, walk = np.random.default_rng(9), microphones_named("square4"), curved_drive(24.0)
     others = [(PLACE, 0.0, 14.0), (np.array([-2.5, -1.0, 1.0]), 14.0, 19.0), (np.array([3.0, -2.0, 1.0]), 19.0, 24.0)]
@@ -111,6 +114,7 @@ def test_several_sources_are_refused(tmp_path: Path) -> None:
         calibrate(track_of(tmp_path, sound, true), walk)
 
 
+@pytest.mark.nightly
 def test_a_source_that_moves_with_the_robot_is_refused(tmp_path: Path) -> None:
     rng, array, walk = np.random.default_rng(3), microphones_named("square4"), curved_drive(20.0)
     late_s = np.linalg.norm(array.position_m - [1.0, 0.4, -0.3], axis=1) / 343.0

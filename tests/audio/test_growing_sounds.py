@@ -96,7 +96,7 @@ def test_a_sound_is_listed_within_a_second_of_its_end() -> None:
     assert sounds.heard(walk).offset_s[1] == pytest.approx(11.0, abs=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_window_of_a_long_track_moves_on_and_keeps_what_was_heard(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -133,6 +133,7 @@ def test_gaps_become_silence_overlaps_are_left_out_and_jitter_changes_nothing(
     assert (samples == 0.5).sum() + round(max(moved_s, 0.0) * RATE_HZ) == len(samples)
 
 
+@pytest.mark.nightly
 def test_a_clock_that_drifts_stays_within_the_gap(tmp_path: Path) -> None:
     track = GrowingTrack(tmp_path / "track.f32")
     for number in range(600):  # 60 s of pieces whose microphone is 1 % slow

@@ -52,6 +52,7 @@ def found(folder: Path, one: tuple[ChannelSound, Trajectory], array: Microphones
     return wiring
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (0, 2, 1), (2, 1, 0), (1, 2, 0), (2, 0, 1)])
 def test_every_order_of_an_array_without_symmetry_is_told(
     order: tuple[int, ...], skew: tuple[ChannelSound, Trajectory], tmp_path: Path
@@ -61,6 +62,7 @@ def test_every_order_of_an_array_without_symmetry_is_told(
     assert wiring.best_fit >= wiring.fit
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (0, 2, 1, 3), (1, 0, 2, 3), (0, 1, 3, 2)])
 def test_exchanged_neighbours_of_a_square_are_told(
     order: tuple[int, ...], square: tuple[ChannelSound, Trajectory], tmp_path: Path
@@ -87,6 +89,7 @@ def test_left_and_right_cannot_be_told_straight_on(tmp_path: Path) -> None:
         assert wiring.is_right and wiring.unsure == ((1, 0),)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("turned", [(0,), (3,), (1, 2)])
 def test_channels_wired_the_other_way_round_are_told_as_sources_take_them_back(
     turned: tuple[int, ...], square: tuple[ChannelSound, Trajectory], tmp_path: Path
@@ -100,6 +103,7 @@ def test_channels_wired_the_other_way_round_are_told_as_sources_take_them_back(
     assert wiring.best_fit > wiring.fit
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("turned", [(), (0,), (3,), (1, 2)])
 def test_sources_are_found_though_signs_are_turned(
     turned: tuple[int, ...], square: tuple[ChannelSound, Trajectory], tmp_path: Path

@@ -33,6 +33,7 @@ def test_an_answer_to_a_closed_output_is_lost_and_that_is_an_error(built: Path) 
         assert "Traceback" not in said
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("verb", ["build", "view", "bench", "import-map"])
 def test_a_verb_of_each_distribution_survives_closed_streams(verb: str) -> None:
     """With nothing to print to, the help of a verb is a sentence or nothing; no file takes a stream's number."""
@@ -99,6 +100,7 @@ def test_other_errors_are_not_about_memory() -> None:
         assert not is_short_of_memory(error)
 
 
+@pytest.mark.few(1)
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs a limit on the address space")
 @pytest.mark.parametrize("megabytes", [250, 450])
 def test_a_small_address_space_is_one_sentence(built: Path, megabytes: int) -> None:

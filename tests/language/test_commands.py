@@ -46,6 +46,7 @@ SPEAKERS = {
 }
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("name", [*SPEAKERS, *NAMES])
 def test_a_sample_of_each_list_is_understood(name: str) -> None:
     if name in SPEAKERS:
@@ -74,6 +75,7 @@ def test_the_development_lists_stay_understood(name: str) -> None:
     assert len(found["other"]) <= other, found["other"]
 
 
+@pytest.mark.few(20)
 @pytest.mark.parametrize("row", read_list(LISTS / "intents.jsonl"), ids=lambda row: row["say"])
 def test_a_sentence_has_its_intents(row: dict[str, object]) -> None:
     judged = judge(row)
@@ -180,6 +182,7 @@ def test_the_plan_is_in_plain_words() -> None:
 ORDERS = ["turn left", "go to the sofa", "stop 2 m left of the bed", "find the sound of rain", "go to the kitchen"]
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize(
     "around",
     ["please {}", "{}. Thanks!", "Hey robot, could you {}, please?", "I'd like you to {}", "um {} uh", "{}, okay?"],
@@ -189,6 +192,7 @@ def test_politeness_changes_nothing(around: str, order: str) -> None:
     assert command_to_program(around.format(order)) == command_to_program(order)
 
 
+@pytest.mark.few(16)
 @pytest.mark.parametrize("first", ORDERS)
 @pytest.mark.parametrize("second", ORDERS)
 @pytest.mark.parametrize("joint", [". ", ", then ", " and then ", "; ", ", and after that "])
@@ -228,6 +232,7 @@ def salads(count: int, seed: int) -> list[str]:
     ]
 
 
+@pytest.mark.few(20)
 @pytest.mark.parametrize("text", salads(150, 7))
 def test_word_salad_raises_nothing_but_errors_of_the_family(text: str) -> None:
     with suppress(AvlmapsError):

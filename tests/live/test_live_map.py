@@ -105,6 +105,7 @@ def test_late_frames_are_dropped_and_counted(tmp_path: Path) -> None:
     assert status.fused + status.dropped.get("late", 0) == status.frames_in == 40
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
@@ -193,6 +194,7 @@ def test_a_fault_of_ours_ends_the_waiting_and_is_raised(tmp_path: Path) -> None:
     assert live.map.data.info.counts.frames == 3
 
 
+@pytest.mark.nightly
 def test_maps_that_are_closed_at_any_moment_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(0)
 
@@ -237,6 +239,7 @@ def breaks(*_: object, **__: object) -> Any:
     raise ZeroDivisionError("division by zero")
 
 
+@pytest.mark.few(1)
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.parametrize("lost", [2, 0], ids=["the one that fuses", "the one behind"])
 def test_a_thread_that_breaks_while_closing_is_told_and_its_map_is_written(tmp_path: Path, lost: int) -> None:
@@ -260,6 +263,7 @@ def test_a_thread_that_breaks_while_closing_is_told_and_its_map_is_written(tmp_p
     assert live.close().data.info.counts.frames == 3 == read(tmp_path / "map").info.counts.frames
 
 
+@pytest.mark.nightly
 def test_an_end_that_breaks_is_a_sentence_and_what_was_saved_stays(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

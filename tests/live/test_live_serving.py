@@ -66,7 +66,7 @@ def test_a_drive_that_fails_says_so_and_raises_where_it_is_waited_for(
     live.close()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(sys.platform == "win32", reason="a signal of POSIX ends it")
 def test_the_command_serves_until_it_is_stopped(tmp_path: Path) -> None:
     recorded(tmp_path / "rec", 20)

@@ -25,6 +25,7 @@ def kitchen(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> MapD
     return build_map(walk, path, "seeing", BuildSettings(frames=FrameSettings(per_part=4)), progress=False)
 
 
+@pytest.mark.nightly
 @pytest.mark.shared
 def test_the_kitchen_is_of_a_kitchens_size_and_stands_upright(kitchen: MapData) -> None:
     assert kitchen.info.counts.frames == 10
@@ -34,6 +35,7 @@ def test_the_kitchen_is_of_a_kitchens_size_and_stands_upright(kitchen: MapData) 
     assert kitchen.info.up.known_from == "planes" and kitchen.info.counts.voxels > 5_000
 
 
+@pytest.mark.nightly
 @pytest.mark.shared
 def test_its_voxels_have_colours_and_features_of_unit_length(kitchen: MapData) -> None:
     length = np.linalg.norm(kitchen.voxels.feature.astype(np.float32), axis=1)
@@ -41,6 +43,7 @@ def test_its_voxels_have_colours_and_features_of_unit_length(kitchen: MapData) -
     assert 20 < kitchen.voxels.rgb.mean() < 230
 
 
+@pytest.mark.nightly
 @pytest.mark.shared
 def test_its_keyframes_keep_points_where_their_cameras_looked(kitchen: MapData) -> None:
     keyframes = kitchen.keyframes

@@ -126,7 +126,7 @@ def test_a_map_with_submaps_has_the_voxels_of_one_without(tmp_path: Path) -> Non
     assert len(submaps.stamp_s) == FRAMES
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @given(st.tuples(*[st.integers(-40, 40)] * 3))
 def test_a_shift_by_whole_voxels_moves_voxels(shift: tuple[int, int, int]) -> None:
     walk = Walk()
@@ -166,7 +166,7 @@ def test_up_turns_with_the_poses(tmp_path: Path) -> None:
     np.testing.assert_allclose(after.up_in_world, [0.0, -1.0, 0.0], atol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_second_correction_replaces_the_first(tmp_path: Path) -> None:
     walk, stray = Walk(), strayed(Walk())
     built(tmp_path, walk)
@@ -215,6 +215,7 @@ def one_submap(walk: Walk) -> tuple[VoxelSums, Submaps]:
     return sums, submap_of(sums, walk.stamps_s, walk.world_from_camera, none)
 
 
+@pytest.mark.nightly
 @given(st.tuples(*[st.floats(-180, 180)] * 3), st.tuples(*[st.floats(-3, 3)] * 3), st.integers(0, 1000))
 def test_nothing_is_lost_on_the_way(angles: tuple, shift: tuple, seed: int) -> None:
     walk = Walk(4, seed=seed)
@@ -293,6 +294,7 @@ def test_looks_that_weigh_next_to_nothing_are_not_missed() -> None:
         assert (np.abs(found.feature_sum - one - two).max(axis=1) <= step + 1e-6).all()
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("turn_deg", [0.0, 2.0])
 def test_a_quick_count_finds_the_same_surface(turn_deg: float) -> None:
     walk = Walk(48)
@@ -378,6 +380,7 @@ def test_a_mapper_map_follows_and_goes_on(tmp_path: Path) -> None:
     require_same_voxels(found, again)
 
 
+@pytest.mark.nightly
 def test_a_mapper_map_follows_while_its_first_frames_wait(tmp_path: Path) -> None:
     walk, shift = Walk(8), motion(shift=(0.0, 0.0, 1.0))
     beeps = AudioTrack.open(write_beeps(tmp_path / "beeps.flac")).read().samples

@@ -103,7 +103,7 @@ def test_exchanged_channels_are_a_finding_with_the_order_that_fits(
     assert "positions_m" in found[0].remedy
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_dead_channel_stays_with_the_map_and_the_sound_is_read_for_it_once(
     right: Draft, heard: ChannelSound, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -116,7 +116,7 @@ def test_a_dead_channel_stays_with_the_map_and_the_sound_is_read_for_it_once(
     assert len(read) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("wrong", [{"order": (0, 2, 1, 3)}, {"dead": 1}], ids=["exchanged", "dead"])
 def test_a_live_map_ends_with_the_doubts_about_channels_that_a_build_has(
     right: Draft, heard: ChannelSound, tmp_path: Path, wrong: dict[str, Any]

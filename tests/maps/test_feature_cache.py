@@ -274,6 +274,7 @@ def test_all_that_an_encoder_may_look_at_is_in_the_key_and_nothing_else(tmp_path
         assert encodes(frame), "another precision makes other features"
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("size", [(0, 0), (32, 24)])
 @pytest.mark.parametrize("scored", [False, True])
 @pytest.mark.parametrize("count", [0, 5])
@@ -361,7 +362,7 @@ def test_a_map_is_the_same_with_the_cache_and_without(torch_like: Profile, tmp_p
     assert array_files(tmp_path / "none") == array_files(tmp_path / "filling") == array_files(tmp_path / "filled")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_same_holds_for_small_models_whose_features_are_not_rounded(tmp_path: Path, home: Path) -> None:
     small = counted("counted")
     build_map(Walk(), tmp_path / "none", small, SETTINGS)

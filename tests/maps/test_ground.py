@@ -72,6 +72,7 @@ def _ground_of_half_the_desks() -> FoundGround:
     return find_ground(filmed_desks(3)[::2], UP)
 
 
+@pytest.mark.few(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("height_m", [0.15, 0.3, 0.6, 1.0, 1.35, 1.8])
 def test_the_floor_is_found_and_not_the_table_tops(height_m: float) -> None:
@@ -80,6 +81,7 @@ def test_the_floor_is_found_and_not_the_table_tops(height_m: float) -> None:
     assert found.floors[0].confidence > 0.9
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("on_floor", [6, 3, 1])
 def test_a_walk_that_films_tables_for_nine_tenths_has_its_floor(on_floor: int) -> None:
     frames = filmed_desks(on_floor)
@@ -108,6 +110,7 @@ def test_depth_that_is_not_finite_is_no_surface() -> None:
     assert np.abs(errors_m(spoilt, 1.35)).max() < 0.03
 
 
+@pytest.mark.nightly
 def test_each_camera_stands_over_the_floor_of_its_own_storey() -> None:
     lift = np.eye(4)
     lift[2, 3] = 2.9
@@ -118,6 +121,7 @@ def test_each_camera_stands_over_the_floor_of_its_own_storey() -> None:
     assert [round(floor.height_m, 1) for floor in found.floors] == [0.0, 2.9]
 
 
+@pytest.mark.few(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("height_m", [0.3, 1.35])
 @pytest.mark.parametrize("steps", [3, 14])
@@ -131,6 +135,7 @@ def test_stairs_lift_the_floor_with_the_camera(height_m: float, steps: int) -> N
     assert found.floors[-1].height_m == pytest.approx(0.18 * steps, abs=0.03)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("height_m", [0.3, 1.35])
 @pytest.mark.parametrize("podium_m", [0.2, 0.4, 0.6])
 def test_a_robot_on_a_podium_stands_on_the_podium(podium_m: float, height_m: float) -> None:
@@ -140,6 +145,7 @@ def test_a_robot_on_a_podium_stands_on_the_podium(podium_m: float, height_m: flo
     assert np.abs(errors_m(frames, height_m)).max() < 0.05
 
 
+@pytest.mark.nightly
 def test_a_table_that_cameras_hover_over_is_no_podium() -> None:
     frames = [*walked(1.35), *film(office(), over_the_desks(1.5, 60.0))]
     assert np.abs(errors_m(frames, [frame.world_from_camera[2, 3] for frame in frames])).max() < 0.05
@@ -185,7 +191,7 @@ def test_the_floor_is_the_same_in_every_world(yaw_rad: float, shift_m: tuple[flo
     assert after.floors[0].confidence == pytest.approx(before.floors[0].confidence, abs=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=5)
 @given(st.integers(0, 1000), st.integers(2, 10))
 def test_more_samples_do_not_flip_a_confident_answer(seed: int, few: int) -> None:
@@ -198,6 +204,7 @@ def test_more_samples_do_not_flip_a_confident_answer(seed: int, few: int) -> Non
     assert len(every) == 1 and every[0].confidence > 0.9
 
 
+@pytest.mark.nightly
 @settings(max_examples=6)
 @given(
     st.lists(st.tuples(st.floats(0.8, 5.0), st.floats(1.0, 4.5), st.floats(0.45, 1.05)), min_size=1, max_size=5),
@@ -231,6 +238,7 @@ def kitchen(shared_data: Path) -> tuple[list[Sight], np.ndarray]:
     return [sight_of(recording.frame(index), up) for index in range(0, len(recording), 4)], up
 
 
+@pytest.mark.nightly
 @pytest.mark.shared
 @pytest.mark.parametrize("count", [40, 8])
 def test_every_sample_of_the_red_kitchen_has_its_floor_and_not_its_table(

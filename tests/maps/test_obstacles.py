@@ -58,6 +58,7 @@ PLACES = {
 }
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("floor_m", [0.0, -1.53, 7.0])
 def test_free_occupied_and_unknown_are_kept_apart(place, floor_m):
@@ -178,7 +179,7 @@ def test_where_the_camera_was_carried_is_free_though_the_floor_was_never_seen():
             assert after.state_at(point) == before.state_at(point) != FREE
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_walk_only_ever_makes_unknown_cells_free(seed):
     rng = np.random.default_rng(seed)

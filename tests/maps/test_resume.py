@@ -91,6 +91,7 @@ def begin(path: Path, known: Undisturbed, *, had_old: bool) -> None:
         shutil.copytree(known.old, path)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("had_old", [True, False])
 def test_a_build_killed_at_random_instants_ends_with_the_same_map(
     builder: Builder, undisturbed: Undisturbed, had_old: bool

@@ -203,6 +203,7 @@ def test_a_body_that_never_moves_is_given_up():
     assert len(arrival.actions) < 5_100
 
 
+@pytest.mark.nightly
 @MODES
 def test_in_a_home_it_gets_everywhere_and_touches_nothing(drive):
     scene = open_scene("house:7")

@@ -102,7 +102,7 @@ def test_an_empty_log_changes_nothing_bit_for_bit() -> None:
     assert m.edited.instances(found, "chair") is found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @given(edits=st.lists(st.sampled_from(EVERY), max_size=5))
 def test_the_same_edits_twice_are_as_once(edits: list[Edit]) -> None:
     again = [msgspec.structs.replace(one, id=f"{one.id}-2") for one in edits]  # not even told by their ids
@@ -112,6 +112,7 @@ def test_the_same_edits_twice_are_as_once(edits: list[Edit]) -> None:
         assert once == state([*edits, *again])
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("independent", [(STOOL, BENCH, DOCK), (PAIR, HALVES, LOST), (STOOL, HALVES, DOCK)])
 def test_independent_edits_come_in_any_order(independent: tuple[Edit, ...]) -> None:
     assert all(state(order) == state(independent) for order in permutations(independent))

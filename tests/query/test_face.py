@@ -360,6 +360,7 @@ def test_settings_of_another_kind_are_refused_at_once(begin: Callable, names: tu
     assert not (tmp_path / "map").exists()
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("words", [None, 5, ["chair"], b"chair"])
 def test_what_is_no_phrase_is_refused_in_a_sentence(m: avlmaps.AVLMap, words: object) -> None:
     kind = type(words).__name__
@@ -464,6 +465,7 @@ WRONG_WALKS = {
 }
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("kind", WRONG_WALKS)
 def test_frames_that_contradict_one_another_are_said_with_every_answer(kind: str, tmp_path: Path) -> None:
     truth, (moved, said) = example_truth(frames=14), WRONG_WALKS[kind]
@@ -550,6 +552,7 @@ WORDS = {
 }  # fmt: skip
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
 def test_the_examples_run(
     script: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

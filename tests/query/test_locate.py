@@ -104,6 +104,7 @@ def test_a_camera_of_another_size_than_the_photo_is_a_mistake(stored: LocatableM
         locate(stored, photo, CAMERA.resized(640, 480), rng())
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("factor", [0.9, 1.0, 585 / 525])
 def test_a_focal_length_that_does_not_fit_is_found_out(stored: LocatableMap, photo: np.ndarray, factor: float) -> None:
     found = locate(stored, photo, replace(CAMERA, fx=CAMERA.fx * factor, fy=CAMERA.fy * factor), rng())
@@ -111,6 +112,7 @@ def test_a_focal_length_that_does_not_fit_is_found_out(stored: LocatableMap, pho
     assert found.camera.fx == pytest.approx(CAMERA.fx, rel=0.01)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("zoom", [1.06, 1.13, 1.25])
 @pytest.mark.parametrize("noted_mm", [None, 30.0])
 def test_a_photo_of_a_longer_lens_is_located_with_its_own_focal_length(

@@ -36,12 +36,13 @@ def test_a_product_has_a_panel_for_each_part_and_one_for_all(tmp_path: Path) -> 
     assert cv2.imread(str(three)).shape[1] > 1.5 * cv2.imread(str(one)).shape[1]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_map_is_drawn_with_its_sounds(tmp_path: Path) -> None:
     stored = furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK))
     assert colours_in(plot_map(stored, tmp_path / "map.png")) > 20
 
 
+@pytest.mark.nightly
 def test_an_empty_map_can_be_drawn(tmp_path: Path) -> None:
     stored = fake_map(voxels_of(np.zeros((0, 3)), np.zeros((0, 4))), encoders=furnished_map().encoders)
     assert plot_map(stored, tmp_path / "map.png").is_file()

@@ -5,7 +5,6 @@ import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -53,10 +52,6 @@ def verdict(draft: Draft, folder: Path, given: Corrections | None = None) -> Ver
     return examine_recording(open_recording(path, corrections=given))
 
 
-def nightly_but(every: int, rows: list[Any]) -> list[Any]:
-    return [row if at % every == 0 else pytest.param(*row, marks=pytest.mark.nightly) for at, row in enumerate(rows)]
-
-
 RIGHT = [
     (RoomWalk("people and noise", seed=53, frames=30, people=3, noise=0.0019),),
     (RoomWalk("a moved chair, holes", seed=54, frames=30, moved_chair=True, holes=0.3),),
@@ -65,6 +60,7 @@ RIGHT = [
 ]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("walk", [row[0] for row in RIGHT], ids=lambda walk: walk.name)
 def test_a_right_recording_passes_without_a_word(walk: RoomWalk, tmp_path: Path) -> None:
     found = verdict(walk.draft(CAMERA), tmp_path)
@@ -88,7 +84,8 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize(("name",), nightly_but(3, [(name,) for name in WRONG]))
+@pytest.mark.few(3)
+@pytest.mark.parametrize(("name",), [(name,) for name in WRONG])
 def test_the_remedy_that_the_door_names_puts_the_recording_right(name: str, right: Draft, tmp_path: Path) -> None:
     import tyro
 
@@ -132,7 +129,8 @@ MISTAKES: list[tuple[str, Reason, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("name", "reason", "said"), nightly_but(4, MISTAKES))
+@pytest.mark.few(4)
+@pytest.mark.parametrize(("name", "reason", "said"), MISTAKES)
 def test_a_mistake_is_named(name: str, reason: Reason, said: str, right: Draft, tmp_path: Path) -> None:
     found = verdict(EVERY[name].change(right, right, np.random.default_rng(0)), tmp_path)
     assert reason in {finding.reason for finding in found.findings}
@@ -172,7 +170,8 @@ OTHERS: list[tuple[str, Callable[[Draft], Draft], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("name", "change", "said"), nightly_but(2, OTHERS))
+@pytest.mark.few(3)
+@pytest.mark.parametrize(("name", "change", "said"), OTHERS)
 def test_what_field_recordings_have_is_said(
     name: str, change: Callable[[Draft], Draft], said: str, right: Draft, tmp_path: Path
 ) -> None:
@@ -182,11 +181,11 @@ def test_what_field_recordings_have_is_said(
 
 @pytest.mark.parametrize(
     ("round_rad_s", "times", "farther_m", "said"),
-    nightly_but(2, [
+    [
         (0.5, 1.15, 0.0, "The depth looks 1.15 times too large, or the positions 1.15 times too small"),
         (0.5, 0.87, 0.0, "The depth looks 1.15 times too small, or the positions 1.15 times too large"),
         (0.0, 1.0, 0.3, "The depth looks 0.3 m too large everywhere: write the depth from the camera's centre (-0.3"),
-    ]),
+    ],
 )  # fmt: skip
 def test_depth_that_is_a_little_off_is_named(
     round_rad_s: float, times: float, farther_m: float, said: str, tmp_path: Path
@@ -239,6 +238,7 @@ SPOTS = {
 }  # fmt: skip
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", SPOTS)
 def test_what_would_not_show_is_said(name: str, tmp_path: Path) -> None:
     walk, spots = SPOTS[name]
@@ -310,6 +310,7 @@ def noise(count: int) -> np.ndarray:
     return np.random.default_rng(3).uniform(-0.5, 0.5, count)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("case", SILENCES)
 def test_a_track_that_a_microphone_did_not_record_is_doubted(case: str, tmp_path: Path) -> None:
     make, said = SILENCES[case]
@@ -346,6 +347,7 @@ def behind_a_lens(sample: Sample, k1: float) -> Sample:
     return replace(sample, depth_m=np.stack(bent))
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("k1", "is_lens"), [(-0.3, True), (-0.15, True), (0.0, False), (-0.04, False), (0.3, False)])
 def test_a_wide_lens_is_found_with_its_strength(k1: float, is_lens: bool, wide: Sample) -> None:
     flats = Flats.of(behind_a_lens(wide, k1) if k1 else wide)
@@ -355,6 +357,7 @@ def test_a_wide_lens_is_found_with_its_strength(k1: float, is_lens: bool, wide: 
     assert k1 or (flats.squeeze() is None and flats.lens_would_show and flats.squeeze_would_show)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("fx", "fy", "axes"),
     [(1.0, 0.75, "fy"), (1.0, 1.333, "fy"), (0.75, 1.0, "fx"), (0.7, 0.7, "fx and fy"), (1.0, 0.93, "")],
@@ -366,6 +369,7 @@ def test_the_focal_length_is_named_that_makes_angles_right(fx: float, fy: float,
     assert found is None or found[1] == pytest.approx(1.0 / max(fx, fy, key=lambda by: abs(by - 1.0)), rel=0.08)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("axis", "degrees"), [(0, 6.0), (0, -6.0), (2, 6.0), (2, -6.0), (0, 14.0)])
 def test_floors_show_how_a_camera_sits_in_its_mount(wide: Sample, axis: int, degrees: float) -> None:
     half = np.radians(degrees) / 2.0
@@ -376,6 +380,7 @@ def test_floors_show_how_a_camera_sits_in_its_mount(wide: Sample, axis: int, deg
     assert (found.down_deg, found.right_deg) == pytest.approx(expected, abs=1.5)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("degrees", [0.0, 5.0, 12.0])
 def test_a_slope_is_no_tilt_of_the_camera(wide: Sample, degrees: float) -> None:
     half = np.radians(degrees) / 2.0

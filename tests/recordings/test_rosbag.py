@@ -159,6 +159,7 @@ def test_a_bag_knows_how_far_the_robots_base_lies_below_the_camera(tmp_path: Pat
     assert recording.begins_s == pytest.approx(START_S, abs=1.0)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("kind", ["ros1", "ros2", "mcap"])
 @pytest.mark.parametrize("poses", ["tf", "odometry"])
 def test_a_bag_opens_with_interpolated_poses_of_the_camera(tmp_path: Path, kind: str, poses: str) -> None:

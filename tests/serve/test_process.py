@@ -157,7 +157,7 @@ def test_an_agent_is_served_by_standard_input_and_output(room: Path) -> None:
     assert anyio.run(conversation)["goals"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_client_whose_input_ends_has_its_last_answer_and_may_name_a_photo(room: Path, walk: Path) -> None:
     photo = sorted((walk / "rgb").iterdir())[5]
     asked: list[dict[str, Any]] = [

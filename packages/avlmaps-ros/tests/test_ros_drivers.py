@@ -85,6 +85,7 @@ def test_a_goal_is_reached_and_the_pose_comes_back_as_the_place_that_was_asked_f
         assert len(goals(robot)) == 1
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_goals_and_poses_pass_through_the_frames_and_the_tilted_world(robot, seed):
     rng = np.random.default_rng(seed)

@@ -113,7 +113,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> DemoReport:
         return run_demo(out, seed=0, scene=small_flat(), settings=settings)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_whole_demonstration_runs_on_a_small_flat(small: DemoReport) -> None:
     told = small.to_json()
     assert list(told) == [
@@ -129,6 +129,7 @@ def test_the_whole_demonstration_runs_on_a_small_flat(small: DemoReport) -> None
     assert json.loads(json.dumps(told)) == told
 
 
+@pytest.mark.nightly
 def test_the_report_is_whole_and_loads_nothing_from_the_network(small: DemoReport) -> None:
     text = (small.out / "report.html").read_text(encoding="utf-8")
     page = Page(text)

@@ -230,6 +230,7 @@ def test_a_photo_asks_only_for_what_it_shows():
     assert photo_tasks(evidence, [hidden], np.random.default_rng(0), 5) == []
 
 
+@pytest.mark.nightly
 def test_an_area_asks_for_what_stands_in_rooms_of_two_kinds(kitchen_and_bedroom: _Perfect):
     tasks = area_tasks(kitchen_and_bedroom.evidence, np.random.default_rng(0), 10)
     asked = {(task.category, task.context) for task in tasks}
@@ -238,6 +239,7 @@ def test_an_area_asks_for_what_stands_in_rooms_of_two_kinds(kitchen_and_bedroom:
         assert all((target.low[0] < 5) == (task.context == "kitchen") for target in task.targets)
 
 
+@pytest.mark.nightly
 def test_the_same_seed_makes_the_same_tasks_and_another_draws_others(kitchen_and_bedroom: _Perfect):
     drawn = [area_tasks(kitchen_and_bedroom.evidence, np.random.default_rng(seed), 2) for seed in (0, 0, 1, 2, 3)]
     assert drawn[0] == drawn[1]
@@ -279,6 +281,7 @@ def test_the_mean_of_equal_values_is_certain_and_that_of_others_as_uncertain_as_
 # Truth.
 
 
+@pytest.mark.nightly
 def test_every_voxel_of_a_thing_is_labelled_with_it(kitchen_and_bedroom: _Perfect):
     asked, scene = kitchen_and_bedroom.asked, kitchen_and_bedroom.scene
     centres = asked.space.centres
@@ -298,6 +301,7 @@ def test_a_room_reaches_into_its_walls_by_the_margin_and_no_farther(x: float, y:
         assert bool(near_polygon(area, np.array([[x, y]]), 0.1)[0]) == (away < 0.1)
 
 
+@pytest.mark.nightly
 def test_the_true_region_map_is_one_in_the_rooms_asked_for(kitchen_and_bedroom: _Perfect):
     asked = kitchen_and_bedroom.asked
     factor = true_regions(asked.space, Part(Modality.AREA, "kitchen"), asked.truth.areas)
@@ -319,6 +323,7 @@ def all_tasks(home: _Perfect) -> list[Task]:
     ]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("swap", [False, True])
 def test_true_perception_answers_every_task_within_a_voxel(swap: bool):
     places = (
@@ -335,6 +340,7 @@ def test_true_perception_answers_every_task_within_a_voxel(swap: bool):
         assert task.off_m(position) <= 0.05
 
 
+@pytest.mark.nightly
 def test_without_context_the_larger_or_equal_thing_wins_whatever_was_heard(kitchen_and_bedroom: _Perfect):
     """The object alone cannot tell: over all area tasks it is right for exactly one of the two rooms."""
     tasks = area_tasks(kitchen_and_bedroom.evidence, np.random.default_rng(0), 10)
@@ -366,6 +372,7 @@ def test_the_weak_ear_tells_kinds_apart_that_differ_in_colour():
 RECORDED = Recorded("overlay", 40, 4, 1, "clean", "", 0)
 
 
+@pytest.mark.nightly
 def test_tasks_come_back_from_a_file_as_they_were(kitchen_and_bedroom: _Perfect, tmp_path: Path):
     tasks = TaskSet(RECORDED, ("home",), tuple(all_tasks(kitchen_and_bedroom)))
     save_tasks(tasks, tmp_path / "tasks.json")

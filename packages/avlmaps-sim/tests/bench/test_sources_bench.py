@@ -125,6 +125,7 @@ def test_the_ratio_of_direct_sound_falls_as_the_reverberation_grows() -> None:
     assert np.allclose(np.diff(ratios), -6.02, atol=0.3)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("front_db", [0.0, 5.0])
 def test_ratios_find_the_source_whichever_way_it_faces(front_db: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("avlmaps_sim.bench.sources.measured._WALKS", 25)
@@ -141,6 +142,7 @@ def test_ratios_find_the_source_whichever_way_it_faces(front_db: float, monkeypa
     assert np.median(walks_of_ratios(room, np.random.default_rng(0), 16)) < np.median(errors)
 
 
+@pytest.mark.nightly
 def test_an_array_of_receivers_is_found_though_signs_are_turned() -> None:
     rows, columns = np.divmod(np.arange(25), 5)
     place = np.column_stack([3.68 - 0.5 * columns, 3.0 + 0.5 * rows, np.full(25, 1.2)])
@@ -156,6 +158,7 @@ def test_a_room_that_is_not_there_is_named(tmp_path: Path) -> None:
         table(tmp_path, 0)
 
 
+@pytest.mark.nightly
 def test_a_usual_trial_finds_its_source() -> None:
     errors = [_trial(USUAL, np.random.default_rng([0, number]))[0] for number in (1, 2)]
     assert max(errors) < 1.0

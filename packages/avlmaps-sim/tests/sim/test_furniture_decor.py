@@ -34,6 +34,7 @@ _ALL = [(category, name) for category in _RANGE for name in families(category)]
 _grey = Material()
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("category", _RANGE)
 def test_a_piece_stands_centred_in_plausible_size_and_few_triangles(category: str) -> None:
     least, most, tallest, _ = _RANGE[category]
@@ -55,6 +56,7 @@ def test_what_shines_says_where_within_its_own_box(category: str, name: str) -> 
         assert (place >= piece.mesh.low - 0.06).all() and (place <= piece.mesh.high + 0.06).all()
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("category", _RANGE)
 def test_families_differ_and_some_are_held_out(category: str) -> None:
     names = families(category)

@@ -6,6 +6,7 @@ import pytest
 from avlmaps_sim.synthesis import MAKERS, RATE_HZ, synthesise
 
 
+@pytest.mark.few(12)
 @pytest.mark.parametrize("category", MAKERS)
 def test_each_kind_can_be_heard_and_varies(category: str) -> None:
     one, same, other = (synthesise(category, np.random.default_rng(seed)) for seed in (1, 1, 2))
