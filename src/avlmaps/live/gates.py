@@ -41,7 +41,6 @@ class Gates:
         return moved_m < self._settings.still_m and turned_rad < np.radians(self._settings.still_deg)
 
     def _new_share(self, frame: Frame, mapper: Mapper) -> float:
-        """Return the share of points in voxels that too few frames hit."""
         world = _points(frame, self._farthest_m)
         if not len(world):
             return 0.0
@@ -50,7 +49,6 @@ class Gates:
 
 
 def _points(frame: Frame, farthest_m: float) -> Float[np.ndarray, "n 3"]:
-    """Return where points of a frame are that are spread evenly over its picture, up to a depth; metres, world."""
     camera = frame.rig.depth
     row = ((np.arange(_ROWS) + 0.5) * camera.height / _ROWS).astype(np.int64)
     column = ((np.arange(_COLUMNS) + 0.5) * camera.width / _COLUMNS).astype(np.int64)

@@ -69,7 +69,6 @@ class _Written:
         self._index = 0
 
     def rows(self) -> list[tuple[str, float]]:
-        """Return the names and stamps of the frames that came."""
         try:
             # Before the poses: that of a frame which is listed is there already.
             rows = [(name, float(stamp)) for name, stamp in self._listed.new()]
@@ -87,7 +86,6 @@ class _Written:
         return rows
 
     def frame(self, name: str, stamp_s: float) -> Frame | None:
-        """Read a frame; None, with a sentence, where it cannot be."""
         path, rig = self._path, self._rig
         pose = self._pose_of.pop(stamp_s, None)
         self._index += 1
@@ -109,7 +107,6 @@ class _Lines:
         self._path, self._at, self._head = path, 0, True
 
     def new(self) -> list[list[str]]:
-        """Return the rows since the last call."""
         try:
             with self._path.open("rb") as stream:
                 stream.seek(self._at)

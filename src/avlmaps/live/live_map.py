@@ -265,7 +265,6 @@ class LiveMap:
 
     @contextlib.contextmanager
     def _hearing(self) -> Generator[None]:
-        """Let one thread give sounds, and count what is refused."""
         self._require_open()
         with self._ears:
             try:
@@ -420,7 +419,6 @@ class LiveMap:
     # The caller's thread
 
     def _unsaved_s(self, now_s: float) -> float:
-        """Return how old the oldest thing is that came and is in no save."""
         if self._closed:
             return 0.0
         with self._door:
@@ -435,13 +433,11 @@ class LiveMap:
             raise self._broken
 
     def _raise_fault(self) -> None:
-        """Raise what an encoder failed with since the last time."""
         fault, self._fault = self._fault, None
         if fault is not None:
             raise fault
 
     def _in_thread(self, work: Callable[[], None]) -> None:
-        """Work; what breaks that is raised at every frame to come."""
         try:
             work()
         except BaseException as fault:
@@ -463,7 +459,6 @@ class LiveMap:
                 self._door.notify_all()
 
     def _fuse_next(self) -> bool:
-        """Fuse the next frame, or correct poses; return whether there is more to come."""
         with self._door:
             self._door.wait_for(lambda: self._queue or self._to_correct or self._closing)
             if not (self._queue or self._to_correct):
@@ -534,7 +529,6 @@ class LiveMap:
     # The thread behind
 
     def _publish_all(self) -> None:
-        """Make snapshots and saves until the map is closed."""
         next_s = save_s = 0.0
         while not self._stop_behind.wait(_LISTEN_S):
             begin_s = time.perf_counter()
@@ -553,7 +547,6 @@ class LiveMap:
                 self._doubt(str(fault))
 
     def _publish(self, now_s: float, *, absorb: bool) -> None:
-        """Make a snapshot, and put it in the place of the last one if something came."""
         before = None if self._snapshot is None else self._snapshot[0].data
         if before is None and not absorb:
             return
@@ -587,6 +580,5 @@ class LiveMap:
 
 
 def _warm(made: AVLMap) -> None:
-    """Compute what most questions need, so that the first one does not wait for it: the closest words, the rooms."""
     with contextlib.suppress(AvlmapsError):  # a profile without names, or a map too small for rooms
         made.ask("the chair in the kitchen")

@@ -104,7 +104,6 @@ class PoseCheck:
         )
 
     def _sound_ahead(self, before: tuple[float, float, float] | None, now: tuple[float, float, float]) -> str | None:
-        """Find a gap in the sound's stamps with which it, in step until then, is far ahead of the frames."""
         if before is None or abs(before[1] - before[0]) >= _WITHOUT_SOUND_S:
             return None
         stamp_s, heard_s, skipped_s = *now[:2], now[2] - before[2]
@@ -116,7 +115,6 @@ class PoseCheck:
         )
 
     def _clock_at(self, stamp_s: float, arrived_s: float | None) -> str | None:
-        """Find a frame that is earlier, by its stamp, than any other that came by the clock."""
         if arrived_s is None:
             self._forget_arrivals()
             return None

@@ -137,7 +137,6 @@ def spans_of_frames(plan: BuildPlan, start: Start, spans: Sequence[Span]) -> Gen
 
 
 def _map_frames(plan: BuildPlan, start: Start, workers: Workers | None) -> None:
-    """Map all frames that no stored state covers yet."""
     spans, step = plan.spans(), plan.settings.frames.step
     jobs = {folder: span for folder, span in spans.items() if not is_stored(folder, plan.key)}
     bad = sum(len(bad_frames(folder, plan.key)) for folder in spans if folder not in jobs)
@@ -171,14 +170,12 @@ class _Tolerance:
         self._met = known
 
     def watch(self, frames: Iterable[EncodedFrame]) -> Iterator[EncodedFrame]:
-        """Yield frames, and count those that cannot be read."""
         for frame, features in frames:
             if isinstance(frame, BadFrame):
                 self.meet(frame)
             yield frame, features
 
     def meet(self, bad: BadFrame) -> None:
-        """Take note of one more; raise ``RecordingError`` when there are more than allowed."""
         self._met += 1
         if self._met <= self._allowed:
             return
@@ -249,7 +246,6 @@ def encode_batches(
 def _next_group(
     frames: Iterator[Frame | BadFrame], size: int, counts: Callable[[Frame | BadFrame], bool]
 ) -> list[Frame | BadFrame]:
-    """Take ``size`` frames that count, and the others among them; where none waits, one that does not goes alone."""
     group: list[Frame | BadFrame] = []
     good = 0
     for frame in frames:

@@ -93,7 +93,6 @@ def doubts_of_channels(track: AudioTrack, walk: Trajectory, name: str) -> tuple[
 
 
 def _array_of(recording: Recording) -> AudioTrack | None:
-    """Return the track of several microphones whose places are known, None where there is none."""
     track = recording.audio
     return track if track is not None and track.microphones is not None and len(track.microphones) > 1 else None
 

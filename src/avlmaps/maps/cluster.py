@@ -33,8 +33,6 @@ from avlmaps.perception.models.settings import ModelSettings, model_settings, us
 from avlmaps.perception.profiles import GIVEN
 from avlmaps.recordings.types import Recording
 
-J = TypeVar("J")
-A = TypeVar("A")
 Reopen = Callable[[], Recording]
 """Opens the recording on a machine: ``functools.partial(open_recording, "/shared/REC")``."""
 _COMPUTING = ("numpy", "numba", "onnxruntime", "opencv-python-headless", "scipy", "torch", "transformers")

@@ -109,7 +109,6 @@ def _sources(
     turn: Float[np.ndarray, "3 3"],
     recording: Recording | None,
 ) -> tuple[SourceEvidence | None, dict[str, float]]:
-    """Return the evidence of where sounds came from, and the seconds that took, where the microphones are known."""
     if recording is None:
         return None, {}
     found, elapsed_s = locate_sources(
@@ -133,7 +132,6 @@ def require_submaps(path: Path, data: MapData) -> Submaps:
 
 
 def _moved(data: MapData, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> tuple[MapData, Removed]:
-    """Return the content of a map whose frames have these poses, and what was no surface."""
     total = MovedSubmaps(submaps, now, data.grid)
     sensor = NONE if data.info.sensor is None else data.info.sensor.model
     clear_mm = np.asarray(submaps.clear_mm)
@@ -177,7 +175,6 @@ def _apply(step: Float[np.ndarray, "n 4 4"], points: np.ndarray) -> np.ndarray:
 
 
 def _replaced(sounds: HeardSounds, walk: WalkedTrack) -> HeardSounds:
-    """Return sounds with where the robot was now."""
     if not len(sounds):
         return sounds
     tracks = [

@@ -94,7 +94,6 @@ def estimate_ground(recording: Recording, settings: BuildSettings, up: UpInfo) -
 def _expected(
     recording: Recording, settings: BuildSettings, up: UpInfo
 ) -> tuple[Expected | None, Literal["surfaces", "user", "recording"]]:
-    """Return the user's or the recording's hint about the floor at the start."""
     start_m = float(recording.world_from_camera[0, :3, 3] @ up.vector()) if len(recording) else 0.0
     given_m, base = settings.gravity.camera_height_m, recording.base_height
     if given_m is not None:

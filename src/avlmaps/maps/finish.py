@@ -237,7 +237,6 @@ def feature_doubts(
 
 
 def _are_one(features: Float[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> bool:
-    """Return whether the features of some rows are the same, within rounding; most maps need but few of them."""
     first = np.asarray(features[rows[0]], np.float32)
     some = rows[:: max(1, len(rows) // _SOME)]
     parts = chain([some], (rows[at : at + _AT_ONCE] for at in range(0, len(rows), _AT_ONCE)))

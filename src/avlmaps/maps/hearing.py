@@ -173,7 +173,6 @@ class Hearing:
         return tuple(f"{one} Check the microphone: nothing that sounded then is in the map." for one in silent)
 
     def _placed(self) -> AudioTrack | None:
-        """Return the sound with what shows where it came from; None where nothing does."""
         if self.whole is not None:
             return None if self.whole.microphones is None and self.whole.directions is None else self.whole
         raw = None if self._sounds is None else self._sounds.track
@@ -181,7 +180,6 @@ class Hearing:
 
 
 def _require_clock(came_s: Float[np.ndarray, " n"], at_s: float | None) -> None:
-    """Raise ``AudioError`` where the first piece of sound is of another clock than the frames before it."""
     if at_s is None or not isfinite(at_s):
         return  # None, or refused with what it is
     fault = date_fault(np.array([at_s]), "pieces of sound")

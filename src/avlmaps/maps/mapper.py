@@ -258,13 +258,11 @@ class Mapper:
             self._see(keyframe, late=late)
 
     def _see(self, keyframe: Frame, *, late: bool) -> None:
-        """Let a keyframe be described, and add its features where they were left out before."""
         self._undescribed.append(keyframe)
         if late and Kind.PIXELS in self.encoders and self.start is not None:
             self._sums.add_features(keyframe, self._encoded(keyframe), self.start.sensor.model)
 
     def _keyframes_by(self, frame: Frame) -> Iterator[Frame]:
-        """Yield the frames that are known to be keyframes by this one."""
         if self._chosen is None:
             yield from self._chooser.add(frame, frame.stamp_s, frame.world_from_camera)
         elif frame.index in self._chosen or self._is_due:
@@ -314,13 +312,11 @@ class Mapper:
             self._book.add_whole(submap_of(state.sums, state.stamp_s, state.pose, np.asarray(state.views.clear_mm)))
 
     def _describe(self) -> None:
-        """Look at the keyframes that wait now; one that an encoder fails on is left out."""
         with self.finishing:
             for _ in range(len(self._undescribed)):
                 self._album.add(self._undescribed.pop(0))
 
     def _absorb(self) -> None:
-        """Add up what came since the last time."""
         with self._adding:
             parts = self._sums.take()
         for part in parts:
@@ -458,7 +454,6 @@ class Mapper:
             return self._made(final=True)
 
     def _look_again(self) -> None:
-        """Find up, the floor and what is odd once more, in the frames that are held."""
         assert self.start is not None
         with self._adding:
             held, self._looked_at = self._held.recording(self._up), len(self)
@@ -468,7 +463,6 @@ class Mapper:
         self._check()
 
     def _check(self) -> None:
-        """Find what is odd about the walk, and where the frames that are held contradict one another."""
         with self._adding:
             held, self._checked = self._held.recording(self._up), len(self)
         self._found = doubts_of_walk(self._walked.until_now(), held) if len(held) > 1 else ()
@@ -508,7 +502,6 @@ class Mapper:
         return MapData(info, merged.voxels, keyframes, sounds, state, sources, wait, submaps)
 
     def _walks(self) -> tuple[WalkedTrack, Trajectory]:
-        """Return where the camera was in each frame, and all along."""
         if self._recording is not None:
             return WalkedTrack(self._recording.stamps_s, self._recording.world_from_camera), self._recording.walk
         walked = self._walked.until_now()

@@ -290,7 +290,6 @@ def _strides(
 
 
 def _under(steps: Float[np.ndarray, "m 2"], reach: float, shape: tuple[int, ...]) -> Bool[np.ndarray, "nx ny"]:
-    """Return the cells whose middle is under a walker, to half a cell; all in units of cells."""
     from scipy.ndimage import distance_transform_edt
 
     away = np.ones(shape, np.bool_)
@@ -305,7 +304,6 @@ def _states(
     body: BodyShape,
     ignored: Bool[np.ndarray, " n"],
 ) -> UInt8[np.ndarray, "nx ny"]:
-    """Return the grid's states from the cells and the height over the floor of each voxel."""
     if size.prod() > MOST_CELLS:
         raise MapError(
             f"A grid of {size[0]} x {size[1]} cells is too large; ask for larger cells, or fuse with a smaller depth."

@@ -154,7 +154,6 @@ def require_unchanged(plan: BuildPlan, stamp: str) -> None:
 
 
 def _lacks_submaps_alone(plan: BuildPlan, there: MapInfo) -> bool:
-    """Return whether the finished map is what this build makes, but for submaps."""
     frames = plan.settings.frames
     without = replace(plan.settings, frames=replace(frames, per_submap=0))
     return (
@@ -166,7 +165,6 @@ def _lacks_submaps_alone(plan: BuildPlan, there: MapInfo) -> bool:
 
 
 def _difference(plan: BuildPlan, there: MapInfo) -> str:
-    """Return in words how the finished map's ingredients differ from this build's."""
     if there.recording.fingerprint != plan.recording.fingerprint:
         return "(another recording, or it has changed)"
     if there.profile != plan.encoders.name:

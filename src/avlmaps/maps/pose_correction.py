@@ -103,7 +103,6 @@ def _checked(stamps_s: Any, poses: Any) -> tuple[Float[np.ndarray, " k"], Float[
 
 
 def _require_stamps(stamps: Float[np.ndarray, " k"], known_s: Float[np.ndarray, " f"]) -> None:
-    """Raise ``MapError`` where no frame was taken at about a stamp."""
     after = np.clip(np.searchsorted(known_s, stamps), 1, len(known_s) - 1) if len(known_s) > 1 else np.zeros(1, int)
     away_s = np.abs(stamps - known_s[after])
     if len(known_s) > 1:
@@ -120,7 +119,6 @@ def _require_stamps(stamps: Float[np.ndarray, " k"], known_s: Float[np.ndarray, 
 def _require_walk(
     stamps: Float[np.ndarray, " k"], given: Float[np.ndarray, "k 4 4"], before: Float[np.ndarray, "k 4 4"]
 ) -> None:
-    """Raise ``MapError`` where poses are those of another walk: a correction changes little from one to the next."""
     later = np.searchsorted(stamps, stamps + _APART_S)
     first = np.flatnonzero(later < len(stamps))
     if not len(first):

@@ -170,7 +170,6 @@ class RayPool:
 
 
 def _environment(place: tuple[str, int] | None) -> dict[str, str]:
-    """Return what the environment says to Ray, where it does not say it already."""
     quiet = {"RAY_USAGE_STATS_ENABLED": "0"}
     if place is not None and not is_loopback(place[0]):
         return quiet

@@ -156,7 +156,6 @@ class _Columns:
 
     @classmethod
     def of(cls, level: Float[np.ndarray, "n 3"], voxel_size_m: float) -> "_Columns | None":
-        """Sort points; None where their extent is too large to number its cells."""
         wide = max(_CELL_M, voxel_size_m)
         index = np.floor(level / np.array([wide, wide, voxel_size_m])).astype(np.int64)
         low = index.min(axis=0) - _GAP - 2
@@ -169,7 +168,6 @@ class _Columns:
         return cls(keys, (span[0], span[1], span[2]), low, (wide, voxel_size_m))
 
     def surfaces(self) -> Int[np.ndarray, " m"]:
-        """Return the numbers of the cells with headroom over them."""
         column = self.keys // self.span[2]
         room = max(1, int(_HEADROOM_M / self.cell_m[1]))
         free = np.ones(len(self.keys), bool)
@@ -177,17 +175,14 @@ class _Columns:
         return self.keys[free]
 
     def heights_m(self, keys: Int[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
-        """Return the level z of the middles of cells."""
         return (keys % self.span[2] + self.low[2] + 0.5) * self.cell_m[1]
 
     def middles(self, keys: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 3"]:
-        """Return the middles of cells, level frame."""
         column = keys // self.span[2]
         xy = (np.stack([column // self.span[1], column % self.span[1]], axis=1) + self.low[:2] + 0.5) * self.cell_m[0]
         return np.c_[xy, self.heights_m(keys)]
 
     def under(self, surface: Int[np.ndarray, " m"], cameras: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, " k"]:
-        """Return the height of the surface that each camera was carried over; NaN where none is near."""
         cell = np.floor(cameras / np.array([self.cell_m[0], self.cell_m[0], self.cell_m[1]])) - self.low
         reach = int(np.ceil(_ROUND_M / self.cell_m[0]))
         inside = ((cell[:, :2] >= reach) & (cell[:, :2] < np.array(self.span[:2]) - reach)).all(axis=1)
@@ -207,7 +202,6 @@ class _Columns:
         return under
 
     def clear(self, keys: Int[np.ndarray, " m"]) -> Bool[np.ndarray, " m"]:
-        """Return over which cells a body fits, with nothing beside it higher than its knees."""
         reach = int(np.ceil(_BODY_M / self.cell_m[0]))
         knee, head = (max(1, round(height / self.cell_m[1])) for height in (_KNEE_M, _HEADROOM_M))
         out = np.ones(len(keys), bool)
@@ -273,7 +267,6 @@ def stayed_on_one(cameras_m: Float[np.ndarray, " k"]) -> bool:
 def _floors(
     columns: _Columns, surface: Int[np.ndarray, " m"], cameras: Float[np.ndarray, "k 3"]
 ) -> list[tuple[float, float]]:
-    """Return height and area of the floors, rising: those that most cameras stood over first, the largest first."""
     height_m, cell_m2 = columns.heights_m(surface), columns.cell_m[0] ** 2
     layer = surface % columns.span[2]
     count = np.bincount(layer, minlength=columns.span[2])
@@ -300,7 +293,6 @@ def _floors(
 
 
 def _bears(columns: _Columns, floor: tuple[float, float]) -> bool:
-    """Return whether something stands on a level; a ceiling is level and large as well."""
     all_m = columns.heights_m(columns.keys)
     over = np.count_nonzero((all_m > floor[0] + _KNEE_M) & (all_m < floor[0] + _HEADROOM_M))
     layers = (_HEADROOM_M - _KNEE_M) / columns.cell_m[1]
@@ -330,7 +322,6 @@ def _storeys(
 
 
 def _stairs(columns: _Columns, surface: Int[np.ndarray, " m"], storeys: Sequence[Storey], below: int) -> list[Stairs]:
-    """Return the stairs between a storey and the next: one for each connected slope of steps between their floors."""
     from scipy.sparse import csgraph, csr_array
 
     low_m, high_m = storeys[below].floor_m, storeys[below + 1].floor_m
@@ -358,7 +349,6 @@ def _stairs(columns: _Columns, surface: Int[np.ndarray, " m"], storeys: Sequence
 def _strides(
     columns: _Columns, nodes: Int[np.ndarray, " m"], z_m: Float[np.ndarray, " m"], steps: Int[np.ndarray, " s"]
 ) -> tuple[Int[np.ndarray, " e"], Int[np.ndarray, " e"], Float[np.ndarray, " e"]]:
-    """Return for each step the places that a foot reaches from it: pairs of nodes, and what each costs."""
     rise = int(_RISE_M / columns.cell_m[1] + 1e-6)
     pairs: list[Int[np.ndarray, "2 e"]] = []
     for i, j in product(range(-_GAP, _GAP + 1), repeat=2):
@@ -377,7 +367,6 @@ def _strides(
 def _shortest(
     one: Int[np.ndarray, " e"], other: Int[np.ndarray, " e"], cost: Float[np.ndarray, " e"], kind: Int[np.ndarray, " n"]
 ) -> list[int]:
-    """Return the nodes of the cheapest path over the steps of one slope, from the lower floor to the upper one."""
     from scipy.sparse import csgraph, csr_array
 
     foot, top = (np.flatnonzero(kind[other] == end) for end in (_FOOT, _TOP))

@@ -19,10 +19,10 @@ from avlmaps.maps.audio.settings import SoundChangeSettings
 from avlmaps.perception.protocols import FrameSoundEncoder
 from avlmaps.recordings.audio import AudioTrack
 
-_BLOCK_S = 26.0
+_ENCODED_S = 26.0
 _CONTEXT_S = 2.0  # heard on either side of a block, so that its first and last frames know what is round them
 _AT_ONCE = 256
-_USUAL = SoundChangeSettings()
+_USUAL_CHANGES = SoundChangeSettings()
 
 
 def frames_of_track(track: AudioTrack, encoder: FrameSoundEncoder) -> Float32[np.ndarray, "frames d"]:
@@ -34,7 +34,7 @@ def frames_of_track(track: AudioTrack, encoder: FrameSoundEncoder) -> Float32[np
     """
     hop_s = encoder.hop_s
     count = int(np.ceil(round(track.duration_s / hop_s, 6)))
-    core, context = max(1, round(_BLOCK_S / hop_s)), round(_CONTEXT_S / hop_s)
+    core, context = max(1, round(_ENCODED_S / hop_s)), round(_CONTEXT_S / hop_s)
     features = np.zeros((count, encoder.card.dim), np.float32)
     begins = range(0, count, core)
     for at in progress(begins, "hearing", unit="block") if count else begins:
@@ -57,7 +57,7 @@ def _check(rows: Float32[np.ndarray, "..."], wanted: int, encoder: FrameSoundEnc
 
 
 def split_at_changes(
-    features: Float32[np.ndarray, "frames d"], hop_s: float, settings: SoundChangeSettings = _USUAL
+    features: Float32[np.ndarray, "frames d"], hop_s: float, settings: SoundChangeSettings = _USUAL_CHANGES
 ) -> Int[np.ndarray, " edges"]:
     """Return where a sequence of unit vectors is divided: 0, the first frame of each further stretch, their number.
 

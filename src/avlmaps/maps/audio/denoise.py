@@ -15,7 +15,7 @@ from avlmaps.core.arrays import Complex64, Float32
 from avlmaps.maps.audio.filterbank import band_powers
 from avlmaps.recordings.audio import Sound
 
-_WINDOW_S = 0.032
+_SPECTRUM_S = 0.032
 _OVERLAP = 4
 _SMOOTH_FRAMES, _SMOOTH_BINS = 5, 3
 _STEEPNESS = 1.5  # noise is assumed to be louder than its average by this factor, since single frames exceed it
@@ -52,9 +52,9 @@ def noise_profile(quiet: Iterable[Sound]) -> NoiseProfile | None:
         size, hop = _sizes(sound.rate_hz)
         rate_hz = sound.rate_hz
         if len(sound.samples) >= size:
-            powers.append(np.abs(_spectra(sound.samples, size, hop)) ** 2)
+            powers.append(np.abs(_windowed_spectra(sound.samples, size, hop)) ** 2)
     frames = sum(len(power) for power in powers)
-    if frames * _WINDOW_S / _OVERLAP < 0.2:
+    if frames * _SPECTRUM_S / _OVERLAP < 0.2:
         return None
     return NoiseProfile((np.median(np.concatenate(powers), axis=0) / np.log(2.0)).astype(np.float32), rate_hz)
 
@@ -96,7 +96,7 @@ def denoise_blocks(blocks: Iterable[Sound], profile: NoiseProfile, reduction_db:
         count = (len(waiting) - size) // hop + 1 - 2 * reach
         if count < 1:
             continue
-        spectra = _spectra(waiting[: (count + 2 * reach - 1) * hop + size], size, hop)
+        spectra = _windowed_spectra(waiting[: (count + 2 * reach - 1) * hop + size], size, hop)
         cleaned = spectra[reach : reach + count] * _gains(spectra, profile, reduction_db)
         added = _overlapped(cleaned, size, hop)
         added[: len(tail)] += tail
@@ -111,7 +111,6 @@ def denoise_blocks(blocks: Iterable[Sound], profile: NoiseProfile, reduction_db:
 def _with_end(
     blocks: Iterable[Sound], rate_hz: int, end: Float32[np.ndarray, " n"]
 ) -> Iterator[tuple[Float32[np.ndarray, " _"], bool]]:
-    """Yield the samples in chunks that fit into memory as spectra, and at last what flushes the filter."""
     chunk = round(_CHUNK_S * rate_hz)
     for block in blocks:
         if block.rate_hz != rate_hz:
@@ -122,16 +121,15 @@ def _with_end(
 
 
 def _sizes(rate_hz: int) -> tuple[int, int]:
-    hop = max(1, round(_WINDOW_S * rate_hz / _OVERLAP))
+    hop = max(1, round(_SPECTRUM_S * rate_hz / _OVERLAP))
     return hop * _OVERLAP, hop
 
 
 def _window(size: int) -> Float32[np.ndarray, " size"]:
-    """Return the root of a Hann window, whose squares add up to two at three quarters overlap."""
     return np.sqrt(np.hanning(size + 1)[:-1]).astype(np.float32)
 
 
-def _spectra(samples: Float32[np.ndarray, " n"], size: int, hop: int) -> Complex64[np.ndarray, "frames bins"]:
+def _windowed_spectra(samples: Float32[np.ndarray, " n"], size: int, hop: int) -> Complex64[np.ndarray, "frames bins"]:
     from scipy.fft import rfft
 
     frames = np.lib.stride_tricks.sliding_window_view(samples, size)[::hop]
@@ -152,7 +150,6 @@ def _overlapped(spectra: Complex64[np.ndarray, "frames bins"], size: int, hop: i
 def _gains(
     spectra: Complex64[np.ndarray, "frames bins"], profile: NoiseProfile, reduction_db: float
 ) -> Float32[np.ndarray, "inner bins"]:
-    """Return the filter for every frame that has enough neighbours on both sides."""
     from scipy.ndimage import uniform_filter1d
 
     power = uniform_filter1d(np.abs(spectra) ** 2, _SMOOTH_BINS, axis=1, mode="nearest")

@@ -82,7 +82,6 @@ Piece = tuple[Segment, Sound, Float32[np.ndarray, "windows d"]]
 
 
 def _by_energy(track: AudioTrack, encoder: SoundEncoder, settings: HearingSettings) -> Iterator[Piece]:
-    """Yield each sound that stands out from the background, as recorded, and its features without the background."""
     found = segment(track, settings.segmentation)
     each = range(len(found))
     for i in progress(each, "hearing", unit="sound") if found else each:
@@ -157,7 +156,6 @@ class StoredSound:
 
 
 def _cleaned(sound: Sound, track: AudioTrack, found: Sequence[Segment], index: int, settings: HearingSettings) -> Sound:
-    """Return the sound with less of the background that plays before and after it, unless it is that background."""
     if settings.noise_reduction_db == 0.0 or settings.quiet_s == 0.0:
         return sound
     quiet = list(_quiet_around(track, found, index, settings.quiet_s))

@@ -97,7 +97,6 @@ def _spectra(samples: Float32[np.ndarray, " n"], count: int, rate_hz: int) -> Fl
 
 
 def _lines(rate_hz: int) -> tuple[Int64[np.ndarray, " bands"], int]:
-    """Return the first spectral line of each band, and the line after the last band."""
     hz = np.fft.rfftfreq(_window_samples(rate_hz), 1.0 / rate_hz)
     *starts, end = np.searchsorted(hz, EDGES_HZ[: band_count(rate_hz) + 1]).tolist()
     return np.minimum(np.array(starts, np.int64), max(end - 1, 0)), end
@@ -182,7 +181,6 @@ def find_noise_floor(
 def _quantiles(
     levels: Float32[np.ndarray, "blocks bands"], reach: int
 ) -> tuple[Float32[np.ndarray, "blocks bands"], Float32[np.ndarray, "blocks bands"]]:
-    """Return two low quantiles over ``2 reach + 1`` blocks; at the ends over the nearest blocks of that number."""
     length = min(2 * reach + 1, len(levels))
     found = np.stack(
         [

@@ -108,7 +108,6 @@ class GrowingSounds:
         return collect([*self._old, *pieces], dim)
 
     def _let_go(self, track: RawTrack, pieces: list[StoredSound]) -> list[StoredSound]:
-        """Move sounds that ended before the window out of it, and return those that are still in it."""
         begin_s = track.end_s - _WINDOW_S
         left = [one for one in pieces if one.segment.offset_s >= begin_s]
         self._old += pieces[: len(pieces) - len(left)]
@@ -145,7 +144,6 @@ class GrowingSounds:
     def _feature(
         self, sound: Sound, track: AudioTrack, found: list[Segment], index: int
     ) -> Float32[np.ndarray, "windows d"]:
-        """Return the features of a sound; those of the same samples in the same quiet are known."""
         here = found[index]
         quiet = quiet_bounds(track, found, index, self._settings.quiet_s)
         extent = self._samples(here.onset_s, here.offset_s)
@@ -161,7 +159,6 @@ class GrowingSounds:
         return feature
 
     def _samples(self, *seconds: float) -> _Key:
-        """Return moments as samples of the whole track, whichever part of it they were found in."""
         track = self.track
         assert track is not None
         return tuple(round((at_s - track.start_s) * track.rate_hz) for at_s in seconds)

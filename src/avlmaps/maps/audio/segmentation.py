@@ -86,7 +86,6 @@ def segment_powers(
 def _excess(
     powers: Iterable[Float32[np.ndarray, "frames bands"]], floor: NoiseFloor
 ) -> Iterator[Float32[np.ndarray, " frames"]]:
-    """Yield every frame's mean over the bands of power over background (a ratio; about 1 where nothing sounds)."""
     begin = 0
     for power in powers:
         yield (power / floor.at(begin, len(power))).mean(axis=1)
@@ -96,7 +95,6 @@ def _excess(
 def _runs(
     excess: Iterable[Float32[np.ndarray, " frames"]], settings: SegmentationSettings, step_s: float
 ) -> Iterator[_Run]:
-    """Yield runs of frames above the release level that pass the onset level, each cut to its audible part."""
     onset, release = (10.0 ** (level / 10.0) for level in (settings.onset_db, settings.release_db))
     longest = max(2, int(settings.max_length_s / step_s))
     begin, open_run = 0, np.zeros((0, 2), np.float32)  # columns: the excess, and smoothed
@@ -123,7 +121,6 @@ def _runs(
 def _closed(
     run: Float32[np.ndarray, "frames 2"], begin: int, onset: float, release: float, settings: SegmentationSettings
 ) -> Iterator[_Run]:
-    """Yield the run, if it passes the onset level, without the ends where only the smoothing holds it up."""
     if len(run) and float(run[:, 1].max()) > onset:
         audible = max(release, float(run[:, 0].max()) * 10.0 ** (-settings.tail_db / 10.0))
         loud = np.flatnonzero(run[:, 0] > audible)
@@ -131,7 +128,6 @@ def _closed(
 
 
 def _smoothed(excess: Iterable[Float32[np.ndarray, " frames"]], length: int) -> Iterator[Float32[np.ndarray, "_ 2"]]:
-    """Yield each frame's excess and its mean over ``length`` frames around it, across the blocks' borders."""
     before, after = (length - 1) // 2, length // 2
     waiting = np.ones(before, np.float32)
     kernel = np.full(length, 1.0 / length)
@@ -149,7 +145,6 @@ def _smoothed(excess: Iterable[Float32[np.ndarray, " frames"]], length: int) -> 
 
 
 def _merged(runs: Iterable[_Run], settings: SegmentationSettings, step_s: float) -> Iterator[_Run]:
-    """Join runs that a short pause divides, as long as the whole is not too long."""
     last: _Run | None = None
     for run in runs:
         near = last is not None and (run.begin - last.end) * step_s <= settings.merge_gap_s
@@ -164,7 +159,6 @@ def _merged(runs: Iterable[_Run], settings: SegmentationSettings, step_s: float)
 
 
 def _loud_runs(track: AudioTrack, settings: SegmentationSettings) -> Iterator[_Run]:
-    """The paper's rule: samples beyond a threshold (of either sign, unlike the published code), split at pauses."""
     gap, longest = round(settings.silence_s * track.rate_hz), int(settings.max_length_s * track.rate_hz)
     begin = end = at = 0
     for block in track.blocks(_BLOCK_S):
@@ -186,7 +180,6 @@ def _loud_runs(track: AudioTrack, settings: SegmentationSettings) -> Iterator[_R
 
 
 def _padded(runs: list[_Run], settings: SegmentationSettings, step_s: float, track: AudioTrack) -> list[Segment]:
-    """Widen the runs that are long enough, at most to the middle of the pause between two and to the track's ends."""
     runs = [run for run in runs if (run.end - run.begin) * step_s >= settings.min_length_s]
     segments: list[Segment] = []
     for i, run in enumerate(runs):

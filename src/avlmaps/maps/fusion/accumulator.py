@@ -85,7 +85,6 @@ def look_up(rig: Rig, feature_rows: int, feature_columns: int) -> PixelLookup:
 def _colour_place(
     rig: Rig, depth: Pinhole, rgb: Pinhole, x: Float64[np.ndarray, " wd"], y: Float64[np.ndarray, " hd"]
 ) -> tuple[Float64[np.ndarray, " wd"], Float64[np.ndarray, " hd"]]:
-    """Return the colour picture's coordinates of each depth column and row, for cameras with the same axes."""
     if rig.registered:  # exact, where a division and a multiplication by fx would leave rounding
         columns, rows = np.arange(depth.width) + 0.5, np.arange(depth.height) + 0.5
         return columns * (rgb.width / depth.width), rows * (rgb.height / depth.height)
@@ -93,13 +92,11 @@ def _colour_place(
 
 
 def _cells(place: Float64[np.ndarray, " n"], size: int, cells: int) -> Int32[np.ndarray, " n"]:
-    """Return which of ``cells`` equal parts of [0, size) each place lies in, -1 outside (or for no cells)."""
     inside = (place >= 0.0) & (place < size) & (cells > 0)
     return np.where(inside, np.floor(np.where(inside, place, 0.0) * (cells / size)), -1.0).astype(np.int32)
 
 
 def _starts(row: Int32[np.ndarray, " n"], columns: int) -> Int32[np.ndarray, " n"]:
-    """Return the linear index at which each row begins; -1 stays."""
     return np.where(row >= 0, row * np.int32(columns), -1).astype(np.int32)
 
 
@@ -121,7 +118,6 @@ class _Scratch:
         )  # fmt: skip
 
     def enlarge(self) -> None:
-        """Double the hash table of the frame's voxels."""
         slots = 2 * len(self.voxels[0])
         self.voxels = np.empty(slots, np.int64), np.empty(slots, np.int32), *self.voxels[2:]
 
@@ -236,7 +232,6 @@ class VoxelAccumulator:
         return total
 
     def _commit(self, voxels: int, origin: Int64[np.ndarray, "3"], stamp_s: float) -> Int32[np.ndarray, " voxels"]:
-        """Add colour and hits of a traced frame to the map, and return the map's row of each of its voxels."""
         _, _, voxel_key, voxel_sum = self._scratch.voxels
         key, own, table = voxel_key[:voxels], voxel_sum[:voxels], self._table
         lowest = (1 << kernels.OFFSET_BITS) - 1
@@ -273,14 +268,12 @@ class VoxelAccumulator:
         return self._table.voxels(feature_out, kept)
 
     def _limits(self) -> kernels.Limits:
-        """Return the limits for `kernels.trace`."""
         settings, sensor, half = self.settings, self.sensor, 0.5 * self.grid.voxel_size_m
         farthest = min(settings.max_depth_m, sensor.farthest_m(self.grid.voxel_size_m))
         noise = sensor.noise_m / half, sensor.noise_per_m / half
         return (self.grid.voxel_size_m, settings.min_depth_m, farthest, 0.5 / settings.variance_m2, *noise)
 
     def _depth_of(self, frame: Frame) -> Float32[np.ndarray, "h w"]:
-        """Return the depths of a frame without flying pixels."""
         depth = np.require(frame.depth_m, np.float32, ["C", "W"])
         sensor, camera = self.sensor, frame.rig.depth
         if sensor.edge_sigmas is None:
@@ -292,7 +285,6 @@ class VoxelAccumulator:
         return kept
 
     def _cells(self, features: np.ndarray | None) -> tuple[Float32[np.ndarray, "cells d"], tuple[int, int]]:
-        """Return the features as rows of cells, and how many rows and columns of cells there are."""
         if features is not None and (features.ndim != 3 or features.shape[2] != self.dim or 0 in features.shape[:2]):
             raise ValueError(f"features have shape {features.shape}; this map takes (rows, columns, {self.dim})")
         if features is None or self.dim == 0:
@@ -301,7 +293,6 @@ class VoxelAccumulator:
         return cells, (features.shape[0], features.shape[1])
 
     def _lookup_for(self, rig: Rig, feature_rows: int, feature_columns: int) -> PixelLookup:
-        """Return the lookup of this rig and feature map, reused from the frame before where they are the same."""
         if self._lookup is not None:
             known_rig, known_rows, known_columns, lookup = self._lookup
             if known_rig is rig and (known_rows, known_columns) == (feature_rows, feature_columns):
@@ -318,7 +309,6 @@ class VoxelAccumulator:
         return lookup
 
     def _pose_of(self, frame: Frame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the rotation, the translation and the camera's voxel."""
         pose = np.asarray(frame.world_from_camera, np.float64)
         if not np.isfinite(pose).all():
             raise RecordingError(f"The pose of frame {frame.name} holds NaN or infinity; leave that frame out.")

@@ -111,7 +111,6 @@ class ThroughCounts:
 
 
 def _rows_in(index: Int32[np.ndarray, "n 3"], some: Int32[np.ndarray, "m 3"]) -> Int64[np.ndarray, " m"] | None:
-    """Return where some of the voxels are, both sorted; None where they lie too far apart for a number each."""
     if not len(some):
         return np.zeros(0, np.int64)
     low = index.min(axis=0).astype(np.int64)
@@ -172,7 +171,6 @@ def _visible(
     clear_mm: UInt16[np.ndarray, "k rows columns"],
     pose: Float64[np.ndarray, "k 4 4"],
 ) -> UInt8[np.ndarray, "k c"]:
-    """Return which spheres each view may see through: not behind it, beyond an edge of its picture, or too far."""
     visible = np.empty((len(pose), len(middle_m)), np.uint8)
     for number, (view, clear) in enumerate(zip(pose, clear_mm, strict=True)):
         across, down, ahead = view[:3, :3].T @ (middle_m - view[:3, 3]).T
@@ -264,7 +262,6 @@ def smear_reach(evidence: VoxelViews, sensor: SensorModel) -> Float64[np.ndarray
 
 
 def _smeared(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
-    """Return which voxels have a much better seen one within their reach."""
     smeared = np.zeros(len(evidence), bool)
     if sensor.smear_sigmas == 0.0 or not len(evidence):
         return smeared
@@ -280,7 +277,6 @@ def _smeared(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[n
 
 
 def _specks(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
-    """Return which voxels are in a small group of voxels that touch, at a corner at least, and that few frames hit."""
     if sensor.speck_voxels == 0 or len(evidence) == 0:
         return np.zeros(len(evidence), bool)
     from scipy.sparse import csr_matrix
@@ -302,7 +298,6 @@ def _specks(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np
 def _rows_of(
     index: Int32[np.ndarray, "m 3"], evidence: VoxelViews, table: Int32[np.ndarray, " slots"]
 ) -> Int32[np.ndarray, " m"]:
-    """Return the row of each voxel, -1 where it is not there."""
     found = np.empty(len(index), np.int32)
     find_rows(np.ascontiguousarray(index, np.int32), table, evidence.index, len(evidence), False, found)
     return found

@@ -73,7 +73,6 @@ def in_steps(
 
 
 def _spread_of(sums: VoxelSums) -> Float[np.ndarray, "n 10"]:
-    """Return mean, Cholesky factor of the covariance (lower: xx, yx, yy, zx, zy, zz) and mean number of the frame."""
     mean = np.asarray(sums.spread) / np.maximum(sums.hits, 1)[:, None]
     x, y, z, xx, xy, xz, yy, yz, zz, number = mean.T
     lxx = np.sqrt(np.maximum(xx - x * x, 0.0))
@@ -185,7 +184,6 @@ class MovedSubmaps:
         return to, row.astype(np.int32), share.astype(np.float32)
 
     def _features(self, rows: Int[np.ndarray, " k"]) -> Float32[np.ndarray, "k d"]:
-        """Return the sums of features of some voxels."""
         to, source, share = self._pairs
         place = np.full(self._table.count, -1)
         place[rows] = np.arange(len(rows))
@@ -202,7 +200,6 @@ class MovedSubmaps:
 
 
 def _unique_rows(index: Int[np.ndarray, "n 3"]) -> tuple[Int32[np.ndarray, "m 3"], Int[np.ndarray, " n"]]:
-    """Return the voxels once each, and which of these each one is."""
     low = index.min(axis=0, initial=0)
     span = [int(size) for size in index.max(axis=0, initial=0) - low + 1]
     if span[0] * span[1] * span[2] >= 1 << 62:

@@ -115,7 +115,6 @@ class VoxelTable:
         return found
 
     def _reserve(self, extra: int) -> None:
-        """Make room for this many new voxels."""
         needed = self.count + extra
         if needed > len(self.weight):
             rows = max(needed, len(self.weight) + len(self.weight) // 8, 2 * SMALLEST_ROOM)

@@ -99,7 +99,6 @@ def ground_of_sights(
 
 
 def _bands(cameras_m: Float[np.ndarray, " k"]) -> Iterator[Int[np.ndarray, " m"]]:
-    """Split rising heights of cameras into groups that differ by 0.12 m at most, as few as that allows, evenly."""
     order = np.arange(len(cameras_m))
     for run in np.split(order, np.flatnonzero(np.diff(cameras_m) > _BAND_M) + 1):
         span_m = cameras_m[run[-1]] - cameras_m[run[0]]
@@ -114,7 +113,6 @@ def _view(
     under_m: Float[np.ndarray, " k"],
     band: Int[np.ndarray, " m"],
 ) -> SurfacesAtHeight:
-    """Return the surfaces round a group of cameras."""
     middle_m = float(np.median(cameras_m[band]))
     near = [sight for sight, at_m in zip(sights, cameras_m, strict=True) if abs(at_m - middle_m) < _STOREY_M]
     return SurfacesAtHeight(
@@ -126,7 +124,6 @@ def _view(
 
 
 def _usual_height_m(bands: Sequence[Int[np.ndarray, " m"]], choices: Sequence[Choice]) -> float | None:
-    """Return the median height of the cameras over floors that are in view and certain, None without any."""
     known = [
         (choice.best.camera_height_m, len(band))
         for band, choice in zip(bands, choices, strict=True)
@@ -139,7 +136,6 @@ def _usual_height_m(bands: Sequence[Int[np.ndarray, " m"]], choices: Sequence[Ch
 def _floors(
     cameras_m: Float[np.ndarray, " k"], bands: Sequence[Int[np.ndarray, " m"]], choices: Sequence[Choice]
 ) -> tuple[FoundFloor, ...]:
-    """Join groups that stand over one floor."""
     order = sorted(range(len(bands)), key=lambda index: choices[index].best.height_m)
     joined: list[list[int]] = []
     for index in order:

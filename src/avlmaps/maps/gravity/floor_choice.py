@@ -214,7 +214,6 @@ def prior_nats(height_m: float, camera_m: float, expected: Expected | None = Non
 
 
 def _beneath(view: SurfacesAtHeight, height_m: float) -> tuple[float, Voxelised]:
-    """Return the share of all surface in view that lies below a height, in [0, 1], and that surface."""
     window = view.surface.height_m > view.camera_m - DEEPEST_M
     deep_m = height_m - view.surface.height_m - _BELOW_M - _BELOW_PER_M * view.surface.range_m
     below = float(np.clip(deep_m[window] / _DEEP_M, 0.0, 1.0).mean()) if window.any() else 0.0
@@ -222,7 +221,6 @@ def _beneath(view: SurfacesAtHeight, height_m: float) -> tuple[float, Voxelised]
 
 
 def _undercut(level: Voxelised, beneath: Voxelised) -> float:
-    """Return the share of a level surface's inner columns in which something is seen beneath it, in [0, 1]."""
     column = np.unique(level.columns())
     inner = np.ones(len(column), bool)
     for step in (STEP_X, -STEP_X, STEP_Y, -STEP_Y):
@@ -251,6 +249,5 @@ def stood_over(camera_m: Float[np.ndarray, "k 3"], level: Voxelised) -> Float[np
 
 
 def _commonest(heights: Float[np.ndarray, " n"]) -> float:
-    """Return the height round which most of them lie; the highest of several that are equal."""
     near: Sequence[int] = (np.abs(heights[:, None] - heights[None]) < 0.06).sum(axis=1).tolist()
     return float(max(zip(near, heights.tolist(), strict=True))[1])

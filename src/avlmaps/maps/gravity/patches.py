@@ -135,7 +135,6 @@ def level_axes(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
 
 
 def _blocks(frame: Frame) -> tuple[Pinhole, Float[np.ndarray, "h w"]]:
-    """Return a small camera and the mean inverse depth of its pixels, 1/m; NaN at edges and where there is none."""
     camera = frame.rig.depth
     size = max(1, round(camera.width / COLUMNS))
     h, w = camera.height // size, camera.width // size

@@ -96,7 +96,6 @@ def surface_normals(frame: Frame, rng: np.random.Generator) -> Float[np.ndarray,
 def _most_shared(
     normals: Float[np.ndarray, "n 3"], rotations: Float[np.ndarray, "k 3 3"], rng: np.random.Generator
 ) -> Float[np.ndarray, "3"]:
-    """Return the candidate that most normals share, weighed by how well the cameras agree that it is up."""
     candidates = normals[rng.integers(len(normals), size=CANDIDATES)]
     camera_x, camera_up = rotations[:, :, 0], -rotations[:, :, 1]
     candidates = np.where((candidates @ camera_up.mean(axis=0) < 0.0)[:, None], -candidates, candidates)

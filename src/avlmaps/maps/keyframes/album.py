@@ -90,7 +90,6 @@ class KeyframeAlbum:
         return self._stacked, self._state
 
     def _placed(self, rng: np.random.Generator, final: bool) -> list[Float32[np.ndarray, " d"]]:
-        """Return the descriptor of each keyframe's place; learnt again, all are encoded again."""
         encoder, count = self._encoders.place, len(self._seen)
         with perceiving(f"The place encoder {encoder.card.id}", "the keyframes"):
             few = not self._learnt_from or count >= _GROWN * self._learnt_from
@@ -123,7 +122,6 @@ def learn_from(keyframes: int) -> Int[np.ndarray, " k"]:
 
 
 def _picture(one: DescribedKeyframe) -> UInt8[np.ndarray, "h w 3"]:
-    """Return the stored picture at the size that the keypoints are of."""
     small = cv2.imdecode(np.frombuffer(one.thumbnail, np.uint8), cv2.IMREAD_COLOR_RGB)
     assert small is not None
     return small if one.local.size in ((0, 0), small.shape[1::-1]) else cv2.resize(small, one.local.size)

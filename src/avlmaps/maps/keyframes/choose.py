@@ -99,14 +99,12 @@ class KeyframeChooser(Generic[T]):
             yield self._before.item
 
     def _share(self, seen: "_Seen[Any]", since: "_Seen[Any] | None" = None) -> float:
-        """Return how far a frame is from the last keyframe, or another frame, in parts of the limits."""
         begin = since or self._last
         assert begin is not None
         return max(value / limit for value, limit in zip(_motion(begin, seen), self._limits, strict=True))
 
 
 def _motion(one: _Seen[Any], other: _Seen[Any]) -> tuple[float, float, float]:
-    """Return metres, radians and seconds between two frames."""
     moved_m = float(np.linalg.norm(other.pose[:3, 3] - one.pose[:3, 3]))
     return moved_m, float(rotation_angle_rad(other.pose[None], one.pose[None])[0]), other.stamp_s - one.stamp_s
 

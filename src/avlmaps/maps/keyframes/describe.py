@@ -108,7 +108,6 @@ def unstack_keyframes(stacked: Keyframes, size: tuple[int, int]) -> list[Describ
 
 
 def _scores(local: Sequence[LocalFeatures]) -> Float16[np.ndarray, " m_or_0"]:
-    """Return the scores of all keypoints, none unless every keypoint has one."""
     if any(len(one.score) != len(one.xy) for one in local):
         return np.zeros(0, np.float16)
     return _joined([one.score for one in local], (), np.float16)
@@ -127,7 +126,6 @@ def _no_features() -> LocalFeatures:
 
 
 def _thumbnail(rgb: UInt8[np.ndarray, "h w 3"], width_px: int) -> bytes:
-    """Return a JPEG file at most ``width_px`` wide."""
     import cv2
 
     if rgb.shape[1] > width_px:
@@ -184,7 +182,6 @@ def middle_of_view(frame: Frame, stride_px: int = 8) -> Float32[np.ndarray, "3"]
 
 
 def _patch_depth(xy: Float[np.ndarray, "n 2"], depth_m: Float32[np.ndarray, "h w"]) -> Float[np.ndarray, " n"]:
-    """Return the median depth of the patch around each point, NaN where it cannot be trusted."""
     if not len(xy):
         return np.zeros(0)
     half = PATCH_PX // 2

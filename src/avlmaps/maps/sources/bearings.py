@@ -140,7 +140,6 @@ class Bearings:
 
 
 def _log_density(spread_deg: float, outliers: float) -> Float[np.ndarray, "b o"]:
-    """Return the log-density of a residual (by bin) at each offset (by bin), less that of an outlier."""
     kappa = 1.0 / np.deg2rad(spread_deg) ** 2
     angle = 2.0 * np.pi * np.arange(_BINS) / _BINS
     shape = np.exp(kappa * (np.cos(angle) - 1.0))
@@ -215,7 +214,6 @@ def evidence_of_bearings(
 
 
 def _known_before(known_rad: tuple[float, float] | None) -> Float[np.ndarray, " o"]:
-    """Return the log-prior of each offset: round the one that is known, or, where the device was turned, any."""
     if known_rad is None:
         return np.zeros(_BINS)
     kappa = 1.0 / (known_rad[1] ** 2 + np.deg2rad(_MOUNTED_DEG) ** 2)
@@ -224,7 +222,6 @@ def _known_before(known_rad: tuple[float, float] | None) -> Float[np.ndarray, " 
 
 
 def _bounded(own: Float[np.ndarray, "g o"]) -> Float[np.ndarray, "g o"]:
-    """Return what a sound says of the device where it may be astray: its place among no candidate, moving, of two."""
     share = np.exp(own - own.max())
     return np.log((1.0 - _ASTRAY) * share / share.mean() + _ASTRAY)
 
@@ -241,7 +238,6 @@ def _device(known: Float[np.ndarray, "g o"], sounds: int) -> Device:
 
 
 def _log_sum(value: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " n"]:
-    """Return the logarithm of the sum of exponentials over the first axis."""
     most = value.max(axis=0)
     return most + np.log(np.exp(value - most).sum(axis=0))
 

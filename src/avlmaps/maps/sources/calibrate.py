@@ -160,7 +160,6 @@ def _too_little(frames: int, begin_s: float, end_s: float) -> str:
 
 
 def _frames(track: AudioTrack, array: Microphones, begin_s: float, end_s: float) -> Correlations:
-    """Return the frames with most onset, of every stretch of the time some."""
     longest_m = array.longest_m + _SLACK_M
     pieces: list[Correlations] = []
     count = max(int(np.ceil((end_s - begin_s) / _BLOCK_S)), 1)
@@ -214,19 +213,16 @@ class _Fit:
         return cls(found, array, walk.at(found.at_s) @ array.camera_from_robot, basis)
 
     def signs(self) -> Float[np.ndarray, " m"]:
-        """Return the sign of each channel, as it is found for sources; 1 for all of two channels, or of very many."""
         if not 3 <= len(self.array) <= MOST_MICROPHONES:
             return np.ones(len(self.array))
         found, ears, place = self._grid()
         return signs_of([(found, steer_pairs(found, ears, place))], SourceSettings.of(len(self.array)))
 
     def seek(self) -> Float[np.ndarray, "3"]:
-        """Return the place round the walk that the given array points to, on a coarse grid."""
         found, ears, place = self._grid()
         return place[int(np.argmax(steer(found, ears, place)))]
 
     def _grid(self) -> tuple[Correlations, Float[np.ndarray, "k m 3"], Float[np.ndarray, "c 3"]]:
-        """Return some frames, where the microphones were then, and places round the walk."""
         up = self.world_from_robot[:, :3, 2].mean(axis=0)
         level = from_rotation(rotation_to_level(up / np.linalg.norm(up)))
         ears = self._ears(self.array.position_m)
@@ -239,7 +235,6 @@ class _Fit:
         return self.found.take(some).smoothed(_SMOOTHING), ears[some], place
 
     def solve(self, start: Float[np.ndarray, " n"], hold_heights: bool) -> tuple[Float[np.ndarray, " n"], _Measured]:
-        """Return the unknowns and the delays that they were found by: measured near the prediction, again and again."""
         free = self._free(hold_heights)
         solution = start.copy()
         solution[: len(free)][~free] = 0.0
@@ -252,7 +247,6 @@ class _Fit:
         return solution, measured
 
     def only_source(self, solution: Float[np.ndarray, " n"], measured: _Measured) -> Float[np.ndarray, " n"]:
-        """Return the unknowns with the array as given, and the place of the source that then fits best."""
         return self._with_source(np.concatenate([np.zeros(len(solution) - 3), solution[-3:]]), measured)
 
     def _with_source(self, solution: Float[np.ndarray, " n"], measured: _Measured) -> Float[np.ndarray, " n"]:
@@ -261,7 +255,6 @@ class _Fit:
     def _least_squares(
         self, solution: Float[np.ndarray, " n"], chosen: Bool[np.ndarray, " n"], measured: _Measured
     ) -> Float[np.ndarray, " n"]:
-        """Return the unknowns with those that are chosen fitted; wild delays count little."""
         from scipy.optimize import least_squares
 
         whole = solution.copy()
@@ -277,7 +270,6 @@ class _Fit:
     def covariance(
         self, solution: Float[np.ndarray, " n"], measured: _Measured, hold_heights: bool
     ) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, " m"]]:
-        """Return standard deviations of the places, along each axis, and of the delays."""
         from scipy.optimize import approx_fprime
 
         free = np.flatnonzero(self._free(hold_heights))
@@ -305,25 +297,20 @@ class _Fit:
         return np.sqrt(np.maximum(place, 0.0)), np.sqrt(np.maximum(delay, 0.0)) * 1e-3
 
     def array_of(self, solution: Float[np.ndarray, " n"]) -> Microphones:
-        """Return the array of the unknowns."""
         (place, late_s), given = self._split(solution), self.array.delay_s
         return replace(self.array, position_m=place, delay_s=late_s if given is None else given + late_s)
 
     def moved_m(self, solution: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
-        """Return how far each microphone lies from where it was given."""
         return np.linalg.norm(self._split(solution)[0] - self.array.position_m, axis=1)
 
     @staticmethod
     def source_of(solution: Float[np.ndarray, " n"]) -> Float[np.ndarray, "3"]:
-        """Return the source's place of the unknowns."""
         return solution[-3:]
 
     def residual_s(self, solution: Float[np.ndarray, " n"], measured: _Measured) -> Float[np.ndarray, " k"]:
-        """Return by how much each measured delay is longer than the unknowns say."""
         return (measured.delay_s - self._predicted_s(solution))[measured.used]
 
     def explained(self, measured: _Measured) -> float:
-        """Return the share of the frames and pairs with a clear peak anywhere that have one where it is predicted."""
         clear = self.found.curve.max(axis=2) > _LEAST_PEAK * self.found.weight[:, None]
         return float(measured.used.sum() / max(int((clear | measured.used).sum()), 1))
 
@@ -334,7 +321,6 @@ class _Fit:
         return free
 
     def _split(self, solution: Float[np.ndarray, " n"]) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, " m"]]:
-        """Return places, and delays in seconds (the unknowns have them in milliseconds, of the size of metres)."""
         count = self.basis.shape[1]
         place = self.array.position_m + self.basis @ solution[: 3 * count].reshape(count, 3)
         return place, 1e-3 * self.basis @ solution[3 * count : 4 * count]
@@ -350,7 +336,6 @@ class _Fit:
         return arrival_s[:, one] - arrival_s[:, other]
 
     def _measure(self, solution: Float[np.ndarray, " n"], window_s: float) -> _Measured:
-        """Return the peaks of the correlations near the predicted delays."""
         curve, step_s = self.found.curve, self.found.step_s
         reach = max(int(np.ceil(window_s / step_s)), 2)
         middle = np.rint((self._predicted_s(solution) - self.found.first_s) / step_s).astype(np.int64)
@@ -368,5 +353,4 @@ class _Fit:
 
 
 def _scale(residual: Float[np.ndarray, " k"]) -> float:
-    """Return the spread of residuals of which some are wild."""
     return float(1.4826 * np.median(np.abs(residual))) if len(residual) else np.inf

@@ -77,31 +77,26 @@ _QUARTERS = ((-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5))
 def _column_of(
     xy: Float[np.ndarray, "k 2"], lowest: Float[np.ndarray, " k"], heights_m: tuple[float, ...]
 ) -> Float[np.ndarray, "n 3"]:
-    """Return places at some heights over the lowest surface of each column."""
     return np.concatenate([np.column_stack([xy, lowest + height]) for height in heights_m])
 
 
 def _free(air: Float[np.ndarray, "n 3"], here: Float[np.ndarray, "k 3"], cell_m: float) -> Float[np.ndarray, "m 3"]:
-    """Return the places in whose cell of that size no surface lies."""
     key = _keys(np.floor(np.concatenate([here, air]) / cell_m).astype(np.int64))
     return air[~np.isin(key[len(here) :], key[: len(here)])]
 
 
 def _flattened(surface: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, " c"]:
-    """Return weights by which a column of k cells of surface has the weight √k: walls sound less than their area."""
     column = _keys(np.floor(surface[:, :2] / CELL_M).astype(np.int64))
     _, which, count = np.unique(column, return_inverse=True, return_counts=True)
     return count[which] ** -0.5
 
 
 def _keys(cell: Int[np.ndarray, "n k"]) -> Int[np.ndarray, " n"]:
-    """Return a number for each cell, the same for the same cell, in the order of the cells' rows."""
     low = cell.min(axis=0)
     return np.asarray(np.ravel_multi_index(tuple((cell - low).T), tuple(cell.max(axis=0) - low + 1)))
 
 
 def _means(point: Float[np.ndarray, "n 3"], cell: Int[np.ndarray, "n 3"]) -> Float[np.ndarray, "c 3"]:
-    """Return the mean of the points in each cell."""
     _, which, count = np.unique(_keys(cell), return_inverse=True, return_counts=True)
     return np.stack([np.bincount(which, point[:, axis]) for axis in range(3)], axis=1) / count[:, None]
 

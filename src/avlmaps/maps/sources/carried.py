@@ -79,7 +79,6 @@ def laid(
 def _means(
     values: Float16[np.ndarray, "n own"], row: Int[np.ndarray, "c k"], weight: Float[np.ndarray, "c k"]
 ) -> Float[np.ndarray, "n c"]:
-    """Return the weighted means of some columns."""
     # One sound at a time: an hour's drive has hundreds, each over tens of thousands of candidates.
     means = [(own.astype(np.float64)[row] * weight).sum(axis=1) for own in np.asarray(values)]
     return np.reshape(means, (len(values), len(row)))

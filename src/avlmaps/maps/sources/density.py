@@ -151,7 +151,6 @@ class Density:
 
     @cached_property
     def _away_and_share(self) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-        """How far the cells that hold something are from the position, metres, and what they hold."""
         held = np.flatnonzero(self.share.ravel() > 0.0)
         return np.linalg.norm(self.plan.middle_m(held) - self.position_m, axis=1), self.share.ravel()[held]
 

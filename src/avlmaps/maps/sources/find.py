@@ -142,7 +142,6 @@ def _said(
     candidates: Candidates,
     others: Float[np.ndarray, "s g o"] | None,
 ) -> BearingEvidence:
-    """Return the evidence of a device's directions, with what was found out about the device."""
     said = [Bearings.of(directions, walked, (float(begin_s), float(end_s))) for begin_s, end_s in spans_s]
     expected = [one.expected for one in heard]
     found = evidence_of_bearings(said, walls, candidates, expected, directions.known_rad, others)

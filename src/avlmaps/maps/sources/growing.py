@@ -145,7 +145,6 @@ class GrowingSources:
         return find_sources(track, walk, spans_s, voxel_m, up_in_world)
 
     def _rows(self, spans_s: Spans) -> Int[np.ndarray, " n"]:
-        """Return which known sound each is, -1 where it is none or waits."""
         row = np.full(len(spans_s), -1)
         for number, span in enumerate(spans_s if len(self._spans_s) else ()):
             off_s = np.abs(self._spans_s - span).max(axis=1)
@@ -155,7 +154,6 @@ class GrowingSources:
         return row
 
     def _chosen(self, row: Int[np.ndarray, " n"]) -> SourceEvidence | None:
-        """Return the evidence of sounds by their rows, with zeros where it is -1."""
         evidence = self._evidence
         if evidence is None or not len(row) or np.array_equal(row, np.arange(len(evidence))):
             return evidence if len(row) else None
@@ -173,7 +171,6 @@ class GrowingSources:
         old: Int[np.ndarray, " k"],
         now: Int[np.ndarray, " s"],
     ) -> None:
-        """Store what was found with what was known before."""
         new, before, count = found.evidence, self._evidence, len(spans_s)
         heard, expected = (np.zeros((count, len(new.place)), np.float16) for _ in range(2))
         moving = np.zeros(count, np.uint8)

@@ -12,7 +12,7 @@ from avlmaps.maps.sources.correlation import HOP_S, spectra
 
 _WINDOW_S = 0.3
 _LOUD = 0.9
-_LOW_HZ, _HIGH_HZ = 300.0, 6000.0
+_LEVEL_LOW_HZ, _LEVEL_HIGH_HZ = 300.0, 6000.0
 _ABOVE_NOISE = 4.0
 _NEAREST_M = 0.3
 
@@ -30,7 +30,7 @@ def levels_db(
     """
     spectrum = spectra(samples[None], rate_hz)[0]
     hz = np.linspace(0.0, rate_hz / 2.0, spectrum.shape[1])
-    power = (np.abs(spectrum[:, (hz > _LOW_HZ) & (hz < _HIGH_HZ)]) ** 2).sum(axis=1).astype(np.float64)
+    power = (np.abs(spectrum[:, (hz > _LEVEL_LOW_HZ) & (hz < _LEVEL_HIGH_HZ)]) ** 2).sum(axis=1).astype(np.float64)
     before = max(int(quiet_s / HOP_S) - 1, 0)
     noise = float(np.median(power[:before])) if before else 0.0
     at_s = start_s + (np.arange(len(power)) + 1) * HOP_S

@@ -107,14 +107,12 @@ class Walls:
         return found, rest_m
 
     def _coarse(self) -> Bool[np.ndarray, "mx my"]:
-        """Return where the air is free, in cells of ``_PASS_CELLS`` a side."""
         nx, ny = (side // _PASS_CELLS for side in self.solid.shape)
         cut = self.solid[: nx * _PASS_CELLS, : ny * _PASS_CELLS]
         return np.logical_not(np.asarray(cut.reshape(nx, _PASS_CELLS, ny, _PASS_CELLS).any(axis=(1, 3))))
 
 
 def _graph(number: Int[np.ndarray, "nx ny"], step_m: float) -> Any:
-    """Return the graph of neighbouring free cells."""
     from scipy.sparse import csr_matrix
 
     rows: list[Int[np.ndarray, " k"]] = []

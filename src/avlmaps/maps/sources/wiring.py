@@ -93,7 +93,6 @@ def check_wiring(track: AudioTrack, walk: Trajectory, spans_s: Sequence[tuple[fl
 
 
 def _moved(order: Order) -> int:
-    """Return how many channels are another microphone's."""
     return sum(channel != microphone for channel, microphone in enumerate(order))
 
 
@@ -102,7 +101,6 @@ def _mean(fits: Float[np.ndarray, " s"]) -> float:
 
 
 def _is_better(one: Float[np.ndarray, " s"], other: Float[np.ndarray, " s"], tried: int = 24) -> bool:
-    """Return whether a fit is better than another, over all sounds and clearly."""
     from scipy.special import stdtrit
 
     more = np.log(np.maximum(one, _LEAST)) - np.log(np.maximum(other, _LEAST))
@@ -114,13 +112,11 @@ def _is_better(one: Float[np.ndarray, " s"], other: Float[np.ndarray, " s"], tri
 
 
 def _spread(spans_s: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return at most as many sounds as are looked at, evenly spread."""
     at = np.unique(np.linspace(0, len(spans_s) - 1, min(len(spans_s), _MOST_SOUNDS)).round().astype(int))
     return [spans_s[number] for number in at.tolist()] if len(spans_s) else []
 
 
 def _orders_of(count: int, heard: Sequence["_Heard"]) -> list[Order]:
-    """Return the orders to compare: all of a few microphones, of more what exchanges lead to from the best turns."""
     own = tuple(range(count))
     if count <= _MOST_ORDERED:
         return list(itertools.permutations(own))
@@ -164,7 +160,6 @@ class _Heard:
     def of(
         cls, track: AudioTrack, array: Microphones, walk: Trajectory, span_s: tuple[float, float]
     ) -> "_Heard | None":
-        """Return what was heard of a sound; None where hardly a frame stands out."""
         found = loudest_of_sound(
             track, array, walk, span_s, longest_s=_LONGEST_S, most=_MOST_FRAMES, smoothing=_SMOOTHING
         )
@@ -177,12 +172,10 @@ class _Heard:
 
     @property
     def steered(self) -> tuple[Correlations, Float[np.ndarray, "p c"]]:
-        """The correlations, and the sum of each pair at each place, as ``signs_of`` takes them."""
         one, other = self.found.pair.T
         return self.found, self.fits[np.arange(len(one)), one, other] * _greatest(self.found)
 
     def fit(self, order: Order, signs: Float[np.ndarray, " m"] | None = None) -> float:
-        """Return how well the best place fits where the channels are those of microphones in an order."""
         pair = self.found.pair
         one, other = np.array(order)[pair].T
         chosen = self.fits[np.arange(len(pair)), one, other]
@@ -192,12 +185,10 @@ class _Heard:
 
 
 def _greatest(found: Correlations) -> float:
-    """Return the greatest possible sum over the frames and pairs."""
     return max(float(found.weight.sum()) * len(found.pair), 1e-9)
 
 
 def _places(ear: Float[np.ndarray, "f m 3"], world_from_robot: Float[np.ndarray, "f 4 4"]) -> Float[np.ndarray, "c 3"]:
-    """Return places all round the middle of the drive, near and far."""
     up = world_from_robot[:, :3, 2].mean(axis=0)
     azimuth = 2.0 * np.pi * np.arange(_AZIMUTHS) / _AZIMUTHS
     flat = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)

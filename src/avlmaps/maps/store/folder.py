@@ -173,7 +173,6 @@ def add_findings(path: Path, findings: Mapping[str, np.ndarray]) -> None:
 
 
 def _commit(path: Path, info: MapInfo, files: dict[str, FileInfo]) -> MapInfo:
-    """Make a folder the map of these files, in one step, and remove those of the map before."""
     size = sum(file.bytes for file in files.values())
     info = msgspec.structs.replace(info, schema_version=SCHEMA_VERSION, files=files, bytes=size)
     write_bytes_atomically(path / MANIFEST, msgspec.json.format(msgspec.json.encode(info), indent=2) + b"\n")
@@ -334,7 +333,6 @@ def _named(arrays: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarra
 
 
 def _sections(data: MapData) -> dict[str, dict[str, np.ndarray]]:
-    """Return the arrays of each file."""
     voxels, keyframes, sounds = fields_of(data.voxels), fields_of(data.keyframes), fields_of(data.sounds)
     voxels |= {} if data.submaps is None else fields_of(data.submaps, _SUBMAPS)
     voxels |= {} if data.life is None else {_LIFE + name: array for name, array in life_arrays(data.life).items()}
@@ -349,7 +347,6 @@ def _free_name(section: str, taken: Container[str]) -> str:
 
 
 def _listed(path: Path) -> frozenset[str]:
-    """Return the files of the map that a folder holds, which must stay until another takes its place."""
     try:
         info = read_info(path)
     except MapError:

@@ -137,7 +137,6 @@ def read_life(arrays: Mapping[str, np.ndarray], where: str, visits: int | None =
 
 
 def _faults(stays: tuple[Stay, ...], visits: int | None) -> Iterator[str]:
-    """Return how stays contradict themselves, each other or the visits of their map."""
     for number, stay in enumerate(stays):
         if not 0.0 <= stay.confidence <= 1.0:
             yield f"stay {number} ({stay.name}) has a confidence of {stay.confidence:g}; it lies in [0, 1]"

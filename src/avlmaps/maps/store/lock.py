@@ -34,7 +34,6 @@ else:
 
 
 def _grab_patiently(descriptor: int, patience_s: float) -> None:
-    """Try a few times: `is_locked` of another process holds the lock for an instant."""
     for _ in range(round(patience_s / 0.02)):
         try:
             return _grab(descriptor)

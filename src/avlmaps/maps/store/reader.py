@@ -101,7 +101,6 @@ def describe(path: Path, data: MapData) -> dict[str, Any]:
 
 
 def _describe_ground(ground: GroundInfo) -> dict[str, Any]:
-    """Return the floor that most cameras stood over, and all of them."""
     main = ground.main()
     return {
         "camera_height_m": main.best.camera_height_m,

@@ -12,7 +12,7 @@ from avlmaps.maps.store.tables import RESTORE, FileInfo
 
 _MOST_BYTES = 1 << 42
 _SMALL_BYTES = 1 << 20
-_CLIP = "sounds/clips/"
+_OLD_CLIP = "sounds/clips/"
 # What a file was called in ``map.json``, and the section and prefix that its array has now.
 _PLACES = {
     "keyframes/state/": ("keyframes", "state."),
@@ -59,7 +59,7 @@ def read_schema1(path: Path, content: bytes) -> tuple[dict[str, tuple[Path, dict
     tables = {section: (path / section, dict[str, np.ndarray]()) for section in ("voxels", "keyframes", "sounds")}
     clips: list[Path] = []
     for name, file in sorted(listed.files.items()):
-        if name.startswith(_CLIP):
+        if name.startswith(_OLD_CLIP):
             clips.append(path / file.path)
             continue
         folder = next(folder for folder in _PLACES if name.startswith(folder))

@@ -169,7 +169,6 @@ def as_kind(kind: type[T], arrays: Mapping[str, np.ndarray], where: Path, prefix
 
 
 def _fits(axes: list[str], shape: tuple[int, ...], sizes: dict[str, int]) -> bool:
-    """Return whether each axis has the size that its letter or number stands for; ``k1`` is one more than ``k``."""
     for axis, size in zip(axes, shape, strict=True):
         if axis.endswith("_or_0"):
             if size and size != sizes.setdefault(axis.removesuffix("_or_0"), size):
