@@ -16,7 +16,7 @@ import cv2  # noqa: E402
 import numpy as np  # noqa: E402
 
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
-from avlmaps.maps.keyframes.describe import DescribedKeyframe, stack_keyframes  # noqa: E402
+from avlmaps.maps.keyframes.album import DescribedKeyframe, stack_keyframes  # noqa: E402
 from avlmaps.perception.embedded.keypoints import RATIO, match_mutual  # noqa: E402
 from avlmaps.perception.encoders import Encoders  # noqa: E402
 from avlmaps.perception.pose import estimate_pose  # noqa: E402

@@ -8,10 +8,9 @@ import pytest
 
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.bearings import Bearings, Device, evidence_of_bearings, expected_alone
-from avlmaps.maps.sources.candidates import Candidates, candidates_of
+from avlmaps.maps.sources.candidates import Candidates, Walls, candidates_of
+from avlmaps.maps.sources.correlation import SourceSettings
 from avlmaps.maps.sources.find import find_sources
-from avlmaps.maps.sources.settings import SourceSettings
-from avlmaps.maps.sources.walls import Walls
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.directions import DirectionTrack
 from helpers.heard_in_the_open import curved_drive

@@ -7,7 +7,7 @@ from audio_fakes import RATE_HZ, quiet, tone
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.maps.audio.denoise import NoiseProfile, denoise, denoise_blocks, is_swell, noise_profile
+from avlmaps.maps.audio.background import NoiseProfile, denoise, denoise_blocks, is_swell, noise_profile
 from avlmaps.recordings.audio import Sound
 from avlmaps_sim.mixing.background import background
 from avlmaps_sim.mixing.clips import amplify, audible_part, find_clips, loudness_db

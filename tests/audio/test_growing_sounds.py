@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError
 from avlmaps.maps.audio import growing as growing_module
-from avlmaps.maps.audio.events import detect_events
-from avlmaps.maps.audio.filterbank import PowerStream, band_powers
-from avlmaps.maps.audio.growing import ENDED_S, GrowingSounds
+from avlmaps.maps.audio.background import PowerStream, band_powers
+from avlmaps.maps.audio.events import ENDED_S, GrowingSounds, detect_events
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.types import HeardSounds

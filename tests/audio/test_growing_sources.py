@@ -9,8 +9,7 @@ from test_bearings import PLACES, SPANS, UP, said, surface
 
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.bearings import Device
-from avlmaps.maps.sources.find import find_sources
-from avlmaps.maps.sources.growing import GrowingSources
+from avlmaps.maps.sources.find import GrowingSources, find_sources
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import ChannelSound, with_microphones, write_channels
@@ -93,7 +92,7 @@ def test_the_offset_of_an_earlier_drive_counts_as_in_a_build(directions: Directi
 def test_what_waits_is_located_the_newest_first_and_again_after_a_correction(
     directions: DirectionTrack, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("avlmaps.maps.sources.growing._RECENT", 0)
+    monkeypatch.setattr("avlmaps.maps.sources.find._RECENT", 0)
     growing = GrowingSources(2)
     found: SourceEvidence | None = None
     growing.add_directions(directions)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError
-from avlmaps.maps.audio.filterbank import band_powers
+from avlmaps.maps.audio.background import band_powers
 from avlmaps.maps.audio.segmentation import Segment, segment
 from avlmaps.maps.audio.settings import SegmentationSettings
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError, BackendError
-from avlmaps.maps.audio.change_points import frames_of_track, split_at_changes
+from avlmaps.maps.audio.segmentation import frames_of_track, split_at_changes
 from avlmaps.maps.audio.settings import HearingSettings, SoundChangeSettings
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.perception.protocols import FrameSoundEncoder, ModelCard

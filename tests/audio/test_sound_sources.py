@@ -5,14 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.maps.sources.candidates import CELL_M, candidates_of
-from avlmaps.maps.sources.carried import carry_evidence
-from avlmaps.maps.sources.correlation import SPEED_M_S, correlate
+from avlmaps.maps.sources.candidates import CELL_M, Walls, candidates_of
+from avlmaps.maps.sources.correlation import SPEED_M_S, SourceSettings, correlate, levels_db, steer, unknown_offset
 from avlmaps.maps.sources.density import CandidateGrid, Density, Spread, log_same_place
-from avlmaps.maps.sources.level import levels_db, unknown_offset
-from avlmaps.maps.sources.settings import SourceSettings
-from avlmaps.maps.sources.steered import steer
-from avlmaps.maps.sources.walls import Walls
+from avlmaps.maps.sources.find import carry_evidence
 from avlmaps.maps.types import SourceEvidence
 
 RATE_HZ = 16_000

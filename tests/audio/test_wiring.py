@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.polarity import signs_along
-from avlmaps.maps.sources.settings import SourceSettings
+from avlmaps.maps.sources.correlation import SourceSettings, signs_along
 from avlmaps.maps.sources.wiring import Wiring, check_wiring
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import ChannelSound, channel_faults, with_microphones, write_channels

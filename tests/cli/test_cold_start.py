@@ -20,7 +20,7 @@ HEAVY = {
     "importlib.resources", "starlette", "uvicorn", "torch", "rosbags", "cv2",
     "avlmaps.cli.build", "avlmaps.cli.go", "avlmaps.cli.serve", "avlmaps.cli.shell", "avlmaps.cli.view",
     "avlmaps.days", "avlmaps.live", "avlmaps.navigate", "avlmaps.serve", "avlmaps.view",
-    "avlmaps.maps.audio.events", "avlmaps.maps.audio.filterbank", "avlmaps.maps.build",
+    "avlmaps.maps.audio.events", "avlmaps.maps.audio.background", "avlmaps.maps.build",
     "avlmaps.maps.fusion.accumulator", "avlmaps.maps.gravity",
 }  # fmt: skip
 ASK = """

@@ -25,7 +25,7 @@ from avlmaps.live.status import Tally
 from avlmaps.maps.build import build_map
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.settings import BuildSettings, FrameSettings, GravitySettings
-from avlmaps.maps.sources.growing import GrowingSources
+from avlmaps.maps.sources.find import GrowingSources
 from avlmaps.maps.store.folder import read
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.types import SourceEvidence

@@ -9,9 +9,14 @@ from hypothesis import strategies as st
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import apply, from_quaternion, inverse, rotation_angle_rad
 from avlmaps.core.registry import Backend, Kind, register
-from avlmaps.maps.keyframes.album import perceive_keyframes
+from avlmaps.maps.keyframes.album import (
+    describe_keyframe,
+    lift_keypoints,
+    middle_of_view,
+    perceive_keyframes,
+    stack_keyframes,
+)
 from avlmaps.maps.keyframes.choose import KeyframeSettings, keyframes_by_motion, select_keyframes
-from avlmaps.maps.keyframes.describe import describe_keyframe, lift_keypoints, middle_of_view, stack_keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.images import depth_in_colour

@@ -13,8 +13,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import linked_folder, write_bytes_atomically
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store.folder import read
-from avlmaps.maps.store.lock import lock_folder
-from avlmaps.maps.store.tables import write_arrays
+from avlmaps.maps.store.tables import lock_folder, write_arrays
 
 PROFILE = register_fakes()
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="links need a privilege there")

@@ -20,8 +20,7 @@ from build_fakes import SETTINGS, content_of, open_walk, register_fakes, write_b
 from avlmaps.core.errors import AvlmapsError, BackendError, MapError
 from avlmaps.days.together import build_together
 from avlmaps.maps.build import build_map
-from avlmaps.maps.cluster import ClusterWorkers
-from avlmaps.maps.ray_pool import RayPool
+from avlmaps.maps.cluster import ClusterWorkers, RayPool
 from avlmaps.perception.encoders import encoders_of
 
 PROFILE = register_fakes()
@@ -172,7 +171,7 @@ def _imports_nothing(_: int) -> None:
 CONNECT = (
     "import sys\n"
     "from avlmaps.core.errors import AvlmapsError\n"
-    "from avlmaps.maps.ray_pool import RayPool\n"
+    "from avlmaps.maps.cluster import RayPool\n"
     "try:\n"
     "    with RayPool(sys.argv[1], wait_s=2.0): print('connected')\n"
     "except AvlmapsError as fault: print(fault)\n"

@@ -26,9 +26,8 @@ from avlmaps.maps.store import folder, tables
 from avlmaps.maps.store.checkpoints import load_checkpoint, save_checkpoint
 from avlmaps.maps.store.edits import read_edits
 from avlmaps.maps.store.folder import damaged_files, has_unfinished_build, read, write
-from avlmaps.maps.store.lock import EDITING, LOCK, is_locked, lock_folder
 from avlmaps.maps.store.reader import encoders_of_map, require_model
-from avlmaps.maps.store.tables import read_arrays, write_arrays
+from avlmaps.maps.store.tables import EDITING, LOCK, is_locked, lock_folder, read_arrays, write_arrays
 from avlmaps.maps.types import Keyframes, Voxels
 
 PROFILE = register_fakes()

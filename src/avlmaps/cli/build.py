@@ -18,7 +18,7 @@ from avlmaps.core.progress import say
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Sequence
 
-    from avlmaps.maps.ray_pool import RayPool
+    from avlmaps.maps.cluster import RayPool
     from avlmaps.perception.encoders import Encoders
     from avlmaps.recordings.types import Recording
 
@@ -237,7 +237,7 @@ def _openings(verb: "Build") -> "list[Callable[[], Recording]]":
     openings: list[Callable[[], Recording]] = [partial(open_one, group) for group in groups]
     if verb.same_device is None:
         return openings
-    from avlmaps.maps.located import open_with_device
+    from avlmaps.maps.hearing import open_with_device
 
     return [partial(open_with_device, one, verb.same_device.absolute()) for one in openings]
 
@@ -250,7 +250,7 @@ def _pool(verb: "Build") -> "Generator[RayPool | None]":
         return
     if len(verb.ray) > 1:
         raise UsageError(f"--ray takes one address and got {' '.join(verb.ray)}; give recordings before it.")
-    from avlmaps.maps.ray_pool import RayPool
+    from avlmaps.maps.cluster import RayPool
 
     with RayPool(*verb.ray) as pool:
         say(f"note: the cluster has {pool.cores} cores (machines: {pool.machines}).")

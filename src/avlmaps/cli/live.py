@@ -162,7 +162,7 @@ def _recording(verb: Live) -> _Source:
     """Return what plays a recording."""
     from avlmaps.live.growing_folder import is_being_written
     from avlmaps.live.replay import follow, replay
-    from avlmaps.maps.located import take_device
+    from avlmaps.maps.hearing import take_device
     from avlmaps.recordings.layout import UNFINISHED, decode_description
     from avlmaps.recordings.open import open_recording
 

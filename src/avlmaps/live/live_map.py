@@ -27,13 +27,13 @@ from avlmaps.live.pose_check import PoseCheck
 from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import LiveStatus, Tally, memory_mb
 from avlmaps.maps.build import require_place
+from avlmaps.maps.hearing import device_of
 from avlmaps.maps.keyframes.choose import KeyframeSettings
-from avlmaps.maps.located import device_of
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.folder import read, write
-from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.store.tables import lock_folder
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap

@@ -18,16 +18,16 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
 from avlmaps.maps.check import doubts_of
 from avlmaps.maps.estimate import Start
+from avlmaps.maps.frame_sums import bad_frames, is_stored, load_state, save_state
 from avlmaps.maps.gravity.floor import GroundedRecording
-from avlmaps.maps.map_state import bad_frames, is_stored, load_state, save_state
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.perceived import encode_pixels
 from avlmaps.maps.plan import BuildPlan, Span, claim, make_plan, require_unchanged, strip_folder
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.folder import MANIFEST, is_map_or_free, read, write
-from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.store.tables import lock_folder
 from avlmaps.perception.cache.cached_encoders import cache_note, with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.encoders import Encoders, encoders_of

@@ -22,12 +22,12 @@ from avlmaps.maps.finish import carving_doubts
 from avlmaps.maps.fusion.free_space import FreeViews, clean, count_where_it_matters
 from avlmaps.maps.fusion.sensor import NONE
 from avlmaps.maps.fusion.submaps import MovedSubmaps
-from avlmaps.maps.located import locate_sources
+from avlmaps.maps.hearing import locate_sources
 from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.store.folder import read, write
-from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import MapBounds, Removed, Timings, UpInfo
 from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.store.tables import lock_folder
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps
 from avlmaps.recordings.types import Recording
 

@@ -10,8 +10,7 @@ import numpy as np
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.wording import option
 from avlmaps.maps.fusion.sensor import FRAMES, MODELS, SensorModel, measure_noise, nearest_model
-from avlmaps.maps.gravity.floor import FoundFloor, find_ground
-from avlmaps.maps.gravity.floor_choice import Expected, FloorEvidence
+from avlmaps.maps.gravity.floor import Expected, FloorEvidence, FoundFloor, find_ground
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, SensorInfo, UpInfo
 from avlmaps.recordings.types import Frame, Ground, Recording

@@ -1,20 +1,206 @@
-"""Frames of a map that were added up since its last snapshot."""
+"""What some frames brought to a map: their sums, where they saw freely, their submap; and that in a folder."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from threading import Lock
 
+import msgspec
 import numpy as np
 
-from avlmaps.core.arrays import Int32
+from avlmaps.core.arrays import Float, Float64, Int32, UInt16
+from avlmaps.core.columns import concat
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind
+from avlmaps.maps.audio.events import WalkedTrack
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.free_space import FreeViewCollector
+from avlmaps.maps.fusion.free_space import FreeViewCollector, FreeViews
 from avlmaps.maps.fusion.sensor import SensorModel
-from avlmaps.maps.fusion.voxel_sums import features_alone
+from avlmaps.maps.fusion.submaps import submap_of
+from avlmaps.maps.fusion.voxel_sums import VoxelSums, features_alone
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.pose_correction import PoseCorrection, moved_frame
 from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.store.checkpoints import find_checkpoint, load_checkpoint, save_checkpoint
+from avlmaps.maps.store.manifest import BadFrame
+from avlmaps.maps.types import Keyframes, Submaps
 from avlmaps.perception.encoders import Encoders
-from avlmaps.recordings.types import Frame
+from avlmaps.recordings.memory import MemoryRecording
+from avlmaps.recordings.types import Frame, Recording
+
+
+@dataclass(frozen=True, slots=True)
+class MapState:
+    """What some frames brought. Those of other frames of the same recording, made with the same ``Start``, add up.
+
+    Attributes:
+        sums: of voxels.
+        views: where the frames saw freely.
+        keyframes: those among the frames, without learnt places.
+        stamp_s: of each frame.
+        pose: of each.
+        bad: frames that were left out.
+    """
+
+    sums: VoxelSums
+    views: FreeViews
+    keyframes: Keyframes
+    stamp_s: Float64[np.ndarray, " f"]
+    pose: Float64[np.ndarray, "f 4 4"]
+    bad: tuple[BadFrame, ...]
+
+
+class _Facts(msgspec.Struct):
+    bad: tuple[BadFrame, ...]
+
+
+_KINDS = {"sums": VoxelSums, "views": FreeViews, "keyframes": Keyframes}
+
+
+def save_state(folder: Path, key: str, state: MapState) -> None:
+    """Store a state; a kill at any instant leaves all of it or none. ``key`` is the hash of all it depends on."""
+    arrays = {"stamp_s": state.stamp_s, "pose": state.pose}
+    for name, kind in _KINDS.items():
+        arrays |= {f"{name}_{one.name}": getattr(getattr(state, name), one.name) for one in fields(kind)}
+    save_checkpoint(folder, key, _Facts(state.bad), arrays)
+
+
+def load_state(folder: Path, key: str) -> MapState:
+    """Read a state; its large arrays stay on the disk until they are used.
+
+    Raises:
+        MapError: there is none, or it is damaged or of another key.
+    """
+    found = load_checkpoint(folder, _Facts, key)
+
+    def part(name: str) -> dict[str, np.ndarray]:
+        return {one.name: found.arrays[f"{name}_{one.name}"] for one in fields(_KINDS[name])}
+
+    return MapState(
+        VoxelSums(**part("sums")), FreeViews(**part("views")), Keyframes(**part("keyframes")),
+        found.arrays["stamp_s"], found.arrays["pose"], found.facts.bad,
+    )  # fmt: skip
+
+
+def is_stored(folder: Path, key: str) -> bool:
+    """Return whether there is a state of this key; what is left of a broken one is removed."""
+    return find_checkpoint(folder, _Facts, key) is not None
+
+
+def bad_frames(folder: Path, key: str) -> tuple[BadFrame, ...]:
+    """Return the frames that a stored state leaves out."""
+    return load_checkpoint(folder, _Facts, key).facts.bad
+
+
+class Walked:
+    """Stamps and poses that become more, from several threads."""
+
+    def __init__(self) -> None:
+        self._stamps_s, self._poses, self._count = np.zeros(64), np.zeros((64, 4, 4)), 0
+        self._lock = Lock()
+
+    def append(self, stamp_s: float, pose: Float[np.ndarray, "4 4"]) -> None:
+        """Take note of one; a frame that was dropped may come a little late."""
+        with self._lock:
+            if self._count == len(self._stamps_s):
+                self._stamps_s = np.concatenate([self._stamps_s, np.zeros(self._count)])
+                self._poses = np.concatenate([self._poses, np.zeros((self._count, 4, 4))])
+            self._stamps_s[self._count], self._poses[self._count] = stamp_s, pose
+            self._count += 1
+
+    def until_now(self) -> WalkedTrack:
+        """Return those until now, in the order of time."""
+        with self._lock:
+            order = np.argsort(self._stamps_s[: self._count], kind="stable")
+            return WalkedTrack(self._stamps_s[order], self._poses[order])
+
+    def move(self, step: PoseCorrection) -> None:
+        """Move all by a correction of the poses."""
+        now = self.until_now()
+        self._stamps_s[: self._count], self._poses[: self._count] = (
+            now.stamps_s,
+            step.moved(now.stamps_s, now.world_from_camera),
+        )
+
+
+class HeldFrames:
+    """Holds frames spread evenly over a walk, up to a number: every one, then every other, every fourth, ..."""
+
+    def __init__(self, most: int) -> None:
+        self._most, self._stride, self._came, self._held = most, 1, 0, list[Frame]()
+
+    def __len__(self) -> int:
+        return len(self._held)
+
+    def add(self, frame: Frame) -> None:
+        """Take the next frame."""
+        if self._came % self._stride == 0 and len(self._held) >= self._most:
+            self._stride, self._held = 2 * self._stride, self._held[::2]
+        if self._came % self._stride == 0:
+            self._held.append(frame)
+        self._came += 1
+
+    def recording(self, up_in_world: Float[np.ndarray, "3"] | None) -> Recording:
+        """Return the frames as a recording; there is at least one."""
+        return MemoryRecording(list(self._held), up_in_world)
+
+    def move(self, step: PoseCorrection) -> None:
+        """Move the frames by a correction of their poses."""
+        self._held = [moved_frame(frame, step) for frame in self._held]
+
+
+_NONE = np.zeros((0, 1, 1), np.uint16)
+
+
+@dataclass(slots=True)
+class _Open:
+    number: int
+    sums: VoxelAccumulator
+    stamps_s: list[float] = field(default_factory=list[float])
+    poses: list[np.ndarray] = field(default_factory=list[np.ndarray])
+
+    def submap(self) -> Submaps:
+        return submap_of(self.sums.sums(), np.array(self.stamps_s), np.stack(self.poses), _NONE)
+
+
+class SubmapBook:
+    """Takes sums in the order of their frames."""
+
+    def __init__(self) -> None:
+        self._whole: list[Submaps] = []
+        self._open: _Open | None = None
+
+    def add(
+        self, number: int, sums: VoxelSums, stamps_s: list[float], poses: list[np.ndarray], empty: VoxelAccumulator
+    ) -> None:
+        """Add frames to the submap of a number, which begins in ``empty`` if it is another one than before."""
+        if self._open is None or self._open.number != number:
+            self.close()
+            self._open = _Open(number, empty)
+        self._open.sums.merge(sums)
+        self._open.stamps_s += stamps_s
+        self._open.poses += poses
+
+    def add_whole(self, submap: Submaps) -> None:
+        """Add a submap that was made elsewhere."""
+        self._whole.append(submap)
+
+    def close(self) -> None:
+        """Let the next frames begin another submap."""
+        if self._open is not None:
+            self._whole.append(self._open.submap())
+            self._open = None
+
+    def submaps(self) -> Submaps | None:
+        """Return all, with the one that is not whole; None where there is none."""
+        every = self._whole + ([] if self._open is None else [self._open.submap()])
+        return concat(every) if every else None
+
+
+def placed(
+    submaps: Submaps, pose: Float[np.ndarray, "f 4 4"], clear_mm: UInt16[np.ndarray, "f_or_0 rows columns"]
+) -> Submaps:
+    """Return submaps whose frames have these poses now."""
+    return replace(submaps, pose=pose, clear_mm=clear_mm)
 
 
 @dataclass(slots=True)

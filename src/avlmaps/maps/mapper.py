@@ -33,7 +33,7 @@ from avlmaps.maps.finish import (
     walked_info,
     with_clear_views,
 )
-from avlmaps.maps.frame_sums import FrameSums
+from avlmaps.maps.frame_sums import FrameSums, HeldFrames, MapState, SubmapBook, Walked
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector, FreeViews, ThroughCounts
 from avlmaps.maps.fusion.submaps import MovedSubmaps, submap_of
@@ -41,7 +41,6 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.hearing import Hearing
 from avlmaps.maps.keyframes.album import KeyframeAlbum
 from avlmaps.maps.keyframes.choose import KeyframeChooser
-from avlmaps.maps.map_state import MapState
 from avlmaps.maps.perceived import encode_pixels, require_unit
 from avlmaps.maps.plan import BUILD_VERSION, models_of
 from avlmaps.maps.pose_correction import PoseCorrection
@@ -49,9 +48,7 @@ from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.manifest import BadFrame, Timings
 from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.submap_book import SubmapBook
 from avlmaps.maps.types import Submaps
-from avlmaps.maps.walked import HeldFrames, Walked
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.memory import next_of
 from avlmaps.recordings.types import Frame, Recording

@@ -17,7 +17,7 @@ from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.perceived import given_features
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.folder import read, write
-from avlmaps.maps.store.lock import lock_folder
+from avlmaps.maps.store.tables import lock_folder
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, with_findings

@@ -14,7 +14,7 @@ from transformers import PeAudioFrameLevelModel, PeAudioProcessor
 
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.registry import Kind
-from avlmaps.maps.audio.change_points import frames_of_track, split_at_changes
+from avlmaps.maps.audio.segmentation import frames_of_track, split_at_changes
 from avlmaps.perception.conformance import check
 from avlmaps.perception.protocols import FrameSoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac

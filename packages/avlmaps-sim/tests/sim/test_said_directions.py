@@ -11,7 +11,7 @@ from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import replay
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.build import build_map
-from avlmaps.maps.located import take_device
+from avlmaps.maps.hearing import take_device
 from avlmaps.maps.store.folder import read
 from avlmaps.recordings.open import open_recording
 from avlmaps_sim.hearing.directions import ERROR_DEG, said_directions

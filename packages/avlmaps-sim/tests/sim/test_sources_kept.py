@@ -15,8 +15,8 @@ from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import replay
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.corrected import correct_map
+from avlmaps.maps.sources.correlation import SourceSettings
 from avlmaps.maps.sources.density import CandidateGrid, Density
-from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.store.folder import write
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.avlmap import AVLMap

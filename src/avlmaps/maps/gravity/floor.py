@@ -1,7 +1,10 @@
 """The floors under a walk, so that encoders may know how high over the floor a pixel lies.
 
-Frames become voxels in level axes (``patches``). Cameras are grouped by their height; for each group the level
-surfaces below it are hypotheses of its floor, and the evidence for each is weighed (``floor_choice``).
+Frames become voxels in level axes (``patches``). Cameras are grouped by their height; for each group the level surfaces
+below it are hypotheses of its floor. The floor is the lowest level that anything stands on, so that surfaces seen
+**below** a level speak against it, unless the camera stood over it and nothing is seen under its own footprint, as on a
+landing or a podium; its extent speaks for it; and cameras are seldom 2 m over the floor. That the floor is not in view
+is a hypothesis, too. Each piece of evidence is a sum in nats; a softmax over the hypotheses gives their confidences.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,17 +14,246 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from avlmaps.maps.gravity.floor_choice import (
-    CERTAIN,
-    SAME_M,
-    Choice,
-    Expected,
-    SurfacesAtHeight,
-    choose_floor,
-    stood_over,
-)
-from avlmaps.maps.gravity.patches import Sight, Voxelised, sight_of
+from avlmaps.maps.gravity.patches import CELL_M, STEP_X, STEP_Y, Sight, Voxelised, sight_of
 from avlmaps.recordings.types import Frame, Ground, Recording, Subset
+
+# The floor is searched between these distances below the camera, metres.
+DEEPEST_M, HIGHEST_M = 2.6, 0.12
+# Where no floor is in view the camera is taken to be held as people and robots mostly do.
+USUAL_HEIGHT_M = 1.3
+CERTAIN = 0.9  # from this confidence a floor gives the camera's height in the whole recording
+SAME_M = 0.12  # two heights closer than this are one hypothesis
+_BIN_M, _BLUR_M = 0.02, 0.03  # of the histogram of level heights
+_FEWEST = 3.0  # voxels that make a peak
+_BELOW_M, _BELOW_PER_M = 0.08, 0.02  # a surface lies below a level when it does by this, and this for each metre away
+_DEEP_M = 0.25  # and counts fully when it does by this much more: up is seldom known to a degree
+_REACH_M = 0.25  # a camera stands over what is level within this horizontal distance
+_FEWEST_UNDER = 3  # voxels that say what a camera stands over
+
+# Weights of the evidence, nats: round numbers, chosen on NYUv2's training frames, the red kitchen and simulated walks.
+_FEW = 20.0  # this number of level voxels (0.2 m2) is worth -0.7
+_MANY = 300.0  # this number (3 m2) is worth +0.5
+_BELOW_NATS, _MOST_BELOW = 40.0, 0.25
+# Cameras over a level make it a floor (a landing, a podium) when that many stand over it and it is larger than tables
+# are, or when they are as high over it as they are over other floors.
+_MOST_STOOD, _LARGE_M2, _USUAL, _STOOD_NATS = 0.5, 5.0, 0.1, 3.0
+_UNSEEN_NATS = -2.5
+_NOT_SAID_NATS = 6.0  # against every floor but the one that someone gave
+_GUESSED = 0.5  # how likely the height of a floor out of view is right, when it is out of view
+_AT_BOTTOM = 0.65  # the bottom of what is in view is taken for a floor out of view from this share of the usual height
+
+
+@dataclass(frozen=True, slots=True)
+class SurfacesAtHeight:
+    """The surfaces round a camera height.
+
+    Attributes:
+        camera_m: height of the cameras, along up.
+        surface: all that was seen by cameras of about that height.
+        level: level surfaces that face up, seen by them.
+        under_m: (k,) height of what each camera at this height stood over; NaN where that was not seen.
+    """
+
+    camera_m: float
+    surface: Voxelised
+    level: Voxelised
+    under_m: Float[np.ndarray, " k"]
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """A user's or a robot's hint about the floor.
+
+    Attributes:
+        floor_m: its height along up.
+        camera_height_m: of the camera over it.
+        exact: whether the floor lies there, or only not above it.
+    """
+
+    floor_m: float
+    camera_height_m: float
+    exact: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class FloorEvidence:
+    """The evidence for and against a floor at one height.
+
+    Attributes:
+        height_m: of the floor, along up.
+        camera_height_m: of the camera over it.
+        level_m2: area of level surface at this height; 0 for a floor out of view.
+        below: share of all surface in view that lies below, in [0, 1].
+        undercut: share of its own footprint with surface seen beneath, in [0, 1].
+        stood: share of the cameras that stand over it, among those of which that is known, in [0, 1].
+        trusted: whether that many cameras over so large a level, or at the recording's usual height, make it a floor
+            though other surface lies below.
+        seen: whether a level surface lies there; False says that the floor is out of view.
+        nats: all of it as one sum, the higher the better.
+    """
+
+    height_m: float
+    camera_height_m: float
+    level_m2: float
+    below: float
+    undercut: float
+    stood: float
+    trusted: bool
+    seen: bool
+    nats: float
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """The floor under a camera.
+
+    Attributes:
+        best: the hypothesis that is taken.
+        confidence: how likely the floor lies within 0.12 m of that height under all the evidence, in [0, 1]; at most
+            0.5 for a floor out of view.
+        runner_up: the best hypothesis at another height, None where there is none.
+        runner_up_confidence: how likely that one is, in [0, 1].
+    """
+
+    best: FloorEvidence
+    confidence: float
+    runner_up: FloorEvidence | None
+    runner_up_confidence: float
+
+
+def choose_floor(view: SurfacesAtHeight, expected: Expected | None = None, usual_m: float | None = None) -> Choice:
+    """Return the floor under the cameras of a view."""
+    found = [weigh(view, height_m, expected, usual_m) for height_m in hypotheses(view)]
+    found = sorted([*found, out_of_view(view, expected)], key=lambda evidence: -evidence.nats)
+    weight = np.exp(np.array([evidence.nats for evidence in found]) - found[0].nats)
+    weight /= weight.sum()
+    if expected is None or not expected.exact:
+        weight *= np.array([1.0 if evidence.seen else _GUESSED for evidence in found])
+    best = found[0]
+    same = np.array([abs(evidence.height_m - best.height_m) < SAME_M for evidence in found])
+    others = np.flatnonzero(~same)
+    if not len(others):
+        return Choice(best, float(weight[same].sum()), None, 0.0)
+    second = found[int(others[0])]
+    near = ~same & np.array([abs(evidence.height_m - second.height_m) < SAME_M for evidence in found])
+    return Choice(best, float(weight[same].sum()), second, float(weight[near].sum()))
+
+
+def hypotheses(view: SurfacesAtHeight) -> list[float]:
+    """Return the heights along up at which level surface gathers, below the camera."""
+    lowest = view.camera_m - DEEPEST_M
+    level = view.level.height_m
+    level = level[(level > lowest) & (level < view.camera_m - HIGHEST_M)]
+    bins = round(DEEPEST_M / _BIN_M)
+    count = np.bincount(((level - lowest) / _BIN_M).astype(int), minlength=bins + 1).astype(float)
+    offset = np.arange(-5, 6) * _BIN_M
+    smooth = np.pad(np.convolve(count, np.exp(-0.5 * (offset / _BLUR_M) ** 2), "same"), 1)
+    peak = (smooth[1:-1] >= smooth[:-2]) & (smooth[1:-1] > smooth[2:]) & (smooth[1:-1] >= _FEWEST)
+    middles = lowest + (np.flatnonzero(peak) + 0.5) * _BIN_M
+    return [float(np.median(level[np.abs(level - height) < 2.5 * _BIN_M])) for height in middles]
+
+
+def weigh(
+    view: SurfacesAtHeight, height_m: float, expected: Expected | None = None, usual_m: float | None = None
+) -> FloorEvidence:
+    """Return the evidence for a floor at a height where level surface was seen."""
+    at = np.abs(view.level.height_m - height_m) < 2.5 * _BIN_M
+    off = (view.level.height_m[at] - height_m) / _BLUR_M
+    support = float(np.exp(-0.5 * off**2).sum())
+    below, beneath = _beneath(view, height_m)
+    undercut = _undercut(view.level[at], beneath)
+    known = view.under_m[np.isfinite(view.under_m)]
+    stood = float(np.mean(np.abs(known - height_m) < SAME_M)) if len(known) else 0.0
+    level_m2 = len(np.unique(view.level[at].columns())) * CELL_M**2
+    usual = usual_m is not None and abs(np.log((view.camera_m - height_m) / usual_m)) < _USUAL
+    trusted = stood >= _MOST_STOOD and (level_m2 >= _LARGE_M2 or usual)
+    given = expected is not None and expected.exact
+    prior = 0.0 if trusted and usual and not given else prior_nats(height_m, view.camera_m, expected)
+    nats = (
+        np.log(support / (support + _FEW))
+        + 0.7 * np.log1p(support / _MANY)
+        - _BELOW_NATS * min(undercut if trusted else below, _MOST_BELOW)
+        + _STOOD_NATS * trusted
+        + prior
+    )
+    return FloorEvidence(
+        height_m, view.camera_m - height_m, level_m2, below, undercut, stood, trusted, True, float(nats)
+    )
+
+
+def out_of_view(view: SurfacesAtHeight, expected: Expected | None = None) -> FloorEvidence:
+    """Return the hypothesis that no level surface in view is the floor.
+
+    The floor then lies where someone said; else at the bottom of what is in view, or where cameras usually have it if
+    that is lower by far.
+    """
+    window = view.surface.height_m[view.surface.height_m > view.camera_m - DEEPEST_M]
+    deep_m = view.camera_m - float(np.quantile(window, 0.01)) if len(window) else 0.0
+    camera_height_m = deep_m if deep_m > _AT_BOTTOM * USUAL_HEIGHT_M else USUAL_HEIGHT_M
+    if expected is not None and expected.exact:
+        given_m = view.camera_m - expected.floor_m
+        camera_height_m = given_m if HIGHEST_M < given_m < DEEPEST_M else expected.camera_height_m
+    height_m = view.camera_m - camera_height_m
+    nats = _UNSEEN_NATS + prior_nats(height_m, view.camera_m, expected)
+    below, _ = _beneath(view, height_m)
+    return FloorEvidence(height_m, camera_height_m, 0.0, below, 0.0, 0.0, False, False, float(nats))
+
+
+def prior_nats(height_m: float, camera_m: float, expected: Expected | None = None) -> float:
+    """Return how likely a floor at a height is before anything was seen, in nats below the likeliest.
+
+    People hold cameras and robots carry them 0.9 to 1.7 m high; small robots have theirs anywhere below.
+    """
+    camera_height_m = camera_m - height_m
+    if expected is not None and expected.exact:
+        if abs(height_m - expected.floor_m) < SAME_M:
+            return 0.0
+        return max(-0.5 * (np.log(camera_height_m / expected.camera_height_m) / 0.1) ** 2, -12.0) - _NOT_SAID_NATS
+    too_high = expected is not None and camera_height_m < expected.camera_height_m - SAME_M
+    ratio = np.log(camera_height_m / 1.25)
+    likely = 0.93 * np.exp(-0.5 * (ratio / (0.4 if ratio < 0.0 else 0.25)) ** 2)
+    return float(np.log(likely + (0.07 if ratio < 0.0 else 0.002))) - _NOT_SAID_NATS * too_high
+
+
+def _beneath(view: SurfacesAtHeight, height_m: float) -> tuple[float, Voxelised]:
+    window = view.surface.height_m > view.camera_m - DEEPEST_M
+    deep_m = height_m - view.surface.height_m - _BELOW_M - _BELOW_PER_M * view.surface.range_m
+    below = float(np.clip(deep_m[window] / _DEEP_M, 0.0, 1.0).mean()) if window.any() else 0.0
+    return below, view.surface[window & (deep_m > 0.0)]
+
+
+def _undercut(level: Voxelised, beneath: Voxelised) -> float:
+    column = np.unique(level.columns())
+    inner = np.ones(len(column), bool)
+    for step in (STEP_X, -STEP_X, STEP_Y, -STEP_Y):
+        inner &= np.isin(column + step, column)
+    if not inner.any():
+        return 0.0
+    return float(np.isin(column[inner], beneath.columns()).mean())
+
+
+def stood_over(camera_m: Float[np.ndarray, "k 3"], level: Voxelised) -> Float[np.ndarray, " k"]:
+    """Return the height of the level surface that each camera stood over, along up; NaN where none was seen.
+
+    Args:
+        camera_m: (k, 3) in level axes.
+        level: level surfaces that any frame saw.
+    """
+    middle_m = level.middles_m()
+    under = np.full(len(camera_m), np.nan)
+    for index, (x, y, height_m) in enumerate(camera_m):
+        close = np.hypot(middle_m[:, 0] - x, middle_m[:, 1] - y) < _REACH_M
+        drop_m = height_m - level.height_m[close]
+        there = level.height_m[close][(drop_m > HIGHEST_M) & (drop_m < DEEPEST_M)]
+        if len(there) >= _FEWEST_UNDER:
+            under[index] = _commonest(there)
+    return under
+
+
+def _commonest(heights: Float[np.ndarray, " n"]) -> float:
+    near: Sequence[int] = (np.abs(heights[:, None] - heights[None]) < 0.06).sum(axis=1).tolist()
+    return float(max(zip(near, heights.tolist(), strict=True))[1])
+
 
 _BAND_M = 0.12  # cameras of one group differ in height by no more than this
 _STOREY_M = 0.6  # a camera's view counts for others whose height differs by no more than this

@@ -15,10 +15,17 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import apply, from_rotation, inverse, rotation_to_level
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
-from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations, correlate
-from avlmaps.maps.sources.polarity import MOST_MICROPHONES, signs_of
-from avlmaps.maps.sources.settings import SourceSettings
-from avlmaps.maps.sources.steered import loudest_frames, steer, steer_pairs
+from avlmaps.maps.sources.correlation import (
+    MOST_MICROPHONES,
+    SPEED_M_S,
+    Correlations,
+    SourceSettings,
+    correlate,
+    loudest_frames,
+    signs_of,
+    steer,
+    steer_pairs,
+)
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import read_channels
 from avlmaps.recordings.microphones import Microphones

@@ -1,17 +1,25 @@
-"""How alike two microphones are at each delay: GCC-PHAT of short frames, weighted to onsets.
+"""How alike two microphones are at each delay, and what that says of a place: GCC-PHAT of short frames, steered.
 
 The phase of each bin counts alike, as in PHAT (Knapp and Carter 1976), times a weight in [0, 1]: what is new in the
-frame (power above the decay of what came before, by the precedence of the direct sound) and above the noise. So a bin
-that holds reverberation alone says nothing.
+frame (power above the decay of what came before, by the precedence of the direct sound) and above the noise. With
+phases that differ from the true ones by von Mises noise, the log-likelihood of a source is the sum over frames, pairs
+and bins of weight times cosine at the delays of its place (SRP-PHAT, DiBiase 2000), times a concentration. A single
+microphone says by how its level changes along the walk: 20 dB less for ten times the distance, down to the reverberant
+field.
 """
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.columns import take
+from avlmaps.core.timeline import Trajectory
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import read_channels
+from avlmaps.recordings.microphones import Microphones
 
 FRAME_S = 0.064
 HOP_S = 0.032
@@ -122,3 +130,232 @@ def correlate(
     at_s = start_s + np.arange(len(power)) * HOP_S + FRAME_S / 2
     step_s = 1.0 / (rate_hz * _OVERSAMPLING)
     return Correlations(at_s, pair, curve, -reach * step_s, step_s, weight.sum(axis=1))
+
+
+@dataclass(frozen=True, slots=True)
+class SourceSettings:
+    """From correlations to probabilities.
+
+    Attributes:
+        concentration: how much a steered sum counts, after it was divided by its greatest possible value to the power
+            ``saturation``: bins of neighbouring frames repeat one another.
+        saturation: see above.
+        smoothing: of the correlations, in steps of their delay: half a cell of the candidates.
+        level_noise_db: by how much a sound's own loudness changes while it sounds (one microphone).
+        reverberant_m: distance at which rooms return as much sound as comes straight (one microphone).
+        hidden: log-odds against a place behind a wall.
+        reach_m: distance from the robot by which a place becomes e times less likely.
+        blur_m: standard deviations of the errors of place that most and some events have.
+        wide: share of those of the second.
+        astray: share of the events whose evidence says nothing.
+    """
+
+    concentration: float = 9.0
+    saturation: float = 0.7
+    smoothing: float = 5.0
+    level_noise_db: float = 8.0
+    reverberant_m: float = 0.6
+    hidden: float = 1.5
+    reach_m: float = 2.5
+    blur_m: tuple[float, float] = (0.075, 0.35)
+    wide: float = 0.15
+    astray: float = 0.03
+
+    def weighed(self, steered: Float[np.ndarray, " c"], found: Correlations) -> Float[np.ndarray, " c"]:
+        """Return the log-likelihood of steered sums, but for a constant."""
+        greatest = max(float(found.weight.sum()) * len(found.pair), 1.0)
+        return self.concentration * steered / greatest**self.saturation
+
+    @classmethod
+    def of(cls, channels: int) -> "SourceSettings":
+        """Return those of a number of microphones."""
+        return _OF_CHANNELS.get(channels, cls())
+
+
+_OF_CHANNELS = {
+    0: SourceSettings(blur_m=(0.07, 0.35), wide=0.1, astray=0.02),  # a device's directions alone
+    1: SourceSettings(reach_m=1.0, blur_m=(0.15, 0.6)),
+    2: SourceSettings(wide=0.3),
+}
+
+
+MOST_FRAMES = 150
+_BEFORE_S = 1.0  # of a sound, by which its noise is known
+
+
+def loudest_frames(found: Correlations, most: int = MOST_FRAMES) -> Int[np.ndarray, " k"]:
+    """Return the frames that say most, in the order of time."""
+    useful = np.flatnonzero(found.weight > 0.0)
+    return np.sort(useful[np.argsort(-found.weight[useful], kind="stable")[:most]])
+
+
+def loudest_of_sound(
+    track: AudioTrack,
+    microphones: Microphones,
+    walk: Trajectory,
+    span_s: tuple[float, float],
+    *,
+    longest_s: float,
+    most: int,
+    smoothing: float,
+) -> Correlations:
+    """Return the frames of a sound that say most of those at which the robot's place is known; perhaps none.
+
+    At most ``longest_s`` of the sound are read, and ``most`` frames chosen; ``smoothing`` of their curves is in steps.
+
+    Raises:
+        AudioError: the track cannot be read.
+    """
+    onset_s, offset_s = span_s
+    begin_s = max(onset_s - _BEFORE_S, track.start_s)
+    sound = read_channels(track, begin_s, min(offset_s, onset_s + longest_s))
+    found = correlate(
+        sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, microphones.longest_m, microphones.delay_s
+    )
+    found = found.take(np.flatnonzero((found.at_s >= walk.stamps_s[0]) & (found.at_s <= walk.stamps_s[-1])))
+    return found.take(loudest_frames(found, most)).smoothed(smoothing)
+
+
+def steer(
+    found: Correlations, ear_m: Float[np.ndarray, "f m 3"], place_m: Float[np.ndarray, "c 3"]
+) -> Float[np.ndarray, " c"]:
+    """Return the sum over frames and pairs of the correlation at the delays of each place; see ``steer_pairs``."""
+    return steer_pairs(found, ear_m, place_m).sum(axis=0)
+
+
+def steer_pairs(
+    found: Correlations, ear_m: Float[np.ndarray, "f m 3"], place_m: Float[np.ndarray, "c 3"]
+) -> Float[np.ndarray, "p c"]:
+    """Return for each pair the sum over frames of the correlation at the delays of each place.
+
+    Args:
+        found: the frames.
+        ear_m: where the microphones were in each frame.
+        place_m: where the sound seems to come from, the same frame of reference.
+    """
+    total = np.zeros((len(found.pair), len(place_m)), np.float32)
+    place = np.ascontiguousarray(place_m.T, np.float32)
+    scale, last = np.float32(1.0 / (SPEED_M_S * found.step_s)), found.curve.shape[2] - 2
+    first = np.float32(found.first_s / found.step_s)
+    for curve, ears in zip(found.curve, ear_m.astype(np.float32), strict=True):
+        away = np.stack([
+            np.sqrt((place[0] - x) ** 2 + (place[1] - y) ** 2 + (place[2] - z) ** 2) for x, y, z in ears
+        ]) * scale  # fmt: skip
+        for number, (one, other) in enumerate(found.pair):
+            at = away[one] - away[other] - first
+            whole = np.clip(at.astype(np.int32), 0, last)
+            part = at - whole
+            own = curve[number]
+            total[number] += own[whole] * (1.0 - part) + own[whole + 1] * part
+    return total.astype(np.float64)
+
+
+_WINDOW_S = 0.3
+_LOUD = 0.9
+_LEVEL_LOW_HZ, _LEVEL_HIGH_HZ = 300.0, 6000.0
+_ABOVE_NOISE = 4.0
+_NEAREST_M = 0.3
+
+
+def levels_db(
+    samples: Float[np.ndarray, " n"], rate_hz: int, start_s: float, quiet_s: float
+) -> tuple[Float[np.ndarray, " w"], Float[np.ndarray, " w"]]:
+    """Return times and levels of the loud frames of a sound, one for each ``_WINDOW_S`` in which it stands out.
+
+    Args:
+        samples: a sound, with what was heard before it.
+        rate_hz: samples a second.
+        start_s: the recording's time of the first sample.
+        quiet_s: how much of it, from its beginning, is before the sound.
+    """
+    spectrum = spectra(samples[None], rate_hz)[0]
+    hz = np.linspace(0.0, rate_hz / 2.0, spectrum.shape[1])
+    power = (np.abs(spectrum[:, (hz > _LEVEL_LOW_HZ) & (hz < _LEVEL_HIGH_HZ)]) ** 2).sum(axis=1).astype(np.float64)
+    before = max(int(quiet_s / HOP_S) - 1, 0)
+    noise = float(np.median(power[:before])) if before else 0.0
+    at_s = start_s + (np.arange(len(power)) + 1) * HOP_S
+    window = ((at_s - start_s - quiet_s) / _WINDOW_S).astype(int)
+    heard = (np.arange(len(power)) >= before) & (power > _ABOVE_NOISE * noise) & (power > 0.0)
+    numbers = [number for number in np.unique(window[heard]).tolist() if (heard & (window == number)).sum() > 1]
+    within = [heard & (window == number) for number in numbers]
+    times = np.array([at_s[inside].mean() for inside in within])
+    return times, np.array([10.0 * np.log10(np.quantile(power[inside], _LOUD)) for inside in within])
+
+
+def unknown_offset(
+    measured_db: Float[np.ndarray, " k"],
+    distance_m: Float[np.ndarray, "k c"],
+    noise_db: float,
+    reverberant_m: float = np.inf,
+) -> Float[np.ndarray, " c"]:
+    """Return the log-likelihood of each place, the loudness integrated out.
+
+    Args:
+        measured_db: levels, or ratios of direct to reverberant sound, at several places.
+        distance_m: from each of these to each candidate.
+        noise_db: standard deviation of what was measured.
+        reverberant_m: distance at which a level is that of the reverberant field; inf for ratios.
+    """
+    rest = measured_db[:, None] - against_1_m_db(distance_m, reverberant_m)
+    return -0.5 * ((rest - rest.mean(axis=0)) ** 2).sum(axis=0) / noise_db**2
+
+
+def against_1_m_db(distance_m: Float[np.ndarray, "*k"], reverberant_m: float = np.inf) -> Float[np.ndarray, "*k"]:
+    """Return by how much a sound is louder at each distance than its direct sound is at 1 m."""
+    return 10.0 * np.log10(1.0 / np.maximum(distance_m, _NEAREST_M) ** 2 + 1.0 / reverberant_m**2)
+
+
+MOST_MICROPHONES = 8  # more choices than can be tried beyond
+_RARE = 2.4  # log-odds against a turned channel
+_MOST_SOUNDS, _MOST_FRAMES, _MOST_PLACES, _LONGEST_S = 6, 40, 4000, 5.0
+
+
+def signs_of(
+    steered: Sequence[tuple[Correlations, Float[np.ndarray, "p c"]]], settings: SourceSettings
+) -> Float[np.ndarray, " m"]:
+    """Return 1 or -1 for each channel; 1 for all where nothing speaks clearly for another choice.
+
+    Args:
+        steered: for each sound its correlations, and the steered sum of each pair at each candidate.
+        settings: how much a sum counts.
+    """
+    pair = steered[0][0].pair
+    count = int(pair.max()) + 1
+    best, chosen = -np.inf, np.ones(count)
+    for tail in itertools.product((1.0, -1.0), repeat=count - 1):
+        signs = np.array([1.0, *tail])
+        turned = min(int((signs < 0.0).sum()), int((signs > 0.0).sum()))
+        both = signs[pair[:, 0]] * signs[pair[:, 1]]
+        value = sum(settings.weighed(both @ sums, found).max() for found, sums in steered) - _RARE * turned
+        if value > best:
+            best, chosen = value, signs
+    return chosen if (chosen < 0.0).sum() <= count / 2 else -chosen
+
+
+def signs_along(
+    track: AudioTrack,
+    microphones: Microphones,
+    walk: Trajectory,
+    spans_s: Sequence[tuple[float, float]],
+    place_m: Float[np.ndarray, "c 3"],
+    settings: SourceSettings,
+) -> Float[np.ndarray, " m"]:
+    """Return the sign of each channel by some sounds along a walk; 1 for all of two channels, or of very many.
+
+    The candidates ``place_m`` are in the frame of the walk's poses; the spans are onset and offset of sounds.
+
+    Raises:
+        AudioError: the track cannot be read.
+    """
+    plain = np.ones(len(microphones))
+    if not 3 <= len(microphones) <= MOST_MICROPHONES:  # the delay of a single pair fits somewhere either way
+        return plain
+    place = place_m[:: -(-len(place_m) // _MOST_PLACES)].astype(np.float64)
+    steered: list[tuple[Correlations, Float[np.ndarray, "p c"]]] = []
+    for span_s in sorted(spans_s, key=lambda span: span[0] - span[1])[:_MOST_SOUNDS]:
+        found = loudest_of_sound(
+            track, microphones, walk, span_s, longest_s=_LONGEST_S, most=_MOST_FRAMES, smoothing=settings.smoothing
+        )
+        if len(found.at_s):
+            steered.append((found, steer_pairs(found, microphones.in_world_m(walk.at(found.at_s)), place)))
+    return signs_of(steered, settings) if steered else plain

@@ -11,7 +11,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.maps.sources.candidates import CELL_M
-from avlmaps.maps.sources.settings import SourceSettings
+from avlmaps.maps.sources.correlation import SourceSettings
 
 RIGHT_M = 0.5
 """A goal so near to what it is for is right, level."""

@@ -1,24 +1,191 @@
-"""From a recording whose microphones are known, and the surfaces of its map: the evidence of where each sound began."""
+"""Where each sound of a drive began, over the surfaces of its map: of a whole drive, or while it goes on.
+
+Each sound is located when it is over, on the surfaces that there are then; what came before is carried over to the
+candidates of now. Surfaces, signs of channels and a device's offset are known better later, so that at the end every
+sound is located once more, on the finished map.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from threading import Lock
 
 import numpy as np
 
-from avlmaps.core.arrays import Float
-from avlmaps.core.poses import from_rotation, rotation_to_level
+from avlmaps.core.arrays import Bool, Float, Float16, Int
+from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.core.poses import apply, from_rotation, rotation_to_level
 from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.bearings import BearingEvidence, Bearings, evidence_of_bearings, expected_alone
-from avlmaps.maps.sources.candidates import Candidates, candidates_of
+from avlmaps.maps.sources.candidates import Candidates, Legs, Walls, candidates_of
+from avlmaps.maps.sources.correlation import (
+    Correlations,
+    SourceSettings,
+    correlate,
+    levels_db,
+    loudest_frames,
+    signs_along,
+    unknown_offset,
+)
 from avlmaps.maps.sources.density import CandidateGrid, Density, log_same_place
-from avlmaps.maps.sources.event import EventEvidence, evidence_of
-from avlmaps.maps.sources.polarity import signs_along
-from avlmaps.maps.sources.settings import SourceSettings
-from avlmaps.maps.sources.walls import Walls
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import read_channels
 from avlmaps.recordings.directions import DirectionTrack
+from avlmaps.recordings.microphones import Microphones
+
+BEFORE_S, AFTER_S = 1.0, 0.2
+_LONGEST_S = 10.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EventEvidence:
+    """What was heard of one sound.
+
+    Attributes:
+        heard: (c,) log-likelihood of each candidate by what the microphones say, the greatest 0.
+        halves: (2, c) those of its first and of its second half, where there are frames in both.
+        expected: (c,) log-likelihood without it: near the robot, in sight.
+    """
+
+    heard: Float[np.ndarray, " c"]
+    halves: Float[np.ndarray, "2 c"] | None
+    expected: Float[np.ndarray, " c"]
+
+
+def evidence_of(
+    track: AudioTrack,
+    microphones: Microphones,
+    walk: Trajectory,
+    span_s: tuple[float, float],
+    candidates: Candidates,
+    walls: Walls,
+    settings: SourceSettings,
+    signs: Float[np.ndarray, " m"],
+) -> EventEvidence:
+    """Return the evidence of a sound.
+
+    The walk's poses are of the level frame, the span is onset and offset; ``signs`` has -1 for a channel that is wired
+    the other way round.
+
+    Raises:
+        AudioError: the track cannot be read.
+    """
+    onset_s, offset_s = span_s[0], min(span_s[1], span_s[0] + _LONGEST_S)
+    begin_s = max(onset_s - BEFORE_S, track.start_s)
+    sound = read_channels(track, begin_s, min(offset_s + AFTER_S, track.end_s))
+    place = candidates.place_m.astype(np.float64)
+    if len(microphones) == 1:
+        at_s, level_db = levels_db(sound.samples[0], sound.rate_hz, begin_s, onset_s - begin_s)
+        ear = _ears(walk, microphones, at_s if len(at_s) else np.array([onset_s, offset_s]))
+        legs = Legs.of(ear[:, 0], walls, place)
+        heard = np.zeros(len(place))
+        if len(level_db) > 1:
+            away = np.linalg.norm(ear - place, axis=2)
+            heard = unknown_offset(level_db, away, settings.level_noise_db, settings.reverberant_m)
+        return EventEvidence(heard - heard.max(initial=-np.inf), None, legs.expected(settings))
+    found = correlate(
+        sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, microphones.longest_m, delay_s=microphones.delay_s
+    )
+    found = found.take(loudest_frames(found)).turned(signs).smoothed(settings.smoothing)
+    if not len(found.at_s):
+        ear = _ears(walk, microphones, np.array([onset_s, offset_s]))
+        return EventEvidence(np.zeros(len(place)), None, Legs.of(ear.mean(axis=1), walls, place).expected(settings))
+    ear = _ears(walk, microphones, found.at_s)
+    legs = Legs.of(ear.mean(axis=1), walls, place)
+    middle = len(found.at_s) // 2
+    first, second = legs.steered(found, ear, place, middle)
+    total = _weighed(first + second, found, settings)
+    if not middle:
+        return EventEvidence(total, None, legs.expected(settings))
+    early, late = (found.take(rows) for rows in np.array_split(np.arange(len(found.at_s)), [middle]))
+    halves = np.stack([_weighed(first, early, settings), _weighed(second, late, settings)])
+    return EventEvidence(total, halves, legs.expected(settings))
+
+
+def _weighed(steered: Float[np.ndarray, " c"], found: Correlations, settings: SourceSettings) -> np.ndarray:
+    value = settings.weighed(steered, found)
+    return value - value.max(initial=-np.inf)
+
+
+def _ears(walk: Trajectory, microphones: Microphones, at_s: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k m 3"]:
+    inside = np.clip(at_s, walk.stamps_s[0], walk.stamps_s[-1])
+    return microphones.in_world_m(walk.at(inside))
+
+
+_NEIGHBOURS = 4
+_KNOWN_M = 0.3  # from the nearest candidate of its own map a place counts as known up to this distance
+_TINY_M2 = 1e-8
+
+
+def carry_evidence(
+    parts: Sequence[tuple[SourceEvidence, Float[np.ndarray, "4 4"]]],
+    voxel_m: Float[np.ndarray, "n 3"],
+    robot_m: Float[np.ndarray, "k 3"],
+    up_in_world: Float[np.ndarray, "3"],
+) -> SourceEvidence | None:
+    """Return the evidence of all sounds of some maps over the surfaces of one; None where it has no candidates.
+
+    A candidate has the mean of the nearest ones of the sound's own map, nearer ones counting more. Where its own map
+    had none the sound is as likely as there, and the place less so with the distance.
+
+    Args:
+        parts: the evidence of each map and world_from_its_world, in the order of the sounds; of one number of
+            microphones.
+        voxel_m: middles of the voxels of the map, world.
+        robot_m: where the robot was, world.
+        up_in_world: unit vector.
+    """
+    level = rotation_to_level(up_in_world)
+    candidates = candidates_of(voxel_m @ level.T, robot_m @ level.T)
+    if not len(candidates) or not parts:
+        return None
+    place = candidates.place_m.astype(np.float64) @ level
+    rows = [laid(evidence, moved, place) for evidence, moved in parts]
+    return SourceEvidence(
+        place=place.astype(np.float32),
+        prior=candidates.prior.astype(np.float32),
+        heard=np.concatenate([heard for heard, _ in rows]).astype(np.float16),
+        expected=np.concatenate([expected for _, expected in rows]).astype(np.float16),
+        moving=np.concatenate([evidence.moving for evidence, _ in parts]),
+        channels=parts[0][0].channels,
+        device=np.concatenate([evidence.device for evidence, _ in parts]),
+    )
+
+
+def laid(
+    evidence: SourceEvidence, moved: Float[np.ndarray, "4 4"], place: Float[np.ndarray, "c 3"]
+) -> tuple[Float[np.ndarray, "n c"], Float[np.ndarray, "n c"]]:
+    """Return what sounds say of other candidates: their log-likelihoods with what was heard, and without.
+
+    Args:
+        evidence: of the sounds.
+        moved: from its world to that of the candidates.
+        place: the candidates.
+    """
+    from scipy.spatial import KDTree
+
+    own = apply(moved, np.asarray(evidence.place, np.float64))
+    count = min(_NEIGHBOURS, len(own))
+    near = KDTree(own).query(place, k=count)
+    away_m = np.asarray(near[0], np.float64).reshape(len(place), count)
+    row = np.asarray(near[1], np.int64).reshape(len(place), count)
+    weight = 1.0 / (away_m**2 + _TINY_M2)
+    weight /= weight.sum(axis=1, keepdims=True)
+    heard = _means(evidence.heard, row, weight)
+    expected = _means(evidence.expected, row, weight)
+    reach_m = SourceSettings.of(int(evidence.channels[0])).reach_m
+    expected -= np.maximum(away_m[:, 0] - _KNOWN_M, 0.0) / reach_m
+    return heard - heard.max(axis=1, keepdims=True), expected
+
+
+def _means(
+    values: Float16[np.ndarray, "n own"], row: Int[np.ndarray, "c k"], weight: Float[np.ndarray, "c k"]
+) -> Float[np.ndarray, "n c"]:
+    # One sound at a time: an hour's drive has hundreds, each over tens of thousands of candidates.
+    means = [(own.astype(np.float64)[row] * weight).sum(axis=1) for own in np.asarray(values)]
+    return np.reshape(means, (len(values), len(row)))
+
 
 _HEIGHT_STEP_M = 0.25
 _MOVING = -1.5  # logarithm of the odds below which the two halves of a sound are of two places
@@ -156,3 +323,187 @@ def moves(one: EventEvidence, plan: CandidateGrid, prior: Float[np.ndarray, " c"
         return False
     first, second = (Density.of(plan, prior, half + one.expected, one.expected, settings) for half in one.halves)
     return log_same_place(first, second, prior) < _MOVING
+
+
+AT_ONCE = 1
+"""Sounds that a live map locates before it looks for new ones again, the newest first."""
+_SAME_S = 0.1  # limits of a sound that are found again, with the background better known
+_SIGNS_BY = 6  # sounds, by which the signs of the channels are settled until the end
+_RECENT = 8  # sounds whose directions are looked at again, now that the device is known better
+
+Spans = Sequence[tuple[float, float]]
+
+
+class GrowingSources:
+    """Takes the microphones and what a device says; gives the evidence of sounds.
+
+    Attributes:
+        microphones: one for each channel; None where they are not known.
+        known_rad: of the device that says directions, as ``DirectionTrack.known_rad``.
+        waiting: how many sounds are not located yet.
+        doubt: why what a device said is left out; empty where it is not.
+    """
+
+    def __init__(self, at_once: int | None = None) -> None:
+        """Begin without sounds.
+
+        Args:
+            at_once: how many are located in one call at most; None for all.
+        """
+        self.microphones: Microphones | None = None
+        self.known_rad: tuple[float, float] | None = None
+        self.waiting, self.doubt = 0, ""
+        self._at_once, self._lock = at_once, Lock()
+        self._said: list[DirectionTrack] = []
+        self.forget()
+
+    def add_directions(self, said: DirectionTrack) -> None:
+        """Take directions that are later than those before. Another thread may do it.
+
+        Raises:
+            RecordingError: they are not.
+        """
+        if not len(said):
+            return
+        with self._lock:
+            last_s = float(self._said[-1].stamp_s[-1]) if self._said else -np.inf
+            if said.stamp_s[0] <= last_s:
+                raise RecordingError(
+                    f"A direction has the stamp {said.stamp_s[0]:.3f} s, and one of {last_s:.3f} s came before: it is "
+                    "repeated or out of order, and was left out."
+                )
+            self._said.append(said)
+
+    def track(self, heard: AudioTrack, channels: int) -> AudioTrack | None:
+        """Return a track with what is known of its sources; None where that is nothing."""
+        with self._lock:
+            self._said = [DirectionTrack.joined(self._said)] if self._said else []
+            said = self._said[0] if self._said else None
+        try:
+            if said is not None:
+                said.require_beside(heard.start_s, heard.end_s, "What the device said")
+                said = replace(said, known_rad=self.known_rad)
+            self.doubt = ""
+        except RecordingError as fault:
+            said, self.doubt = None, self.doubt or str(fault)  # its numbers change with every piece
+        placed = self.microphones if self.microphones is not None and len(self.microphones) == channels else None
+        return None if placed is None and said is None else replace(heard, microphones=placed, directions=said)
+
+    def forget(self) -> None:
+        """Locate every sound again: the poses have changed."""
+        self._evidence: SourceEvidence | None = None
+        self._spans_s = np.zeros((0, 2))
+        self._located: Bool[np.ndarray, " n"] = np.zeros(0, bool)
+        self._of_device: Float[np.ndarray, "n g o"] = np.zeros((0, 1, 1))
+        self._signs: Float[np.ndarray, " m"] | None = None
+
+    def known(self, spans_s: Spans) -> SourceEvidence | None:
+        """Return the evidence of the sounds that are over, as far as they are located. One that waits has all zeros.
+
+        The same object as before where nothing changed.
+        """
+        row = self._rows(spans_s)
+        self.waiting = int((row < 0).sum())
+        return self._chosen(row)
+
+    def until_now(
+        self,
+        track: AudioTrack,
+        walk: Trajectory,
+        spans_s: Spans,
+        voxel_m: Float[np.ndarray, "n 3"],
+        up_in_world: Float[np.ndarray, "3"],
+    ) -> SourceEvidence | None:
+        """Locate the next sounds that wait, and return what is ``known`` then; see ``find_sources``."""
+        row = self._rows(spans_s)
+        fresh = np.flatnonzero(row < 0)
+        if not len(fresh):
+            return self.known(spans_s)
+        now = fresh if self._at_once is None else fresh[-self._at_once :]
+        if track.microphones is None:
+            now = np.union1d(now, np.arange(max(0, len(row) - _RECENT), len(row)))
+        old = np.setdiff1d(np.flatnonzero(row >= 0), now)
+        told = track.directions is not None and self._of_device.shape[1] > 1  # else the device said nothing before
+        others = self._of_device[row[old]] if told and len(old) else None
+        signs = self._signs if len(old) >= _SIGNS_BY else None
+        wanted = [spans_s[number] for number in now.tolist()]
+        # By all sounds, also those that wait: else signs change with the order, and what was located waits again.
+        found = find_among(track, walk, wanted, voxel_m, up_in_world, signs_by_s=spans_s, signs=signs, others=others)
+        if found is None:
+            return None
+        if self._signs is not None and not np.array_equal(self._signs, found.signs):
+            old = old[:0]  # they were located with other signs
+        self._keep(found, spans_s, row, old, now)
+        return self._evidence
+
+    def at_the_end(
+        self,
+        track: AudioTrack,
+        walk: Trajectory,
+        spans_s: Spans,
+        voxel_m: Float[np.ndarray, "n 3"],
+        up_in_world: Float[np.ndarray, "3"],
+    ) -> SourceEvidence | None:
+        """Return the evidence of all sounds as a build finds it."""
+        self.waiting = 0
+        return find_sources(track, walk, spans_s, voxel_m, up_in_world)
+
+    def _rows(self, spans_s: Spans) -> Int[np.ndarray, " n"]:
+        row = np.full(len(spans_s), -1)
+        for number, span in enumerate(spans_s if len(self._spans_s) else ()):
+            off_s = np.abs(self._spans_s - span).max(axis=1)
+            nearest = int(np.argmin(off_s))
+            if off_s[nearest] < _SAME_S and self._located[nearest]:
+                row[number] = nearest
+        return row
+
+    def _chosen(self, row: Int[np.ndarray, " n"]) -> SourceEvidence | None:
+        evidence = self._evidence
+        if evidence is None or not len(row) or np.array_equal(row, np.arange(len(evidence))):
+            return evidence if len(row) else None
+        known = row >= 0
+        return replace(
+            evidence, heard=evidence.heard[row] * known[:, None], expected=evidence.expected[row] * known[:, None],
+            moving=evidence.moving[row] * known,
+        )  # fmt: skip
+
+    def _keep(
+        self,
+        found: FoundSources,
+        spans_s: Spans,
+        row: Int[np.ndarray, " n"],
+        old: Int[np.ndarray, " k"],
+        now: Int[np.ndarray, " s"],
+    ) -> None:
+        new, before, count = found.evidence, self._evidence, len(spans_s)
+        heard, expected = (np.zeros((count, len(new.place)), np.float16) for _ in range(2))
+        moving = np.zeros(count, np.uint8)
+        of_device = np.zeros((count, *found.of_device.shape[1:]))
+        heard[now], expected[now], moving[now] = new.heard, new.expected, new.moving
+        of_device[now if len(found.of_device) else now[:0]] = found.of_device
+        if before is not None and len(old):
+            own = replace(
+                before, heard=before.heard[row[old]], expected=before.expected[row[old]],
+                moving=before.moving[row[old]],
+            )  # fmt: skip
+            carried = laid(own, np.eye(4), new.place.astype(np.float64))
+            heard[old], expected[old] = (np.maximum(values, LEAST) for values in carried)
+            moving[old] = own.moving
+            of_device[old] = self._of_device[row[old]] if len(found.of_device) else 0.0
+        self._evidence = replace(new, heard=heard, expected=expected, moving=moving)
+        self._spans_s, self._of_device, self._signs = np.array(spans_s), of_device, found.signs
+        self._located = np.isin(np.arange(count), np.concatenate([old, now]))
+        self.waiting = int((~self._located).sum())
+
+
+def require_fit(microphones: Microphones | None, channels: int) -> None:
+    """Refuse a piece of sound whose channels are not those of the microphones.
+
+    Raises:
+        AudioError: there are more or fewer.
+    """
+    if microphones is not None and channels != len(microphones):
+        raise AudioError(
+            f"A piece of sound has {channels} channel(s), but {len(microphones)} microphone(s) are described; give one "
+            "position for each channel."
+        )

@@ -14,10 +14,14 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.poses import apply, from_rotation, rotation_to_level
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations
-from avlmaps.maps.sources.polarity import MOST_MICROPHONES, signs_of
-from avlmaps.maps.sources.settings import SourceSettings
-from avlmaps.maps.sources.steered import loudest_of_sound
+from avlmaps.maps.sources.correlation import (
+    MOST_MICROPHONES,
+    SPEED_M_S,
+    Correlations,
+    SourceSettings,
+    loudest_of_sound,
+    signs_of,
+)
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.microphones import Microphones
 

@@ -18,9 +18,8 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular, write_bytes_atomically
 from avlmaps.core.poses import apply, inverse, plain_point
-from avlmaps.maps.store.lock import EDITING, lock_folder
 from avlmaps.maps.store.manifest import MapInfo, RecordingInfo
-from avlmaps.maps.store.tables import TO_EDIT, explain_write_errors
+from avlmaps.maps.store.tables import EDITING, TO_EDIT, explain_write_errors, lock_folder
 from avlmaps.maps.types import Keyframes
 
 EDITS = "edits.jsonl"

@@ -24,7 +24,6 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.folder import PARTS, is_map_or_free, read_info, write
-from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import (
     Counts,
     MapBounds,
@@ -34,6 +33,7 @@ from avlmaps.maps.store.manifest import (
     UpInfo,
 )
 from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.store.tables import lock_folder
 from avlmaps.maps.types import Voxels
 from avlmaps.query.avlmap import AVLMap
 from avlmaps_models.import_reference.frames import Walk, read_walk

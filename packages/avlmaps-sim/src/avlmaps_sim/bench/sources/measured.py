@@ -13,10 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import AvlmapsError
-from avlmaps.maps.sources.correlation import SPEED_M_S, correlate
-from avlmaps.maps.sources.polarity import signs_of
-from avlmaps.maps.sources.settings import SourceSettings
-from avlmaps.maps.sources.steered import steer, steer_pairs
+from avlmaps.maps.sources.correlation import SPEED_M_S, SourceSettings, correlate, signs_of, steer, steer_pairs
 from avlmaps_sim.bench.harness.figures import Table, median_interval
 
 SIZE_M = np.array([5.36, 5.85, 2.86])
