@@ -16,7 +16,7 @@ from build_fakes import SETTINGS, Pixels, Walk, content_of, open_walk, register_
 from avlmaps.core.errors import AvlmapsError, BackendError, MapError, RecordingError
 from avlmaps.maps import cluster
 from avlmaps.maps.build import build_map
-from avlmaps.maps.cluster import ClusterWorkers, JobResult, Pool
+from avlmaps.maps.cluster import ClusterWorkers, Pool
 from avlmaps.perception.encoders import Encoders
 from helpers.pool_here import Here
 
@@ -102,7 +102,7 @@ REFUSED = [
     (lambda job: replace(job, reopen=nothing_there), MapError, "cannot open the recording"),
     (lambda job: replace(job, reopen=partial(open_walk, seed=1)), MapError, "would build another map"),
     (lambda job: replace(job, models=replace(job.models, names={"pixels": "unheard-of"})), BackendError, "unheard-of"),
-    (lambda job: replace(job, folder=job.folder.with_name("elsewhere")), MapError, "does not see"),
+    (lambda job: replace(job, file=job.file.with_name("elsewhere")), MapError, "does not see"),
 ]
 
 
@@ -126,9 +126,3 @@ def test_an_encoder_that_is_an_object_cannot_travel(tmp_path: Path) -> None:
             open_walk(), tmp_path / "map", Encoders.named(PROFILE, pixels=Mine()), SETTINGS, workers=workers,
             progress=False,
         )  # fmt: skip
-
-
-def test_what_went_wrong_with_a_job_keeps_its_class() -> None:
-    with pytest.raises(RecordingError, match="dark"):
-        JobResult("RecordingError", "It is dark.").require()
-    JobResult().require()

@@ -23,7 +23,6 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store import folder, tables
-from avlmaps.maps.store.checkpoints import load_checkpoint, save_checkpoint
 from avlmaps.maps.store.edits import read_edits
 from avlmaps.maps.store.folder import damaged_files, has_unfinished_build, read, write
 from avlmaps.maps.store.reader import encoders_of_map, require_model
@@ -95,26 +94,6 @@ def test_who_may_not_write_is_told_what_helps_a_build_and_what_helps_an_edit(tmp
     for name, helps in ((LOCK, "choose another folder"), (EDITING, "edit a copy that lies where you may write")):
         with pytest.raises(MapError, match=f"Not a directory; {helps}"), lock_folder(tmp_path / "file" / "map", name):
             pass
-
-
-class Facts(msgspec.Struct):
-    """The facts of a stage."""
-
-    number: int
-
-
-def test_a_stage_comes_back_with_its_files_or_not_at_all(tmp_path: Path) -> None:
-    (tmp_path / "clip.flac").write_bytes(b"fLaC")
-    files = {"clips/clip.flac": tmp_path / "clip.flac"}
-    save_checkpoint(tmp_path / "stage", "key", Facts(7), {"a": np.arange(3)}, files)
-    found = load_checkpoint(tmp_path / "stage", Facts, "key")
-    assert found.facts.number == 7 and found.arrays["a"].tolist() == [0, 1, 2]
-    assert [path.read_bytes() for path in found.files.values()] == [b"fLaC"]
-    with pytest.raises(MapError, match="another recording"):
-        load_checkpoint(tmp_path / "stage", Facts, "other")
-    found.files["clips/clip.flac"].unlink()
-    with pytest.raises(MapError, match="is missing"):
-        load_checkpoint(tmp_path / "stage", Facts, "key")
 
 
 def test_a_map_comes_back_with_all_that_it_is_of(built: Path) -> None:

@@ -36,13 +36,12 @@ from avlmaps.days.surfaces import Occupied, resampled
 from avlmaps.maps.build import require_place
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.sources.find import carry_evidence
-from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.edits import Edit, World, carried_edits, read_edits, write_edits
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.life import PEOPLE, Life
 from avlmaps.maps.store.manifest import Counts, MapBounds, MapInfo, RecordingInfo, RigInfo, Timings, Visit
 from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.store.tables import EDITING, lock_folder
+from avlmaps.maps.store.tables import EDITING, key_of, lock_folder
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Voxels
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Thing

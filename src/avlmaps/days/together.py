@@ -2,6 +2,7 @@
 
 import secrets
 import shutil
+import socket
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -9,16 +10,14 @@ from pathlib import Path
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import user_path
-from avlmaps.core.progress import progress, say
+from avlmaps.core.progress import progress, say, silence_progress
 from avlmaps.days.merge import merge_maps, merged_key
 from avlmaps.maps.build import build_map, require_place
 from avlmaps.maps.cluster import (
     ClusterWorkers,
-    JobResult,
     Models,
     Pool,
     Reopen,
-    done_by,
     reopened,
     require_same_software,
     software,
@@ -80,18 +79,16 @@ def build_together(
     return merge_in_turn([AVLMap.open(path) for path in paths], folder, out, overwrite=overwrite)
 
 
-def build_job(job: BuildJob) -> JobResult:
+def build_job(job: BuildJob) -> None:
     """Build the map of one recording on a worker."""
-
-    def work(host: str) -> None:
+    host = socket.gethostname()
+    with silence_progress():
         require_same_software(job.software, host)
         if not job.token.is_file():
             raise unseen(f"The worker on {host}", job.token.parent)
         recording = reopened(job.reopen, host)
         build_map(recording, job.path, job.models.encoders(), job.settings, cache=job.models.cache, allow=job.allow,
                   overwrite=job.overwrite)  # fmt: skip
-
-    return done_by(work)
 
 
 def _build_each(
@@ -115,8 +112,8 @@ def _build_each(
             for reopen, path in zip(recordings, paths, strict=True)
         ]
         with closing(pool.run(build_job, jobs)) as results:
-            for _, result in progress(results, "building", total=len(jobs), unit="recording"):
-                result.require()
+            for _ in progress(results, "building", total=len(jobs), unit="recording"):
+                pass
     finally:
         token.unlink(missing_ok=True)
 

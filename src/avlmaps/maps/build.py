@@ -18,7 +18,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
 from avlmaps.maps.check import doubts_of
 from avlmaps.maps.estimate import Start
-from avlmaps.maps.frame_sums import bad_frames, is_stored, load_state, save_state
+from avlmaps.maps.frame_sums import bad_frames, load_state, save_state
 from avlmaps.maps.gravity.floor import GroundedRecording
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.perceived import encode_pixels
@@ -43,7 +43,7 @@ class Workers(Protocol):
     """Who maps stretches of a recording: a cluster."""
 
     def map_spans(self, plan: BuildPlan, start: Start, jobs: dict[Path, Span]) -> Iterator[Path]:
-        """Store what each stretch of frames brings in its folder (``map_span``); yield each that is done."""
+        """Store what each stretch of frames brings in its file (``map_span``); yield each that is done."""
         ...
 
 
@@ -93,8 +93,8 @@ def build_map(
                 recording, plan.settings, plan.encoders, start, plan.keyframes, plan.key, doubts
             )
             mapper.began_s = began_s
-            for folder in plan.spans():
-                mapper.add_state(load_state(folder, plan.key))
+            for file in plan.spans():
+                mapper.add_state(load_state(file))
             made = mapper.finish()
             require_unchanged(plan, stamp)
             write(plan.path, made)
@@ -111,12 +111,12 @@ def require_place(path: Path, overwrite: bool) -> None:
         )
 
 
-def map_span(plan: BuildPlan, start: Start, frames: Iterable[EncodedFrame], folder: Path) -> None:
+def map_span(plan: BuildPlan, start: Start, frames: Iterable[EncodedFrame], file: Path) -> None:
     """Map a stretch of frames and store what it brings.
 
     Raises:
         BackendError: an encoder failed.
-        MapError: the folder cannot be written.
+        MapError: the file cannot be written.
     """
     mapper = Mapper.of_recording(plan.recording, plan.settings, plan.encoders, start, plan.keyframes)
     for frame, features in frames:
@@ -124,7 +124,7 @@ def map_span(plan: BuildPlan, start: Start, frames: Iterable[EncodedFrame], fold
             mapper.leave_out(frame.index, frame.why)
         else:
             mapper.add(frame, features, encode=False)
-    save_state(folder, plan.key, mapper.state())
+    save_state(file, plan.key, mapper.state())
 
 
 def spans_of_frames(plan: BuildPlan, start: Start, spans: Sequence[Span]) -> Generator[EncodedFrame]:
@@ -138,24 +138,24 @@ def spans_of_frames(plan: BuildPlan, start: Start, spans: Sequence[Span]) -> Gen
 
 def _map_frames(plan: BuildPlan, start: Start, workers: Workers | None) -> None:
     spans, step = plan.spans(), plan.settings.frames.step
-    jobs = {folder: span for folder, span in spans.items() if not is_stored(folder, plan.key)}
-    bad = sum(len(bad_frames(folder, plan.key)) for folder in spans if folder not in jobs)
-    tolerance = _Tolerance(plan, bad)
+    known = {file: bad_frames(file, plan.key) for file in spans}
+    jobs = {file: span for file, span in spans.items() if known[file] is None}
+    tolerance = _Tolerance(plan, sum(len(bad or ()) for bad in known.values()))
     total = len(range(0, len(plan.recording), step))
     done = total - sum(len(range(*span)) for span in jobs.values())
     if not jobs:
         return
     if workers is not None:
         ended = workers.map_spans(plan, start, jobs)
-        for folder in progress(ended, "fusing", total=total, done=done, size=lambda at: len(range(*jobs[at]))):
-            for one in bad_frames(folder, plan.key):
+        for file in progress(ended, "fusing", total=total, done=done, size=lambda at: len(range(*jobs[at]))):
+            for one in bad_frames(file, plan.key) or ():
                 tolerance.meet(one)
         return
     with closing(spans_of_frames(plan, start, list(jobs.values()))) as ahead:
         note = lambda: cache_note(plan.encoders, Kind.PIXELS)  # noqa: E731
         seen = tolerance.watch(progress(ahead, "fusing", total=total, done=done, note=note))
-        for folder, span in jobs.items():
-            map_span(plan, start, islice(seen, len(range(*span))), folder)
+        for file, span in jobs.items():
+            map_span(plan, start, islice(seen, len(range(*span))), file)
         for _ in seen:  # nothing is left; this completes the bar
             pass
 

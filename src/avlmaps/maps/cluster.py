@@ -1,14 +1,14 @@
-"""A build on a cluster: each stretch of frames is a job, whose result any machine stores on the storage they share.
+"""A build on a Ray cluster: a task of a ``Mapper`` for each stretch of frames, whose states add up.
 
 A worker opens the recording and makes the build's plan itself, of what it sees, its own code and its own weights, and
-refuses to work where that plan is another one. What it makes is stored beside and renamed when it is whole: a worker
-that dies leaves nothing that counts, and two that do the same job leave one result.
+refuses to work where that plan is another one. A state is written in one step on storage that all share: a worker that
+dies leaves nothing that counts, and two that do the same leave one result. Ray moves tasks by its own serialisation,
+which trusts everybody in the cluster; a cluster of this machine alone listens on the loopback interface.
 """
 
 import hashlib
 import importlib
 import os
-import secrets
 import shutil
 import socket
 import subprocess
@@ -22,7 +22,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Protocol, Self, TypeVar
 
-from avlmaps.core.errors import AvlmapsError, BackendError, MapError, RecordingError
+from avlmaps.core.errors import AvlmapsError, BackendError, MapError
 from avlmaps.core.extras import install_command
 from avlmaps.core.machine import is_loopback, usable_cores
 from avlmaps.core.progress import silence_progress
@@ -32,8 +32,6 @@ from avlmaps.maps.build import map_span, spans_of_frames
 from avlmaps.maps.estimate import Start
 from avlmaps.maps.plan import BuildPlan, Span, make_plan
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.checkpoints import DONE
-from avlmaps.maps.store.tables import explain_write_errors
 from avlmaps.perception.cache.cached_encoders import with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.encoders import Encoders
@@ -51,7 +49,7 @@ _STORE_BYTES = 100_000_000  # jobs are small values: Ray's store of objects stay
 
 
 class RayPool:
-    """A pool for ``Spread``; to be used as a context."""
+    """A Ray cluster, while the context lasts: one that runs already, or one of this machine's cores."""
 
     def __init__(self, address: str = "", *, cores: int = 0, wait_s: float = WAIT_S) -> None:
         """Name a cluster; it is met when the context begins.
@@ -73,8 +71,9 @@ class RayPool:
             MapError: the address is none, does not answer, or is of another Ray.
         """
         place = _host_and_port(self._address)
-        for name, value in _environment(place).items():
-            os.environ.setdefault(name, value)
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        if place is None or is_loopback(place[0]):  # Ray named it for the systems that needed loopback alone first
+            os.environ.setdefault("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")
         try:
             self._ray = importlib.import_module("ray")
         except ImportError:
@@ -85,7 +84,7 @@ class RayPool:
             return self
         self._began = True
         try:
-            self._start() if place is None else self._join(*place)
+            self._begin() if place is None else self._join(*place)
         except BaseException:
             self.__exit__()
             raise
@@ -130,25 +129,20 @@ class RayPool:
         try:
             return self._ray.get(done)
         except faults.RayTaskError as fault:
-            missing = _last_line(fault.cause)  # of a job that could not be read it is Ray's own error that says it
-            if not isinstance(fault.cause, ImportError | faults.RaySystemError):
+            if isinstance(fault.cause, AvlmapsError):
+                raise fault.cause from None
+            if not isinstance(fault.cause, ImportError | faults.RaySystemError):  # Ray's own says what it cannot read
                 raise
             raise MapError(
-                f"A worker cannot take the job, as it cannot import what is here ({missing}); install the same avlmaps "
-                "on all machines of the cluster."
+                f"A worker cannot take the job, as it cannot import what is here ({_lines(fault.cause)[-1]}); install "
+                "the same avlmaps on all machines of the cluster."
             ) from None
         except (faults.RayError, MemoryError) as fault:
             raise MapError(
                 f"A job of the build was given up, after its worker died {MOST_DEATHS + 1} times "
-                f"({_first_line(fault)}); give the machines more memory, then run the same build again: the finished "
+                f"({_lines(fault)[0]}); give the machines more memory, then run the same build again: the finished "
                 "parts are stored."
             ) from None
-
-    def _start(self) -> None:
-        self.folder = tempfile.mkdtemp(prefix="avlmaps-ray-")
-        self._init(
-            num_cpus=self._cores, object_store_memory=_STORE_BYTES, _node_ip_address="127.0.0.1", _temp_dir=self.folder
-        )
 
     def _join(self, host: str, port: int) -> None:
         """Join the cluster of an address; Ray itself would try for a quarter of an hour where something else answers.
@@ -174,28 +168,22 @@ class RayPool:
                 f"{_HEALTH * self._wait_s:g} s; check the address, and where the cluster asks for a token, set "
                 "RAY_AUTH_MODE=token here."
             )
-        self._init(address=self._address)
+        remedy = "This machine must be part of the cluster, with the same Ray and Python as the others."
+        self._init(f"the Ray cluster at {self._address}", remedy, address=self._address)
 
-    def _init(self, **how: Any) -> None:
+    def _begin(self) -> None:
+        self.folder = tempfile.mkdtemp(prefix="avlmaps-ray-")
+        where = "a Ray cluster on this machine", "Try again when the machine is less busy, or build without a cluster."
+        self._init(
+            *where, include_dashboard=False, num_cpus=self._cores, object_store_memory=_STORE_BYTES,
+            _node_ip_address="127.0.0.1", _temp_dir=self.folder,
+        )  # fmt: skip
+
+    def _init(self, where: str, remedy: str, **how: Any) -> None:
         try:
-            self._ray.init(include_dashboard=None if "address" in how else False, log_to_driver=False,
-                           logging_level="ERROR", **how)  # fmt: skip
+            self._ray.init(log_to_driver=False, logging_level="ERROR", **how)
         except Exception as fault:  # noqa: BLE001 - Ray raises plain ones, among many others, where it cannot begin
-            where = f"the Ray cluster at {self._address}" if "address" in how else "a Ray cluster on this machine"
-            remedy = (
-                "This machine must be part of the cluster, with the same Ray and Python as the others."
-                if "address" in how
-                else "Try again when the machine is less busy, or build without a cluster."
-            )
-            raise MapError(f"Could not use {where}: {_first_line(fault).rstrip('.')}. {remedy}") from None
-
-
-def _environment(place: tuple[str, int] | None) -> dict[str, str]:
-    quiet = {"RAY_USAGE_STATS_ENABLED": "0"}
-    if place is not None and not is_loopback(place[0]):
-        return quiet
-    # Whether Ray may listen on other interfaces than loopback; Ray named it for the systems that needed it first.
-    return {**quiet, "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
+            raise MapError(f"Could not use {where}: {_lines(fault)[0].rstrip('.')}. {remedy}") from None
 
 
 def _host_and_port(address: str) -> tuple[str, int] | None:
@@ -207,12 +195,8 @@ def _host_and_port(address: str) -> tuple[str, int] | None:
     return host.strip("[]"), int(port)
 
 
-def _first_line(fault: BaseException) -> str:
-    return next((line.strip() for line in str(fault).splitlines() if line.strip()), type(fault).__name__)
-
-
-def _last_line(fault: BaseException) -> str:
-    return next((line.strip() for line in reversed(str(fault).splitlines()) if line.strip()), type(fault).__name__)
+def _lines(fault: BaseException) -> list[str]:
+    return [line.strip() for line in str(fault).splitlines() if line.strip()] or [type(fault).__name__]
 
 
 Reopen = Callable[[], Recording]
@@ -270,7 +254,7 @@ class Models:
 
 @dataclass(frozen=True, slots=True)
 class SpanJob:
-    """A stretch of frames whose state is to be stored in a folder, and by what a worker knows that it sees the same."""
+    """A stretch of frames whose state is to be stored in a file, and by what a worker knows that it sees the same."""
 
     reopen: Reopen
     path: Path
@@ -278,25 +262,9 @@ class SpanJob:
     settings: BuildSettings
     start: Start
     span: Span
-    folder: Path
+    file: Path
     key: str
     software: dict[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class JobResult:
-    """What became of a job: the class and the sentence of the error that a user can fix, empty for none."""
-
-    error: str = ""
-    why: str = ""
-
-    def require(self) -> None:
-        """Raise the error again on this side."""
-        if self.error:
-            raise _ERRORS.get(self.error, MapError)(self.why)
-
-
-_ERRORS: dict[str, type[AvlmapsError]] = {one.__name__: one for one in (BackendError, MapError, RecordingError)}
 
 
 class ClusterWorkers:
@@ -314,64 +282,37 @@ class ClusterWorkers:
             BackendError: it has other weights, or lacks a model.
         """
         models, path, known = Models.of(plan.encoders, self._cache), plan.path.absolute(), software()
-        folders = [folder.absolute() for folder in jobs]
         orders = [
-            SpanJob(self._reopen, path, models, plan.settings, start, span, folder, plan.key, known)
-            for folder, span in zip(folders, jobs.values(), strict=True)
+            SpanJob(self._reopen, path, models, plan.settings, start, span, file.absolute(), plan.key, known)
+            for file, span in jobs.items()
         ]
-        with closing(self._pool.run(span_job, orders)) as results:
-            for number, result in results:
-                result.require()
-                if not (folders[number] / DONE).is_file():
+        with closing(self._pool.run(span_job, orders)) as done:
+            for number, _ in done:
+                if not orders[number].file.is_file():
                     raise unseen("A worker", path)
                 yield list(jobs)[number]
 
 
-def span_job(job: SpanJob) -> JobResult:
+def span_job(job: SpanJob) -> None:
     """Map a stretch of frames on a worker."""
-
-    def work(host: str) -> None:
-        plan, attempt = _plan_of(job, host), job.folder.with_name(f"{job.folder.name}.{secrets.token_hex(4)}")
-        try:
-            with closing(spans_of_frames(plan, job.start, [job.span])) as frames:
-                map_span(plan, job.start, frames, attempt)
-            with explain_write_errors(job.folder), suppress(OSError):  # another worker was taken for dead, and did it
-                attempt.rename(job.folder)
-        finally:
-            shutil.rmtree(attempt, ignore_errors=True)
-
-    return done_by(work)
+    with silence_progress():
+        plan = _plan_of(job, socket.gethostname())
+        with closing(spans_of_frames(plan, job.start, [job.span])) as frames:
+            map_span(plan, job.start, frames, job.file)
 
 
-def done_by(work: Callable[[str], None]) -> JobResult:
-    """Do a job, of the worker's name, and return what became of it; errors of users become values."""
-    try:
-        with silence_progress():
-            work(socket.gethostname())
-    except AvlmapsError as fault:
-        return JobResult(type(fault).__name__, str(fault))
-    return JobResult()
-
-
-_known: dict[str, BuildPlan] = {}  # the last plan that this worker made, by its key
+_known: dict[str, BuildPlan] = {}  # of this worker: that of the build that it works for
 
 
 def _plan_of(job: SpanJob, host: str) -> BuildPlan:
-    """Return the plan of the build, made from what this worker sees, once.
-
-    Raises:
-        MapError: it sees another recording, or computes by other software or weights.
-    """
     if job.key not in _known:
         require_same_software(job.software, host)
-        recording = reopened(job.reopen, host)  # first: it may register what its models are
-        encoders = with_cache(job.models.encoders(), job.models.cache)
+        recording, encoders = reopened(job.reopen, host), with_cache(job.models.encoders(), job.models.cache)
         plan = make_plan(recording, job.path, encoders, job.settings)
         if plan.key != job.key:
             raise MapError(
-                f"The worker on {host} would build another map: its recording, its sound track or its models are not "
-                "those of this machine. The recording must lie on storage that all machines of the cluster share, and "
-                "the same models must be on all."
+                f"The worker on {host} would build another map: it sees another recording or other weights than this "
+                "machine; the same files and the same models must be on all."
             )
         _known.clear()
         _known[job.key] = plan

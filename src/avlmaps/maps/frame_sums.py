@@ -1,15 +1,17 @@
 """What some frames brought to a map: their sums, where they saw freely, their submap; and that in a folder."""
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float64, Int32, UInt16
 from avlmaps.core.columns import concat
-from avlmaps.core.errors import BackendError
+from avlmaps.core.errors import BackendError, MapError
+from avlmaps.core.files import decode_json
 from avlmaps.core.registry import Kind
 from avlmaps.maps.audio.events import WalkedTrack
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
@@ -20,8 +22,8 @@ from avlmaps.maps.fusion.voxel_sums import VoxelSums, features_alone
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pose_correction import PoseCorrection, moved_frame
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.checkpoints import find_checkpoint, load_checkpoint, save_checkpoint
 from avlmaps.maps.store.manifest import BadFrame
+from avlmaps.maps.store.tables import as_kind, explain_write_errors, fields_of, read_arrays, write_arrays
 from avlmaps.maps.types import Keyframes, Submaps
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.memory import MemoryRecording
@@ -49,46 +51,42 @@ class MapState:
     bad: tuple[BadFrame, ...]
 
 
-class _Facts(msgspec.Struct):
+class _Note(msgspec.Struct):
+    key: str
     bad: tuple[BadFrame, ...]
 
 
 _KINDS = {"sums": VoxelSums, "views": FreeViews, "keyframes": Keyframes}
 
 
-def save_state(folder: Path, key: str, state: MapState) -> None:
+def save_state(file: Path, key: str, state: MapState) -> None:
     """Store a state; a kill at any instant leaves all of it or none. ``key`` is the hash of all it depends on."""
     arrays = {"stamp_s": state.stamp_s, "pose": state.pose}
-    for name, kind in _KINDS.items():
-        arrays |= {f"{name}_{one.name}": getattr(getattr(state, name), one.name) for one in fields(kind)}
-    save_checkpoint(folder, key, _Facts(state.bad), arrays)
+    for name in _KINDS:
+        arrays |= fields_of(getattr(state, name), f"{name}.")
+    with explain_write_errors(file):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_arrays(file, arrays, msgspec.json.encode(_Note(key, state.bad)).decode())
 
 
-def load_state(folder: Path, key: str) -> MapState:
+def load_state(file: Path) -> MapState:
     """Read a state; its large arrays stay on the disk until they are used.
 
     Raises:
-        MapError: there is none, or it is damaged or of another key.
+        MapError: there is none, or it is damaged.
     """
-    found = load_checkpoint(folder, _Facts, key)
-
-    def part(name: str) -> dict[str, np.ndarray]:
-        return {one.name: found.arrays[f"{name}_{one.name}"] for one in fields(_KINDS[name])}
-
-    return MapState(
-        VoxelSums(**part("sums")), FreeViews(**part("views")), Keyframes(**part("keyframes")),
-        found.arrays["stamp_s"], found.arrays["pose"], found.facts.bad,
-    )  # fmt: skip
+    arrays, note = read_arrays(file)
+    parts: list[Any] = [as_kind(kind, arrays, file, f"{name}.") for name, kind in _KINDS.items()]
+    return MapState(*parts, arrays["stamp_s"], arrays["pose"], decode_json(note.encode(), _Note).bad)
 
 
-def is_stored(folder: Path, key: str) -> bool:
-    """Return whether there is a state of this key; what is left of a broken one is removed."""
-    return find_checkpoint(folder, _Facts, key) is not None
-
-
-def bad_frames(folder: Path, key: str) -> tuple[BadFrame, ...]:
-    """Return the frames that a stored state leaves out."""
-    return load_checkpoint(folder, _Facts, key).facts.bad
+def bad_frames(file: Path, key: str) -> tuple[BadFrame, ...] | None:
+    """Return the frames that a stored state leaves out; None where no whole state of this key is stored."""
+    try:
+        note: _Note = decode_json(read_arrays(file)[1].encode(), _Note)
+    except (MapError, msgspec.DecodeError):
+        return None
+    return note.bad if note.key == key else None
 
 
 class Walked:

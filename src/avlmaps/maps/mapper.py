@@ -45,9 +45,9 @@ from avlmaps.maps.perceived import encode_pixels, require_unit
 from avlmaps.maps.plan import BUILD_VERSION, models_of
 from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings
-from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.manifest import BadFrame, Timings
 from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.store.tables import key_of
 from avlmaps.maps.types import Submaps
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.memory import next_of

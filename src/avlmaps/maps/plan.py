@@ -12,9 +12,9 @@ from avlmaps.core.progress import say
 from avlmaps.core.wording import option
 from avlmaps.maps.keyframes.choose import keyframes_by_motion
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.checkpoints import key_of, remove_stages
-from avlmaps.maps.store.folder import PARTS, is_map_or_free, read_info, sweep
+from avlmaps.maps.store.folder import PARTS, is_map_or_free, read_info, remove_parts, sweep
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo
+from avlmaps.maps.store.tables import SUFFIX, key_of
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.formats.file_recording import LARGEST_BUDGET_BYTES
 from avlmaps.recordings.types import Recording
@@ -47,13 +47,14 @@ class BuildPlan:
     keyframes: frozenset[int]
 
     def spans(self) -> dict[Path, Span]:
-        """Return the stretches of frames that are fused one after the other, by the folders of what they bring."""
+        """Return the stretches of frames that are fused one after the other, by the files of what they bring."""
         count, step = len(self.recording), self.settings.frames.step
         stride = self.settings.frames.summed * step
         key = key_of("frames", self.key, self.recording.base_height)
         home = self.path / PARTS / f"frames-{key[:12]}"
         return {
-            home / f"{start:08d}": (start, min(start + stride, count), step) for start in range(0, count, stride)
+            home / f"{start:08d}{SUFFIX}": (start, min(start + stride, count), step)
+            for start in range(0, count, stride)
         }  # fmt: skip
 
 
@@ -132,7 +133,7 @@ def claim(plan: BuildPlan, resume: bool, overwrite: bool) -> MapInfo | None:
         sweep(plan.path, there)
         return there
     if not resume:
-        remove_stages(plan.path / PARTS)
+        remove_parts(plan.path)
     return None
 
 
@@ -146,7 +147,7 @@ def require_unchanged(plan: BuildPlan, stamp: str) -> None:
     """
     if plan.recording.change_stamp() == stamp:
         return
-    remove_stages(plan.path / PARTS)
+    remove_parts(plan.path)
     raise MapError(
         f"Files of {plan.recording.path} were written while it was mapped, so that the map would be of two recordings; "
         "run the same build again when it is complete."

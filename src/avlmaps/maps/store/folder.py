@@ -5,6 +5,7 @@ files go. So a kill at any instant leaves the old map or the new one.
 """
 
 import re
+import shutil
 from collections.abc import Container, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -28,7 +29,6 @@ from avlmaps.core.files import (
 )
 from avlmaps.core.words import near_path
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.store.checkpoints import remove_stages, stage_folders
 from avlmaps.maps.store.edits import EDITS
 from avlmaps.maps.store.life import life_arrays, read_life
 from avlmaps.maps.store.manifest import SCHEMA_VERSION, MapInfo
@@ -119,6 +119,7 @@ def _array(path: Path, size: int) -> np.ndarray:
 
 MANIFEST = "map.json"
 PARTS = "parts"
+_PART = re.compile(r"[a-z_]+-[0-9a-f]{12}|clips|clips\.unfinished")  # the folders that builds make there
 SECTIONS = ("voxels", "keyframes", "sounds")
 NAMES = "names"  # what was found by the names of the encoders; a map may lack it
 CLIPS = "clips"
@@ -264,7 +265,22 @@ def sweep(path: Path, info: MapInfo) -> None:
     for section in (CLIPS, *_OLD_SECTIONS):
         with suppress(OSError):
             (path / section).rmdir()
-    remove_stages(path / PARTS)
+    remove_parts(path)
+
+
+def _parts(path: Path) -> list[Path]:
+    parts = path / PARTS
+    if parts.is_symlink() or not parts.is_dir():
+        return []
+    return [entry for entry in parts.iterdir() if _PART.fullmatch(entry.name) and entry.is_dir()]
+
+
+def remove_parts(path: Path) -> None:
+    """Remove what a build stored of a map that it had not finished."""
+    for folder in _parts(path):
+        shutil.rmtree(folder, ignore_errors=True)
+    with suppress(OSError):
+        (path / PARTS).rmdir()
 
 
 def is_map_or_free(path: Path) -> bool:
@@ -274,7 +290,7 @@ def is_map_or_free(path: Path) -> bool:
     if not path.is_dir():
         return False
     names = {entry.name for entry in path.iterdir()}
-    if MANIFEST in names or any(stage_folders(path / PARTS)):
+    if MANIFEST in names or any(_parts(path)):
         return True
     names = {name for name in names if not (_TABLE.fullmatch(name) or _PARTIAL.fullmatch(name))}
     if not names <= {EDITS, PARTS, CLIPS, LOCK, EDITING}:

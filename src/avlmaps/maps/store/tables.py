@@ -2,6 +2,7 @@
 
 import dataclasses
 import errno
+import hashlib
 import mmap
 import os
 import re
@@ -127,6 +128,11 @@ def _array(content: mmap.mmap, begin: int, entry: Mapping[str, Any]) -> np.ndarr
         return np.zeros(shape, kind)
     array = np.frombuffer(content, kind, count, at).reshape(shape)
     return array.copy() if array.nbytes <= _SMALL_BYTES else array
+
+
+def key_of(*ingredients: Any) -> str:
+    """Return the hex SHA-256 of numbers, words, dataclasses, structs, and lists and dictionaries of them."""
+    return hashlib.sha256(msgspec.json.encode(ingredients, order="deterministic")).hexdigest()
 
 
 def sync_file(path: Path) -> None:

@@ -22,7 +22,6 @@ from avlmaps.maps.fusion.kernels import SHARP_UNITS
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.folder import PARTS, is_map_or_free, read_info, write
 from avlmaps.maps.store.manifest import (
     Counts,
@@ -33,7 +32,7 @@ from avlmaps.maps.store.manifest import (
     UpInfo,
 )
 from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.store.tables import lock_folder
+from avlmaps.maps.store.tables import key_of, lock_folder
 from avlmaps.maps.types import Voxels
 from avlmaps.query.avlmap import AVLMap
 from avlmaps_models.import_reference.frames import Walk, read_walk
