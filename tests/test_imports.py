@@ -1,132 +1,51 @@
-"""No module imports itself by way of others: neither at run time nor for types."""
+"""No module imports itself by way of others, whenever the import is carried out, types included."""
 
 import ast
 from collections import Counter
 from collections.abc import Iterator
-from enum import StrEnum
-from functools import cache
 from pathlib import Path
 
-import pytest
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 ROOT = Path(__file__).parents[1]
-SOURCES = (ROOT / "src", *sorted(ROOT.glob("packages/*/src")))
 
 
-class When(StrEnum):
-    """When an import is carried out."""
-
-    LOADED = "when the module is loaded"
-    CALLED = "when a function is called"
-    TYPED = "for the type checker"
-
-
-def modules(*sources: Path) -> dict[str, Path]:
+def modules() -> dict[str, Path]:
     found: dict[str, Path] = {}
-    for src in sources:
-        for path in sorted(src.rglob("*.py")):
-            parts = path.relative_to(src).with_suffix("").parts
+    for source in (ROOT / "src", *ROOT.glob("packages/*/src")):
+        for path in source.rglob("*.py"):
+            parts = path.relative_to(source).with_suffix("").parts
             found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return found
 
 
-def imports(tree: ast.AST, package: str, when: When = When.LOADED) -> Iterator[tuple[When, str, str]]:
-    """Yield when each import is carried out, the module that it names, and the name that it takes from there."""
-    for node in ast.iter_child_nodes(tree):
+def imports(path: Path) -> Iterator[str]:
+    """Yield what a file imports: a module, or a name of one."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from ((when, alias.name, "") for alias in node.names)
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            above = package.split(".")[: len(package.split(".")) + 1 - node.level] if node.level else []
-            yield from ((when, ".".join([*above, node.module or ""]).strip("."), alias.name) for alias in node.names)
-        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
-            yield from imports(ast.Module(node.body, []), package, When.TYPED)
-            yield from imports(ast.Module(node.orelse, []), package, when)
-        else:
-            inside = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-            yield from imports(node, package, When.CALLED if inside and when is When.LOADED else when)
+            assert node.level == 0, f"{path}: imports here are absolute"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def import_graph(*sources: Path) -> dict[str, set[tuple[When, str]]]:
-    """Return for each module which others of the package it imports, and when."""
-    every = modules(*sources)
-    graph: dict[str, set[tuple[When, str]]] = {}
-    for name, path in every.items():
-        package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-        graph[name] = set()
-        for when, base, taken in imports(ast.parse(path.read_text(encoding="utf-8")), package):
-            target = f"{base}.{taken}" if f"{base}.{taken}" in every else base
-            if target in every and target != name:
-                graph[name].add((when, target))
-    return graph
-
-
-def circles(graph: dict[str, set[str]]) -> list[list[str]]:
-    """Return the groups of modules that reach one another (Tarjan's strongly connected components)."""
-    order: dict[str, int] = {}
-    low: dict[str, int] = {}
-    stack: list[str] = []
-    found: list[list[str]] = []
-
-    def visit(name: str) -> None:
-        order[name] = low[name] = len(order)
-        stack.append(name)
-        for other in sorted(graph[name]):
-            if other not in order:
-                visit(other)
-                low[name] = min(low[name], low[other])
-            elif other in stack:
-                low[name] = min(low[name], order[other])
-        if low[name] == order[name]:
-            group = stack[stack.index(name) :]
-            del stack[stack.index(name) :]
-            if len(group) > 1:
-                found.append(sorted(group))
-
-    for name in graph:
-        if name not in order:
-            visit(name)
-    return sorted(found)
-
-
-@cache
-def own_graph() -> dict[str, set[tuple[When, str]]]:
-    return import_graph(*SOURCES)
-
-
-@pytest.mark.parametrize(
-    "counted",
-    [{When.LOADED}, {When.LOADED, When.CALLED}, {When.LOADED, When.TYPED}, set(When)],
-    ids=["loaded", "and-called", "and-typed", "all"],
-)
-def test_there_is_no_circle_of_imports(counted: set[When]) -> None:
-    graph = {name: {other for when, other in others if when in counted} for name, others in own_graph().items()}
-    assert circles(graph) == []
-
-
-def test_a_circle_is_found_whenever_its_imports_are_carried_out(tmp_path: Path) -> None:
-    package = tmp_path / "house"
-    package.mkdir()
-    (package / "__init__.py").write_text("")
-    (package / "attic.py").write_text("from house import cellar\n")
-    (package / "cellar.py").write_text("def stairs():\n    from house.hall import door\n")
-    (package / "hall.py").write_text(
-        "import typing\nif typing.TYPE_CHECKING:\n    from .attic import roof\nelse:\n    import house.attic\n"
-    )
-    graph = import_graph(tmp_path)
-    assert graph["house.attic"] == {(When.LOADED, "house.cellar")}
-    assert graph["house.cellar"] == {(When.CALLED, "house.hall")}
-    assert graph["house.hall"] == {(When.TYPED, "house.attic"), (When.LOADED, "house.attic")}
-    everything = {name: {other for _, other in others} for name, others in graph.items()}
-    assert circles(everything) == [["house.attic", "house.cellar", "house.hall"]]
-    loaded = {name: {other for when, other in others if when is When.LOADED} for name, others in graph.items()}
-    assert circles(loaded) == []
-
-
-def test_all_distributions_are_read() -> None:
-    graph = own_graph()
-    assert len(graph) > 300
-    assert {name.partition(".")[0] for name in graph} == {"avlmaps", "avlmaps_sim", "avlmaps_models", "avlmaps_ros"}
-    assert (When.LOADED, "avlmaps.query.goals") in graph["avlmaps.query.heatmap"]
+def test_there_is_no_circle_of_imports() -> None:
+    every = modules()
+    number = {name: at for at, name in enumerate(every)}
+    pairs = [
+        (name, target if target in every else target.rpartition(".")[0])
+        for name, path in every.items()
+        for target in imports(path)
+    ]
+    edges = [(number[name], number[other]) for name, other in pairs if other in every and other != name]
+    assert len(edges) > 1000
+    row, column = np.array(edges).T
+    graph = csr_array((np.ones(len(edges)), (row, column)), (len(every), len(every)))
+    _, group = connected_components(graph, directed=True, connection="strong")
+    circles = {label for label, size in Counter(group.tolist()).items() if size > 1}
+    assert [name for name, label in zip(every, group.tolist(), strict=True) if label in circles] == []
 
 
 def test_no_two_files_of_tests_have_one_name_where_their_folders_are_no_packages() -> None:
