@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.cli.process import models_in_force
+from avlmaps.cli.main import _models_in_force as models_in_force
 from avlmaps.cli.query import Query
 from avlmaps.core.extras import install_command
 from avlmaps.core.registry import Backend, Kind, find, forget_loaded

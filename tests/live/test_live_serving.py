@@ -12,7 +12,7 @@ import pytest
 from live_frames import ENCODERS, UP, add, frame, recorded, wait_for, within
 from starlette.testclient import TestClient
 
-from avlmaps.cli.live_serving import LiveFeed, live_source
+from avlmaps.cli.live import LiveFeed, live_source
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.store.folder import read

@@ -1,25 +1,25 @@
-"""`avlmaps build`: build a map from a recording."""
+"""`avlmaps build` and `calibrate`: a map from a recording, and where the microphones of its robot are."""
 
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from avlmaps.cli.info import describe_map, info_lines
-from avlmaps.cli.output import UsageError, emit
-from avlmaps.cli.verb import ModelVerb, Reading, topics_of
+from avlmaps.cli.output import UsageError, emit, table_lines
+from avlmaps.cli.verb import Building, Reading, Verb
 from avlmaps.core.files import user_path
 from avlmaps.core.progress import say
+from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Sequence
+    from collections.abc import Callable, Generator
 
     from avlmaps.maps.cluster import RayPool
-    from avlmaps.perception.encoders import Encoders
     from avlmaps.recordings.types import Recording
 
 
@@ -29,7 +29,7 @@ _OF_ONE_RECORDING = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Build(ModelVerb):
+class Build(Building):
     """Build a map from a recording. A build that was stopped resumes, and the map is the same.
 
     Example: avlmaps build REC --out kitchen.avlmap
@@ -37,20 +37,12 @@ class Build(ModelVerb):
     Example: avlmaps build REC --out kitchen.avlmap --profile foundation --model pixels=clip-patches views=clip
     """
 
-    compiles: ClassVar[bool] = True
-
     recording: Annotated[Positional[Path], arg(metavar="REC")]
     """Recording: our folder, a bag (or a folder of its parts), a phone's scan, a data set; docs/recordings.md lists
     all."""
     more: Annotated[Positional[tuple[Path, ...]], arg(metavar="[BAG ...]")] = ()
     """Further files of a bag that was split; with --ray, further recordings of the same place, in the order of their
     days, which are found in the first by their pictures (as `merge` does)."""
-    out: Annotated[Path, arg(metavar="MAP")]
-    """Map folder to write, by custom NAME.avlmap."""
-    profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
-    """Set of models (see `avlmaps profiles`)."""
-    model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
-    """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
     rules: Literal["ours", "paper"] = "ours"
     """Rules of mapping: ours, or the paper's with any models (docs/paper-models.md)."""
     batch: Annotated[int | None, arg(metavar="N")] = None
@@ -60,21 +52,8 @@ class Build(ModelVerb):
     cache folder), off, or a folder (all models)."""
     feature_cache_gb: Annotated[float, arg(metavar="GB")] = 20.0
     """Size of the feature cache, GB; the features unused for the longest time go first."""
-    voxel_size_m: Annotated[float, arg(metavar="METRES")] = 0.05
-    """Edge of a voxel, metres."""
-    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
-    """Format of the recording, if its files do not show it."""
     audio: Annotated[Path | None, arg(metavar="FILE")] = None
     """Sound file to use instead of the recording's own track."""
-    microphones: Annotated[Path | None, arg(metavar="FILE")] = None
-    """Places of the microphones instead of the recording's own: a JSON file, as `avlmaps calibrate` writes it."""
-    same_device: Annotated[Path | None, arg(metavar="MAP")] = None
-    """Map of an earlier recording with the same device that says directions: its offset is known from there."""
-    topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
-    """Topics of a ROS bag that their type does not identify: rgb=, depth=, pose= or audio=TOPIC; directions=TOPIC,
-    azimuths that a device says of sounds; or pose=FILE, a table of stamp tx ty tz qx qy qz qw."""
-    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
-    """What you know better than the recording's files."""
     submaps: bool = False
     """Store the sums of every 32 frames as well, so that the map can follow corrected poses later; it takes three to
     four times the room."""
@@ -108,15 +87,12 @@ class Build(ModelVerb):
     """Resume a stopped build. This is the default; the flag lets scripts say so."""
     fresh: bool = False
     """Start again; ignore the stages that a stopped build finished."""
-    overwrite: bool = False
-    """Replace a finished map at --out that was built from another recording or with other settings."""
     verbose: bool = False
     """Print every detail of the map."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of all random choices (visual words, RANSAC)."""
 
     def run(self) -> None:
-        """Build the map."""
         answer = build(self)
         lines = list(info_lines(answer, verbose=self.verbose))
         if (done := answer.get("corrected")) is not None:
@@ -149,7 +125,7 @@ def build(verb: "Build") -> dict[str, Any]:
         raise UsageError(
             f"The paper's rules use every depth as it is; leave out --sensor {verb.sensor} or --rules paper."
         )
-    used = choose_models(verb.profile, [word for words in verb.model for word in words])
+    used = verb.encoders()
     place = verb.feature_cache
     cache = CacheSettings(place if place in ("auto", "off") else user_path(place), verb.feature_cache_gb)
     openings = _openings(verb)
@@ -215,7 +191,7 @@ def _openings(verb: "Build") -> "list[Callable[[], Recording]]":
     """Return what opens each recording, here and on any machine that sees it at the same place."""
     from avlmaps.recordings.open import open_recording
 
-    files, topics = [verb.recording, *verb.more], topics_of(verb.topics)
+    files, topics = [verb.recording, *verb.more], verb.named_topics()
     audio, microphones, groups = verb.audio, verb.microphones, [files]
     if verb.ray is not None:  # a path that is relative means another place on another machine
         groups = [[path.absolute()] for path in files]
@@ -257,13 +233,91 @@ def _pool(verb: "Build") -> "Generator[RayPool | None]":
         yield pool
 
 
-def choose_models(name: str, words: "Sequence[str]") -> "Encoders":
-    """Return the encoders of a profile, with those of ``--model`` instead of some; ``UsageError`` for wrong words."""
-    from avlmaps.perception.encoders import encoders_of
-    from avlmaps.perception.profiles import profile, read_choices
+@dataclass(frozen=True, kw_only=True)
+class Calibrate(Verb):
+    """Refine where the microphones of a robot are and how late each channel is, from a drive past one still source.
 
-    try:
-        choices = read_choices(words)
-    except ValueError as problem:
-        raise UsageError(f"--model {problem}") from None
-    return encoders_of(profile(name).choosing(choices))
+    Let something tick or click at one place, and drive past it in curves, 1 to 3 m away, for half a minute. The
+    geometry that is given must be right within a few centimetres. The recording stays as it is.
+
+    Example: avlmaps calibrate REC --out array.json && avlmaps build REC --microphones array.json --out home.avlmap
+    """
+
+    recording: Annotated[Positional[Path], arg(metavar="REC")]
+    """Recording with an array, or with several channels and --microphones."""
+    out: Annotated[Path, arg(metavar="FILE")]
+    """File to write: the refined microphones, as --microphones and `microphones` of recording.json take them."""
+    microphones: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Geometry to begin with, instead of the recording's own."""
+    between: Annotated[tuple[float, float] | None, arg(metavar="BEGIN END")] = None
+    """Time when the one source sounds, seconds of the recording. Default: all of it."""
+    overwrite: bool = False
+    """Replace --out where it is there already."""
+    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
+    """Format of the recording, if its files do not show it."""
+    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
+    """What you know better than the recording's files."""
+
+    def run(self) -> None:
+        answer = calibrate_array(self)
+        rows = [
+            (str(number + 1), place_text(one["position_m"]), f"{100 * one['moved_m']:.1f} cm",
+             f"{100 * one['sd_m']:.2f} cm", f"{1e6 * one['delay_s']:.0f} µs")
+            for number, one in enumerate(answer["microphones"])
+        ]  # fmt: skip
+        heights = " Heights stay as given: this drive does not show them." if answer["held_heights"] else ""
+        lines = [
+            *table_lines(("channel", "place (robot's frame)", "moved", "known to", "late by"), rows),
+            f"source at {place_text(answer['source'])} ({answer['frame']} frame), {answer['measured_frames']} frames",
+            f"residual: {1e6 * answer['residual_before_s']:.0f} µs before, {1e6 * answer['residual_after_s']:.0f} µs "
+            f"after.{heights}",
+            *(f"channel {number} is wired the other way round; this is taken back" for number in answer["turned"]),
+            f"wrote {answer['out']}",
+        ]
+        emit(answer, lines, self.json)
+
+
+def calibrate_array(verb: "Calibrate") -> dict[str, Any]:
+    """Refine an array, write it, and describe it.
+
+    Raises:
+        RecordingError: the file is there already, or the array cannot be refined.
+    """
+    from avlmaps.core.errors import RecordingError
+    from avlmaps.core.poses import FRAME
+    from avlmaps.core.wording import option
+    from avlmaps.maps.sources.calibrate import calibrate
+    from avlmaps.recordings.microphones import write_microphones
+    from avlmaps.recordings.open import open_recording
+
+    if verb.out.exists() and not verb.overwrite:
+        raise RecordingError(
+            f"{verb.out} is there already; give another {option('out')}, or replace it with {option('overwrite')}."
+        )
+    recording = open_recording(
+        verb.recording, format=verb.format, microphones=verb.microphones, corrections=verb.reading.corrections()
+    )
+    if recording.audio is None:
+        raise RecordingError(f"{verb.recording} has no sound track, so that there is no array to calibrate.")
+    found = calibrate(recording.audio, recording.walk, verb.between)
+    write_microphones(verb.out, found.microphones)
+    array = found.microphones
+    late_s = [0.0] * len(array) if array.delay_s is None else array.delay_s.tolist()
+    return {
+        "recording": str(verb.recording),
+        "out": str(verb.out),
+        "microphones": [
+            {"position_m": at, "moved_m": moved, "sd_m": sd, "delay_s": late, "delay_sd_s": late_sd}
+            for at, moved, sd, late, late_sd in zip(
+                array.position_m.tolist(), found.moved_m.tolist(), found.place_sd_m.tolist(), late_s,
+                found.delay_sd_s.tolist(), strict=True,
+            )
+        ],
+        "held_heights": found.held_heights,
+        "turned": [channel + 1 for channel in found.turned],
+        "frame": FRAME,
+        "source": found.source_m.tolist(),
+        "measured_frames": found.frames,
+        "residual_before_s": found.before_s,
+        "residual_after_s": found.after_s,
+    }  # fmt: skip

@@ -9,9 +9,9 @@ from tyro.conf import arg
 
 from avlmaps.cli.output import UsageError, size_of
 from avlmaps.cli.verb import MapVerb, shown_in
-from avlmaps.core.poses import FrameName
 
 if TYPE_CHECKING:
+    from avlmaps.core.poses import FrameName
     from avlmaps.query.avlmap import AVLMap
 
 _SUFFIXES = (".ply", ".glb", ".pgm", ".csv", ".rrd", ".mcap", ".openlex3d")
@@ -57,19 +57,17 @@ class Export(MapVerb):
     """Replace a file that exists."""
 
     def run(self) -> None:
-        """Write the file."""
         self.require()
         super().run()
 
     def require(self) -> None:
-        """Refuse options that do not fit the format, and a file that is there."""
         kind = self.out.suffix.lower()
         _require_sense(self, kind)
         if kind != ".pgm":
             _require_new([self.out], self.overwrite)
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
-        """Write a map for other programs."""
+        from avlmaps.core.poses import FrameName
         from avlmaps.query.export import write_table
 
         self.require()
@@ -91,7 +89,6 @@ class Export(MapVerb):
         return {"map": str(self.map), "files": [str(path) for path in written], "frame": str(frame)}
 
     def lines(self, answer: Mapping[str, Any]) -> list[str]:
-        """Name what was written."""
         files = ", ".join(f"{name} ({size_of(Path(name).stat().st_size)})" for name in answer["files"])
         storeys = answer.get("storeys", [])
         several = [f"one grid for each storey of the map, lowest first: {', '.join(storeys)}"] * (len(storeys) > 1)
@@ -100,7 +97,6 @@ class Export(MapVerb):
 
 
 def _require_sense(verb: Export, kind: str) -> None:
-    """Refuse options that do not fit the format."""
     name = verb.out.name
     if kind not in _SUFFIXES:
         raise UsageError(f"--out takes a file that ends in {', '.join(_SUFFIXES)}; {name!r} does not.")
@@ -110,9 +106,9 @@ def _require_sense(verb: Export, kind: str) -> None:
         raise UsageError("--things and --heat both choose colours; give one of them.")
     if (verb.things or verb.heat is not None) and kind not in (".ply", ".glb", *_LAYERED):
         raise UsageError(f"--things and --heat colour a .ply or a .glb; {name!r} has no colours.")
-    if kind == ".pgm" and verb.frame == FrameName.RECORDING:
+    if kind == ".pgm" and verb.frame == "recording":
         raise UsageError("An occupancy grid is a floor plan and needs the level frame; leave --frame out.")
-    if kind == ".openlex3d" and verb.frame == FrameName.LEVEL:
+    if kind == ".openlex3d" and verb.frame == "level":
         raise UsageError("OpenLex3D compares with positions of its recordings; leave --frame out.")
     if verb.storey is not None and kind != ".pgm":
         raise UsageError(f"--storey chooses the storey of an occupancy grid; {name!r} holds all of them.")
@@ -125,7 +121,6 @@ def _require_new(paths: "list[Path]", overwrite: bool) -> None:
 
 
 def _write_grids(verb: Export, opened: "AVLMap") -> dict[str, Any]:
-    """Write the occupancy grid of one storey, or of each."""
     from avlmaps.navigate.bodies import BodyShape
     from avlmaps.navigate.costmap import obstacles_for
     from avlmaps.query.export import write_occupancy
@@ -140,11 +135,11 @@ def _write_grids(verb: Export, opened: "AVLMap") -> dict[str, Any]:
     shape = BodyShape(radius_m=verb.radius_m, height_m=verb.height_m)
     for number, path in zip(wanted, named, strict=True):
         write_occupancy(path, obstacles_for(opened, shape, number))
-    answer = {"map": str(verb.map), "files": [str(path) for path in written], "frame": str(FrameName.LEVEL)}
+    answer = {"map": str(verb.map), "files": [str(path) for path in written], "frame": "level"}
     return answer if storeys is None else answer | {"storeys": [storeys[number].name for number in wanted]}
 
 
-def _write_voxels(verb: Export, opened: "AVLMap", kind: str, frame: FrameName) -> None:
+def _write_voxels(verb: Export, opened: "AVLMap", kind: str, frame: "FrameName") -> None:
     from avlmaps.query.export import heat_colors, thing_colors, write_glb, write_ply
 
     colors, columns = opened.colors, {}
@@ -160,7 +155,7 @@ def _write_voxels(verb: Export, opened: "AVLMap", kind: str, frame: FrameName) -
         write_glb(verb.out, opened.data.voxels.index, opened.space.grid.voxel_size_m, colors, opened.space, frame)
 
 
-def _write_layers(verb: Export, opened: "AVLMap", kind: str, frame: FrameName) -> None:
+def _write_layers(verb: Export, opened: "AVLMap", kind: str, frame: "FrameName") -> None:
     from avlmaps.query.export_viewers import layers_of, write_foxglove, write_rerun
 
     layers = layers_of(opened, frame, verb.heat, verb.least)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_named, table_lines
-from avlmaps.cli.verb import MapVerb, idle
+from avlmaps.cli.verb import Asking, MapVerb, idle
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
 
@@ -44,7 +44,7 @@ class Chat:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Go(MapVerb):
+class Go(Asking, MapVerb):
     """Drive the robot by a sentence: avlmaps writes a program, runs it, and reports how near each stop came.
 
     The map is all that the robot knows. Its body is simulated in --scene, which must be the scene that was recorded:
@@ -74,10 +74,6 @@ class Go(MapVerb):
     """JSON file of the robot's frames and settings: namespace, radius, speed, timeouts (docs/robots.md)."""
     start: Annotated[str | None, arg(metavar="X,Y,HEADING")] = None
     """Start of the simulated robot: metres, degrees counter-clockwise from +x. Default: the start of the recording."""
-    at: Annotated[Literal["robot", "source"] | None, arg(metavar="robot|source")] = None
-    """Place of a sound: where the robot was when it heard it, or its source. Default: as the words say, else robot."""
-    found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
-    """Drive to what is found from this probability on, 0 to 1."""
     guess: bool = False
     """Go to the best guess where nothing is found, and to the nearest of several things that fit equally."""
     choose: Annotated[tuple[int, ...], arg(metavar="NUMBER"), UseAppendAction] = ()
@@ -94,7 +90,6 @@ class Go(MapVerb):
     """Draw the path over the map into this picture: start, goals, stops, contacts."""
 
     def run(self) -> None:
-        """Drive."""
         from avlmaps.navigate.interrupts import UNCONFIRMED_STATUS, Interrupted
 
         try:
@@ -141,19 +136,13 @@ def go(verb: "Go") -> dict[str, Any]:
         )
     if verb.robot != "simulated" and (verb.scene or start):
         raise UsageError(f"--scene and --start belong to a simulated robot; --robot {verb.robot} is where it is.")
-    settings = _query_settings(verb)
+    settings = verb.query_settings()
     if verb.dry_run:
         return _planned(verb, settings)
     from avlmaps.navigate.interrupts import raised_signals
 
     with raised_signals():
         return _driven(verb, start, settings)
-
-
-def _query_settings(verb: "Go") -> "QuerySettings":
-    from avlmaps.query.settings import QuerySettings, SoundSettings
-
-    return QuerySettings(found_at=verb.found_at, sounds=SoundSettings(at=verb.at))
 
 
 def _read(verb: "Go", translator: "Translator") -> "Translation":
@@ -168,7 +157,6 @@ def _read(verb: "Go", translator: "Translator") -> "Translation":
 
 
 def _idle(verb: "Go", program: str) -> list[str]:
-    """Return which options have no effect, and why."""
     notes: list[str] = []
     if "sound=" not in program:
         notes += idle(verb, ["at"], "no sound is named")

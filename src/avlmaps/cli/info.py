@@ -51,7 +51,6 @@ class Info(Verb):
     """What you know better than the recording's files (REC)."""
 
     def run(self) -> None:
-        """Describe it."""
         given = self.reading.corrections()
         answer = describe_path(
             self.path, self.format, verify=self.verify, plot=self.plot, corrections=given, more=self.more
@@ -89,7 +88,6 @@ def describe_path(
 
 
 def _consistency(recording: "Recording") -> dict[str, Any] | None:
-    """Check a recording against itself, on a sample; None where none of the sample can be read."""
     from avlmaps.maps.check import judge
 
     try:

@@ -1,33 +1,36 @@
 """`avlmaps live`: a map that grows while a recording is played, as it would on a robot."""
 
+import sys
+import threading
+import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+from urllib.parse import quote
 
-from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+from tyro.conf import Positional, arg
 
 from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import UsageError, emit
-from avlmaps.cli.verb import ModelVerb, Reading, idle, topics_of
+from avlmaps.cli.verb import Building, Reading, idle
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
     from avlmaps.live.live_map import LiveMap
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.recordings.microphones import Microphones
+    from avlmaps.serve.shelf import MapSource
 
 
 @dataclass(frozen=True, kw_only=True)
-class Live(ModelVerb):
+class Live(Building):
     """Map a recording while it is played, or a robot while it drives; the map is saved all along.
 
     Example:
     avlmaps live REC --out home.avlmap --rate 1
     """
-
-    compiles: ClassVar[bool] = True
 
     recording: Annotated[Positional[Path | None], arg(metavar="REC")] = None
     """Recording, of any format that build reads (a bag, a folder); or one of ours that is being written: it is followed
@@ -35,17 +38,6 @@ class Live(ModelVerb):
     source: Annotated[Literal["recording", "ros2"], arg(metavar="recording|ros2")] = "recording"
     """Source of frames and sound: REC, or what a running robot publishes in ROS 2 (by rclpy, in the Python that ROS 2
     was built for), until Ctrl-C."""
-    topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
-    """Topics of ROS (a bag, or --source ros2) that their type does not identify: rgb=, depth=, pose= or audio=TOPIC;
-    audio=none leaves the sound out, audio_pcm=16000,1 says how plain samples are coded; directions=TOPIC, azimuths that
-    a device says of sounds."""
-    microphones: Annotated[Path | None, arg(metavar="FILE")] = None
-    """Places of the microphones, instead of the recording's own, or of the sound of --source ros2: a JSON file, as
-    `avlmaps calibrate` writes it. With them the map knows where sounds came from."""
-    same_device: Annotated[Path | None, arg(metavar="MAP")] = None
-    """Map of an earlier drive with the same device that says directions: its offset is known from there."""
-    out: Annotated[Path, arg(metavar="MAP")]
-    """Map folder to write, by custom NAME.avlmap."""
     rate: Annotated[float, arg(metavar="FACTOR")] = 1.0
     """Speed of the replay: 1 as it was recorded, 2 twice as fast."""
     give_up_s: Annotated[float, arg(metavar="SECONDS")] = 60.0
@@ -55,12 +47,6 @@ class Live(ModelVerb):
     every_frame: bool = False
     """Fuse every frame that is not late, also where nothing moved and nothing new is in view; the end is bit by bit
     that of a build."""
-    profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
-    """Set of models (see `avlmaps profiles`)."""
-    model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
-    """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
-    voxel_size_m: Annotated[float, arg(metavar="METRES")] = 0.05
-    """Edge of a voxel, metres."""
     serve: bool = False
     """Answer HTTP on this machine while the map grows, and afterwards until Ctrl-C, as `avlmaps serve` does; agents are
     served by `avlmaps serve MAP` beside it, which takes each save."""
@@ -68,31 +54,23 @@ class Live(ModelVerb):
     """The same, and open the map's page in a browser."""
     port: Annotated[int, arg(metavar="NUMBER")] = 8750
     """Port of --serve and --view; 0 takes a free one."""
-    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
-    """Format of the recording, if its files do not show it."""
-    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
-    """What you know better than the recording's files."""
     into: Annotated[Path | None, arg(metavar="MAP")] = None
     """Map folder that this drive updates when it is over: it finds itself there by its pictures, as `avlmaps merge`
     does. Where it is not seen to be the same place, that map stays as it is, and --out has the drive."""
     day: Annotated[str | None, arg(metavar="DAY")] = None
     """Day of the drive for --into, such as 2026-11-24. Default: by its stamps, if those are of a clock."""
-    overwrite: bool = False
-    """Replace a map at --out."""
 
     def run(self) -> None:
-        """Play it."""
         answer = _live(self)
         lines = [*info_lines(answer, verbose=False), f"live: {answer['live']['summary']}"]
         if "into" in answer:
-            from avlmaps.cli.days import merge_lines
+            from avlmaps.cli.edit import merge_lines
 
             lines += merge_lines(answer["into"])
         emit(answer, lines, self.json)
 
 
 def _live(verb: Live) -> dict[str, Any]:
-    from avlmaps.cli.build import choose_models
     from avlmaps.live.live_map import SPARSE, LiveMap
     from avlmaps.live.replay import end_drive
     from avlmaps.live.settings import LiveSettings
@@ -108,7 +86,7 @@ def _live(verb: Live) -> dict[str, Any]:
     for note in [] if verb.serve or verb.view else idle(verb, ["port"], "neither --serve nor --view is given"):
         say(f"note: {note}")
     first = _days_before(verb)
-    used = choose_models(verb.profile, [word for words in verb.model for word in words])
+    used = verb.encoders()
     source = _robot(verb) if verb.source == "ros2" else _recording(verb)
     with LiveMap(
         verb.out,
@@ -122,8 +100,6 @@ def _live(verb: Live) -> dict[str, Any]:
         same_device=verb.same_device,
     ) as live:
         if verb.serve or verb.view:
-            from avlmaps.cli.live_serving import serve_while
-
             serve_while(live, lambda over: source.play(live, over), verb.port, browse=verb.view)
         else:
             try:
@@ -159,7 +135,6 @@ class _Source:
 
 
 def _recording(verb: Live) -> _Source:
-    """Return what plays a recording."""
     from avlmaps.live.growing_folder import is_being_written
     from avlmaps.live.replay import follow, replay
     from avlmaps.maps.hearing import take_device
@@ -189,7 +164,7 @@ def _recording(verb: Live) -> _Source:
     recording = open_recording(
         path,
         format=verb.format,
-        topics=topics_of(verb.topics),
+        topics=verb.named_topics(),
         corrections=verb.reading.corrections(),
         microphones=microphones,
     )
@@ -218,7 +193,7 @@ def _robot(verb: Live) -> _Source:
         raise UsageError(
             "--depth-unit, --intrinsics and the like are of a recording; leave them out with --source ros2."
         )
-    topics = topics_of(verb.topics)
+    topics = verb.named_topics()
     if verb.same_device is not None and "directions" not in topics:
         raise UsageError(
             "--same-device is of a device that says directions; name its topic (--topics directions=TOPIC)."
@@ -228,7 +203,6 @@ def _robot(verb: Live) -> _Source:
 
 
 def _days_before(verb: Live) -> "AVLMap | None":
-    """Return the map that the drive is to update; None where it updates none."""
     from avlmaps.query.avlmap import AVLMap
 
     if verb.into is None:
@@ -241,7 +215,86 @@ def _days_before(verb: Live) -> "AVLMap | None":
 
 
 def _joined(first: "AVLMap", today: "AVLMap", day: str) -> dict[str, Any]:
-    from avlmaps.cli.days import merged_answer
+    from avlmaps.cli.edit import merged_answer
     from avlmaps.days.merge import merge_maps
 
     return merged_answer(merge_maps(first, today, first.path, day=day, overwrite=True))
+
+
+_NAME = "live"
+_LOOK_S = 0.1
+
+
+def live_source(live: "LiveMap") -> "MapSource":
+    """Return a live map as the server takes it: its last snapshot; none before the first."""
+    from avlmaps.serve.shelf import MapSource
+
+    return MapSource(live.path, lambda: live.generation or None, lambda: live.map, tells=False)
+
+
+class LiveFeed:
+    """Frames that come into a live map in a thread of their own, to the end of which the map is closed."""
+
+    def __init__(self, live: "LiveMap", drive: Callable[[Callable[[], bool]], None]) -> None:
+        self._live, self._drive = live, drive
+        self._over = threading.Event()
+        self._fault: BaseException | None = None
+        self._thread = threading.Thread(target=self._run, name="avlmaps-drive", daemon=True)
+        self._thread.start()
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether no frame comes any more."""
+        return not self._thread.is_alive()
+
+    def end(self) -> None:
+        """Let it end after the frame that it has, wait until the map is closed, and raise what went wrong."""
+        self._over.set()
+        self._thread.join()
+        if self._fault is not None:
+            raise self._fault
+
+    def _run(self) -> None:
+        try:
+            self._drive(self._over.is_set)
+            from avlmaps.live.replay import end_drive
+
+            end_drive(self._live)
+            say("The drive is over; its map is answered on until Ctrl-C.")
+        except BaseException as fault:  # noqa: BLE001 - raised where it is waited for
+            self._fault = fault
+            if self._live.generation:  # else the command ends with it at once
+                say(f"note: The drive ended, and no frame comes any more; stop with Ctrl-C. {fault}")
+
+
+def serve_while(live: "LiveMap", drive: Callable[[Callable[[], bool]], None], port: int, *, browse: bool) -> None:
+    """Serve a live map on this machine until Ctrl-C, while a drive gives it frames, and close it.
+
+    Raises:
+        ServeError: the port is taken.
+    """
+    from avlmaps.cli.view import open_browser, require_port, run_page
+    from avlmaps.serve.service import Service, listening_socket, url_of
+    from avlmaps.serve.settings import ServeSettings
+
+    require_port(port)
+    settings = ServeSettings(host="127.0.0.1", port=port)
+    with listening_socket(settings) as opened:
+        running = LiveFeed(live, drive)
+        try:
+            while not live.generation and not running.has_ended:
+                time.sleep(_LOOK_S)
+            if not live.generation:  # it ended without a map, or by a fault
+                return
+            service = Service.open({_NAME: live_source(live)}, settings, say)
+            url = f"{url_of(settings, opened)}/maps/{quote(_NAME)}/view"
+
+            def told() -> None:
+                say(f"The map is at {url}; the page grows with it. Stop with Ctrl-C.")
+                sys.stderr.flush()
+                if browse:
+                    open_browser(url)
+
+            run_page(service, opened, told)
+        finally:
+            running.end()

@@ -2,22 +2,15 @@
 
 import io
 import os
+import select
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stderr
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TextIO
 
 from avlmaps.cli import output
-from avlmaps.cli.process import (
-    READER_GONE,
-    drop,
-    end_at_shortened_files,
-    models_in_force,
-    reader_gone,
-    require_address_space,
-    settle_streams,
-)
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars
@@ -26,6 +19,10 @@ from avlmaps.core.wording import Spelling, options_as
 if TYPE_CHECKING:
     from avlmaps.cli.verb import Verb
 
+READER_GONE = 141
+"""Exit status where a reader went away: what a shell reports for a program that SIGPIPE (13) ended."""
+# A question about a small map needs 0.9 GB of addresses (not of memory): libraries reserve more than they use.
+_LEAST_BYTES = 1_000_000_000
 # The language asks for files in words that fit every program; here an option names them.
 _ATTACHED = {
     "Which picture? Attach it": "Which picture? Give it with --image FILE",
@@ -39,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Args:
         arguments: the words after ``avlmaps``; those of this process if None.
     """
-    settle_streams()
+    _settle_streams()
     try:
         try:
             with options_as(Spelling.FLAG):
@@ -47,9 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         finally:
             sys.stdout.flush()  # here, since Python reports a reader that has gone on standard error if it flushes last
     except OSError as error:  # of what was printed last; a verb's own are a sentence already
-        if reader_gone():
+        if _reader_gone():
             sys.exit(READER_GONE)
-        drop(sys.stdout)
+        _drop(sys.stdout)
         sys.exit(_complain(output.system_sentence(error), 1))
     except Exception as fault:  # of loading the verbs; what a verb meets is a sentence already
         if not output.is_short_of_memory(fault):
@@ -110,9 +107,8 @@ def _usage(words: Sequence[str]) -> Iterator[None]:
 
 
 def _run(verb: "Verb") -> int:
-    end_at_shortened_files(as_json=verb.json)
     try:
-        with models_in_force(verb), _compiling(verb):
+        with _models_in_force(verb), _compiling(verb):
             verb.run()
     except output.AnsweredError as error:
         return _complain(error, error.status)
@@ -125,7 +121,7 @@ def _run(verb: "Verb") -> int:
             return _complain(stop, status)
         return _fail(verb, stop, "stopped; a build continues where it ended, by the same command", 130)
     except Exception as fault:
-        if isinstance(fault, BrokenPipeError) and reader_gone():
+        if isinstance(fault, BrokenPipeError) and _reader_gone():
             return READER_GONE
         if isinstance(fault, OSError) or output.is_short_of_memory(fault):
             return _fail(verb, fault, output.fault_sentence(fault), 1)
@@ -150,16 +146,16 @@ def _name_of(verb: "Verb") -> str:
 
 
 def _compiling(verb: "Verb") -> AbstractContextManager[None]:
+    if verb.compiles or hasattr(verb, "map"):
+        _require_address_space()
     if not verb.compiles:
         return nullcontext()
-    require_address_space()
     from avlmaps.core.progress import announce_compiling
 
     return announce_compiling()
 
 
 def _fail(verb: "Verb", error: BaseException, message: str, status: int) -> int:
-    """Print an error in one sentence on standard error, and as JSON on standard output with --json."""
     for said, option in _ATTACHED.items():
         message = message.replace(said, option)
     if verb.json:
@@ -173,10 +169,96 @@ def _emit_error(kind: str, message: str) -> None:
         output.emit({"error": output.error_answer(kind, message)}, (), as_json=True)
         sys.stdout.flush()
     except OSError:
-        drop(sys.stdout)
+        _drop(sys.stdout)
 
 
 def _complain(what: object, status: int) -> int:
     end_bars()
     sys.stderr.write(f"avlmaps: {printable(what)}\n")
     return status
+
+
+def _settle_streams() -> None:
+    """Make the standard streams usable: characters that an encoding lacks become escapes, a closed one goes nowhere.
+
+    What is printed to a closed standard output is lost, which is an error.
+    """
+    for name, flags in (("stdin", "r"), ("stdout", "r"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            number = os.open(os.devnull, os.O_RDONLY if flags == "r" else os.O_WRONLY)
+            setattr(sys, name, open(number, "r" if name == "stdin" else "w", encoding="utf-8"))  # noqa: PTH123, SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors in ("strict", "surrogateescape"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _reader_gone() -> bool:
+    """Return whether standard output or error is a pipe without a reader; if so, drop what is still written there.
+
+    Another pipe may have broken, a connection to a robot or a worker: that is a fault, and is reported.
+    """
+    gone = [stream for stream in (sys.stdout, sys.stderr) if _is_broken(stream)]
+    for stream in gone:
+        _drop(stream)
+    return bool(gone)
+
+
+def _is_broken(stream: TextIO) -> bool:
+    try:
+        stream.flush()
+        number = stream.fileno()
+    except BrokenPipeError:  # the words that could not be written are still in the buffer
+        return True
+    except (OSError, ValueError):  # closed, or no file at all
+        return False
+    if not hasattr(select, "poll"):
+        return False
+    watch = select.poll()
+    watch.register(number, 0)  # errors are reported in any case
+    return any(event & select.POLLERR for _, event in watch.poll(0))
+
+
+def _drop(stream: TextIO) -> None:
+    """Let all that a stream still holds, or gets, go nowhere: Python would report it on standard error when it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def _require_address_space() -> None:
+    if sys.platform == "win32":
+        return
+    import resource
+
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY and limit < _LEAST_BYTES:
+        raise output.AddressSpaceError(
+            f"this process may have {limit / 1e6:,.0f} MB of address space, which is too little memory: this needs "
+            f"{_LEAST_BYTES / 1e6:,.0f} MB or more; raise the limit (ulimit -v)"
+        )
+
+
+@contextmanager
+def _models_in_force(verb: object) -> Iterator[None]:
+    """Load models as a verb's words say while it runs, here and in processes that it starts."""
+    options = {"folder": "models", "device": "device", "precision": "precision", "batch": "batch"}
+    given = {name: getattr(verb, option, None) for name, option in options.items()}
+    given: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    if not given:
+        yield
+        return
+    from avlmaps.perception.models.settings import environment_of, model_settings, using_models
+
+    if "folder" in given:
+        given["folder"] = given["folder"].absolute()
+    settings = replace(model_settings(), **given)
+    variables = environment_of(settings)
+    before = {name: os.environ.get(name) for name in variables}
+    with using_models(settings):
+        os.environ.update(variables)
+        try:
+            yield
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    del os.environ[name]
+                else:
+                    os.environ[name] = value

@@ -36,7 +36,6 @@ class Profiles(ModelVerb):
     """Where --fetch finds them: a page or a folder. Default: AVLMAPS_LIGHT_FROM."""
 
     def run(self) -> None:
-        """List them, check some, or fetch the files of one."""
         if self.fetch is not None:
             self._bring(self.fetch)
             return
@@ -181,7 +180,6 @@ class TeachSound(Verb):
     """Forget the sound of this name."""
 
     def run(self) -> None:
-        """Teach or forget."""
         if bool(self.clips) == self.forget:
             raise UsageError("teach-sound takes clips to learn from, or --forget, and not both.")
         answer = teach(self.name, self.clips)

@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, query_lines
-from avlmaps.cli.process import require_address_space
-from avlmaps.cli.verb import MapVerb, OptionalPath, OptionalText, idle, shown_in
-from avlmaps.core.poses import FrameName
+from avlmaps.cli.verb import Asking, InFrame, MapVerb, OptionalPath, OptionalText, idle, shown_in
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Query(MapVerb):
+class Query(Asking, InFrame, MapVerb):
     """Query a map with a sentence, or part by part; the product of the parts' heatmaps gives the goals.
 
     Example: avlmaps query MAP "the red cabinet near the sound of a dog barking"
@@ -41,8 +39,6 @@ class Query(MapVerb):
     """Sound, by name."""
     sound_clip: Annotated[OptionalPath, arg(metavar="FILE")] = None
     """Sound, by a sound file of one like it."""
-    at: Annotated[Literal["robot", "source"] | None, arg(metavar="robot|source")] = None
-    """Place of a sound: where the robot was when it heard it, or its source. Default: as the words say, else robot."""
     area: Annotated[OptionalText, arg(metavar="NAME")] = None
     """Area, by name: a room or a part of the building."""
     image: Annotated[OptionalPath, arg(metavar="PHOTO")] = None
@@ -55,20 +51,14 @@ class Query(MapVerb):
         None
     )
     """Part that is the goal; the others say where it is. Default: the first of object, image, sound, area."""
-    found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
-    """Call the query found from this probability of its first goal on, 0 to 1."""
     rules: Literal["ours", "paper"] = "ours"
     """Rules of scores and heat: ours, or the paper's with any models (docs/paper-models.md)."""
     top: Annotated[int, arg(metavar="N")] = 3
     """Number of goals to print."""
-    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
-    """Frame of the places: the recording's own, or the level one (z up)."""
     plot: Annotated[OptionalPath, arg(metavar="FILE")] = None
     """Draw the heat of each part and of the product, with numbered goals, into this picture."""
 
     def run(self) -> None:
-        """Answer the query."""
-        require_address_space()
         if not self.map.exists() and not self.sentence:
             words = shlex.join(["MAP", str(self.map)])
             raise UsageError(f"there is no map at {str(self.map)[:80]!r}; the map comes first: avlmaps query {words}")
@@ -76,27 +66,17 @@ class Query(MapVerb):
         super().run()
 
     def opened(self) -> "AVLMap":
-        """Return the map."""
         from avlmaps.query.avlmap import AVLMap
 
         return AVLMap.open(self.map, self._settings())
 
     def _settings(self) -> "QuerySettings":
-        from avlmaps.query.settings import QuerySettings
+        from avlmaps.query.settings import query_settings
 
-        settings = QuerySettings(found_at=self.found_at)
-        if self.rules != "ours":
-            from avlmaps.query.settings import query_settings
-
-            settings = query_settings(self.rules, settings)
+        settings = query_settings(self.rules, self.query_settings())
         return settings if self.at is None else replace(settings, sounds=replace(settings.sounds, at=self.at))
 
     def _asked(self) -> "Asked":
-        """Return what is asked.
-
-        Raises:
-            UsageError: what is given does not fit together.
-        """
         from avlmaps.core.question import Modality
         from avlmaps.query.asking import Asked, AskError
 
@@ -112,11 +92,6 @@ class Query(MapVerb):
             raise UsageError(str(error)) from None
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
-        """Query a map with a sentence or with parts.
-
-        Raises:
-            UsageError: what is given does not fit together.
-        """
         from avlmaps.core.progress import announce_compiling
         from avlmaps.core.question import Modality
         from avlmaps.query.asking import AskError, Files, ask, thing_alone
@@ -135,7 +110,7 @@ class Query(MapVerb):
         except AskError as error:
             raise UsageError(str(error)) from None
         told: dict[str, Any] = {**found.to_dict(), **drawn}
-        if self.frame != FrameName.RECORDING:
+        if self.frame != "recording":
             told = shown_in(told, self.frame, avlmap)
         notes: list[str] = []
         if not any(part["modality"] == Modality.SOUND for part in told["parts"]):
@@ -145,12 +120,11 @@ class Query(MapVerb):
         return {**told, "notes": [*told.get("notes", ()), *notes]} if notes else told
 
     def lines(self, answer: Mapping[str, Any]) -> list[str]:
-        """Lay out the answer."""
         return query_lines(answer)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Locate(MapVerb):
+class Locate(InFrame, MapVerb):
     """Find the 6-DoF pose of a photo's camera in the map, or report that the photo cannot be located.
 
     Example: avlmaps locate home.avlmap photo.jpg
@@ -161,17 +135,13 @@ class Locate(MapVerb):
     intrinsics: Annotated[str | None, arg(metavar="FX,FY,CX,CY")] = None
     """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: by its EXIF, else the map's own colour camera,
     with another focal length where that fits clearly better."""
-    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
-    """Frame of the pose: the recording's own, or the level one (z up)."""
 
     def run(self) -> None:
-        """Locate the photo."""
         if self.intrinsics is not None:
             numbers_of(self.intrinsics)
         super().run()
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
-        """Locate the photo in a map."""
         from avlmaps.query.locate import focal_35mm_of
         from avlmaps.query.modalities.image import read_picture
         from avlmaps.query.schema import locate_answer
@@ -184,7 +154,6 @@ class Locate(MapVerb):
         return shown_in(locate_answer(found, avlmap.data.info.doubts), self.frame, avlmap)
 
     def lines(self, answer: Mapping[str, Any]) -> list[str]:
-        """Lay out the pose."""
         pose, notes = answer["world_from_camera"], [f"note: {note}" for note in answer.get("notes", [])]
         if pose is None:
             few = f"not located: {answer['inliers']} points agree, too few to fix a place"

@@ -4,12 +4,12 @@ import logging
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import AnsweredError, UsageError, emit
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import Asking, ModelVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Serve(ModelVerb):
+class Serve(Asking, ModelVerb):
     """Answer programs by HTTP and agents by MCP.
 
     The server prints its address. Its page lists every operation; /openapi.json describes them; agents connect to /mcp.
@@ -56,10 +56,6 @@ class Serve(ModelVerb):
     """PEM key of the certificate."""
     allow_host: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = ()
     """A further name of this server in the Host header, such as that of a reverse proxy; may be repeated."""
-    found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
-    """Call a query found, and drive to it, from this probability of its first goal on, 0 to 1."""
-    at: Annotated[Literal["robot", "source"] | None, arg(metavar="robot|source")] = None
-    """Place of a sound: where the robot was when it heard it, or its source. Default: as the words say, else robot."""
 
     drive: Annotated[Path | None, arg(metavar="ROBOT.json")] = None
     """Drive the robot of this file as well: plans, confirmations and stops under /drive, every order logged."""
@@ -67,7 +63,6 @@ class Serve(ModelVerb):
     """Log of orders, for --drive. Default: $XDG_STATE_HOME/avlmaps/orders.jsonl."""
 
     def run(self) -> None:
-        """Serve."""
         if self.stdio and self.drive is not None:
             raise UsageError("--drive is served by HTTP, not by --stdio; leave one of them out.")
         if self.drive_log is not None and self.drive is None:

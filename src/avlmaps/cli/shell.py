@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, T
 from tyro.conf import Positional, arg
 
 from avlmaps.cli import go as going
-from avlmaps.cli.days import Changes
+from avlmaps.cli.edit import Changes
 from avlmaps.cli.export import Export
 from avlmaps.cli.info import Info, describe_path, info_lines, plot_named
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, fault_sentence, kind_of
@@ -25,7 +25,6 @@ from avlmaps.cli.verbs import read_verb
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.extras import install_command
 from avlmaps.core.files import user_path
-from avlmaps.core.poses import FrameName
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars, say
 
@@ -55,7 +54,7 @@ VERBS = (*_MAP_VERBS, "go", "sounds", "info", "plot", "help", "quit", "exit")
 WITH_FILES = ("locate", "plot", "export")
 _WITH_WORDS = ("query", "plot", "export")
 _PICTURE = re.compile(r"\.(jpe?g|png|webp|bmp|tiff?|ppm|pgm)['\"]?$", re.IGNORECASE)
-_FRAME = str(FrameName.RECORDING)
+_FRAME = "recording"
 _CONFIRM = "Drive this plan? [y/N]"
 _LEAST_COMPLETED = 0.3  # things with this confidence are completed
 LONGEST_LINE = 10_000
@@ -92,7 +91,6 @@ class Shell(ModelVerb):
     """Neither read nor write the history of questions ($XDG_STATE_HOME/avlmaps/shell_history)."""
 
     def run(self) -> None:
-        """Answer line after line."""
         start = going.read_start(self.start)
         if start is not None and self.scene is None:
             raise UsageError("--start places the simulated robot; give its --scene as well.")
@@ -152,7 +150,6 @@ class ShellSession:
 
     @property
     def opened(self) -> "AVLMap":
-        """The map; opened again where it was replaced on disk since."""
         if self._signature() not in (self._seen, ()):
             self._opened, self._seen = self._open()
             self._names, self._robot = None, None
@@ -160,12 +157,6 @@ class ShellSession:
         return self._opened
 
     def answer(self, line: str, confirms: Callable[[str], bool]) -> Reply:
-        """Answer a line.
-
-        Raises:
-            AvlmapsError: what the verb raises.
-            UsageError: the words do not fit together.
-        """
         word, _, rest = line.partition(" ")
         word, rest = word.lower(), rest.strip()
         with self._lock:
@@ -215,7 +206,6 @@ class ShellSession:
         return Reply(answer, info_lines(answer, verbose=verb.verbose))
 
     def _plot(self, rest: str) -> Reply:
-        """Draw the last answer, or the map."""
         words = _split(rest)
         if len(words) != 1 or words[0].startswith("-"):
             raise UsageError("plot takes the name of a picture, such as: plot heat.png")
@@ -404,11 +394,6 @@ def _piped() -> Lines:
 
 
 def _prompt(session: ShellSession, with_history: bool) -> Lines:
-    """Return the lines that a person types.
-
-    Raises:
-        BackendError: prompt-toolkit is not installed.
-    """
     try:
         from avlmaps.cli.shell_prompt import NameCompleter, PromptLines
     except ImportError:

@@ -67,7 +67,6 @@ class PromptLines:
 
 
 def _history() -> FileHistory | InMemoryHistory:
-    """Return the history in its file, which nobody else may read; that of this session where there can be no file."""
     path = state_file("shell_history")
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -119,7 +118,6 @@ def _lexicon_names() -> tuple[str, ...]:
 
 
 def _files(typed: str) -> Iterator[Completion]:
-    """Yield the files and folders whose names begin so, written as the shell reads them back."""
     plain = typed.replace("\\ ", " ").strip("'\"")
     folder, _, begin = plain.rpartition("/")
     base = user_path(f"{folder}/" if plain.startswith("/") else folder or ".")

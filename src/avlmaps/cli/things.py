@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import arg
 
 from avlmaps.cli.output import UsageError, require_share, table_lines
-from avlmaps.cli.verb import MapVerb, shown_in
-from avlmaps.core.poses import FrameName
+from avlmaps.cli.verb import InFrame, MapVerb, shown_in
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
 
@@ -19,11 +18,11 @@ if TYPE_CHECKING:
     from avlmaps.query.schema import ListedThing, RoomAnswer, SoundAnswer
 
 
-_FRAME = str(FrameName.RECORDING)
+_FRAME = "recording"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Things(MapVerb):
+class Things(InFrame, MapVerb):
     """List the things, sounds and rooms of a map, each with its confidence; of rooms the area as well.
 
     With --room, --near, --at, --top or --page it lists things alone, each with its room.
@@ -52,24 +51,19 @@ class Things(MapVerb):
     """Maximum number of things on a page. Default: all."""
     page: Annotated[int, arg(metavar="N")] = 1
     """Page, counted from 1."""
-    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
-    """Frame of the positions: the recording's own, or the level one (z up)."""
     csv: Annotated[Path | None, arg(metavar="FILE")] = None
     """Write things and sounds to a CSV file as well."""
 
     def run(self) -> None:
-        """List the map's contents."""
         self.require()
         super().run()
 
     def require(self) -> None:
-        """Raise a usage error for numbers that make no list."""
         require_share(self.least, "confidence")
         if min(self.page, 1 if self.top is None else self.top) < 1:
             raise UsageError("--top and --page take a number from 1 on.")
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
-        """List the things, sounds and rooms of a map, or a page of some of its things."""
         from avlmaps.query.export import write_table
         from avlmaps.query.selection import MapLists, Wanted, page_of_things
 
@@ -100,11 +94,10 @@ class Things(MapVerb):
         if self.near is None or not is_place(self.near):
             return self.near
         place = place_of(self.near)
-        in_space = len(place) == 3 and self.frame == FrameName.LEVEL
+        in_space = len(place) == 3 and self.frame == "level"
         return (avlmap.space.world(place) if in_space else place).tolist()
 
     def lines(self, answer: "Mapping[str, Any]") -> list[str]:
-        """Lay out three tables with an empty line between them, or a page of things."""
         frame = answer["frame"]
         lines = [f"note: {note}" for note in answer.get("notes", [])] + thing_lines(answer["things"], frame)
         if "total" in answer:
@@ -115,7 +108,7 @@ class Things(MapVerb):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rooms(MapVerb):
+class Rooms(InFrame, MapVerb):
     """List the rooms of a map: name, probability of the name, floor area and place of each.
 
     Example: avlmaps rooms home.avlmap --plot rooms.png
@@ -123,13 +116,10 @@ class Rooms(MapVerb):
 
     least: Annotated[float, arg(metavar="PROBABILITY")] = 0.0
     """List rooms whose name has at least this probability, 0 to 1."""
-    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
-    """Frame of the positions: the recording's own, or the level one (z up)."""
     plot: Annotated[Path | None, arg(metavar="FILE")] = None
     """Draw a top-down view with the outline, name and area of each room into this picture."""
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
-        """List the rooms of a map."""
         from avlmaps.query.plots import plot_map
         from avlmaps.query.selection import MapLists
 
@@ -148,14 +138,13 @@ class Rooms(MapVerb):
         return answer
 
     def lines(self, answer: "Mapping[str, Any]") -> list[str]:
-        """Lay out rooms as a table."""
         notes = [f"note: {note}" for note in answer.get("notes", [])]
         drawn = [f"wrote {answer['plot']}"] if "plot" in answer else []
         return [*notes, *room_lines(answer["rooms"], answer["frame"]), *drawn]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sources(MapVerb):
+class Sources(InFrame, MapVerb):
     """List where the sounds of a map came from: a region with a probability, rooms and things that it may be.
 
     The recording must say where its microphones are (docs/guides/where-sounds-come-from.md). Sounds of one kind from
@@ -170,18 +159,14 @@ class Sources(MapVerb):
     """lexicon: things that usually make such a sound are likelier sources; none: by what the microphones say alone."""
     least: Annotated[float, arg(metavar="CONFIDENCE")] = 0.0
     """List sounds whose name has at least this confidence, 0 to 1."""
-    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
-    """Frame of the positions: the recording's own, or the level one (z up)."""
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
-        """Return the sources of a map's sounds."""
         require_share(self.least, "confidence")
         found = avlmap.sources(self.sound, prior=self.prior == "lexicon", least=self.least)
         listed = {"map": str(self.map), "frame": _FRAME, "sources": [one.to_json() for one in found]}
         return shown_in(listed, self.frame, avlmap)
 
     def lines(self, answer: "Mapping[str, Any]") -> list[str]:
-        """Lay out sources as a table."""
         if not answer["sources"]:
             return ["no sounds"]
         rows = [
@@ -201,7 +186,7 @@ class Sources(MapVerb):
         return table_lines(head, rows)
 
 
-def thing_lines(things: "Sequence[ListedThing]", frame: str = FrameName.RECORDING) -> list[str]:
+def thing_lines(things: "Sequence[ListedThing]", frame: str = "recording") -> list[str]:
     """Lay out things as a table; with their rooms and distances where those are known."""
     if not things:
         return ["no things with this confidence; lower --least to list less certain ones"]
@@ -221,7 +206,7 @@ def thing_lines(things: "Sequence[ListedThing]", frame: str = FrameName.RECORDIN
     return _with_storeys(head, rows, [t.get("storey") for t in things])
 
 
-def sound_lines(sounds: "list[SoundAnswer]", frame: str = FrameName.RECORDING) -> list[str]:
+def sound_lines(sounds: "list[SoundAnswer]", frame: str = "recording") -> list[str]:
     """Lay out sounds as a table, in the order of their onset."""
     if not sounds:
         return ["no sounds"]
@@ -234,7 +219,7 @@ def sound_lines(sounds: "list[SoundAnswer]", frame: str = FrameName.RECORDING) -
     return _with_storeys(head, rows, [s.get("storey") for s in sounds])
 
 
-def room_lines(rooms: "list[RoomAnswer]", frame: str = FrameName.RECORDING) -> list[str]:
+def room_lines(rooms: "list[RoomAnswer]", frame: str = "recording") -> list[str]:
     """Lay out rooms as a table, those with most views first."""
     if not rooms:
         return ["no rooms"]

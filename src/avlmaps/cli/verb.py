@@ -1,19 +1,20 @@
 """The options of every verb, of every verb that runs models or opens a recording, and what verbs of a map share."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Optional
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import UsageError, emit
-from avlmaps.core.poses import FrameName
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+    from avlmaps.perception.encoders import Encoders
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.settings import QuerySettings
     from avlmaps.recordings.corrections import Corrections
 
 
@@ -88,8 +89,33 @@ class MapVerb(ModelVerb):
         raise NotImplementedError
 
 
+@dataclass(frozen=True, kw_only=True)
+class Asking:
+    """Options of every verb that answers questions."""
+
+    found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
+    """Call a query found, and drive to it, from this probability of its first goal on, 0 to 1."""
+    at: Annotated[Literal["robot", "source"] | None, arg(metavar="robot|source")] = None
+    """Place of a sound: where the robot was when it heard it, or its source. Default: as the words say, else robot."""
+
+    def query_settings(self) -> "QuerySettings":
+        """Return the settings behind them."""
+        from avlmaps.query.settings import QuerySettings, SoundSettings
+
+        return QuerySettings(found_at=self.found_at, sounds=SoundSettings(at=self.at))
+
+
+@dataclass(frozen=True, kw_only=True)
+class InFrame:
+    """The option of every verb that prints places."""
+
+    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
+    """Frame of the places: the recording's own, or the level one (z up)."""
+
+
 def shown_in(answer: Mapping[str, Any], frame: str, avlmap: "AVLMap") -> dict[str, Any]:
     """Return an answer with its places in a frame."""
+    from avlmaps.core.poses import FrameName
     from avlmaps.query.places import answer_in
 
     return dict(answer_in(answer, FrameName(frame), avlmap.space.level_from_recording))
@@ -144,21 +170,65 @@ class Reading:
         )
 
 
-def topics_of(words: tuple[str, ...]) -> dict[str, str]:
-    """Return what ``--topics`` says: names by what they are for.
-
-    Raises:
-        UsageError: a word is not of its form.
-    """
-    for word in words:
-        if not all(word.partition("=")):
-            raise UsageError(f"--topics takes words like rgb=/camera/color/image_raw, not {word!r}.")
-    return dict(word.split("=", 1) for word in words)
-
-
 def _direction(words: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(word) for word in words.split(","))
     except ValueError:
         raise UsageError(f"--up takes x,y,z, such as 0,0,1; not {words!r}.") from None
     return x, y, z
+
+
+@dataclass(frozen=True, kw_only=True)
+class Building(ModelVerb):
+    """Options of every verb that makes a map."""
+
+    compiles: ClassVar[bool] = True
+
+    out: Annotated[Path, arg(metavar="MAP")]
+    """Map folder to write, by custom NAME.avlmap."""
+    profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
+    """Set of models (see `avlmaps profiles`)."""
+    model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
+    """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
+    voxel_size_m: Annotated[float, arg(metavar="METRES")] = 0.05
+    """Edge of a voxel, metres."""
+    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
+    """Format of the recording, if its files do not show it."""
+    microphones: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Places of the microphones instead of the recording's own: a JSON file, as `avlmaps calibrate` writes it."""
+    same_device: Annotated[Path | None, arg(metavar="MAP")] = None
+    """Map of an earlier recording with the same device that says directions: its offset is known from there."""
+    topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
+    """Topics of ROS that their type does not identify: rgb=, depth=, pose= or audio=TOPIC; directions=TOPIC, azimuths
+    that a device says of sounds; pose=FILE, a table of stamp tx ty tz qx qy qz qw; for `live` also audio=none, and
+    audio_pcm=16000,1, how plain samples are coded."""
+    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
+    """What you know better than the recording's files."""
+    overwrite: bool = False
+    """Replace a finished map at --out that was built from another recording or with other settings."""
+
+    def encoders(self) -> "Encoders":
+        """Return the encoders of the profile, with those of ``--model`` instead of some.
+
+        Raises:
+            UsageError: the words of --model do not say any.
+        """
+        from avlmaps.perception.encoders import encoders_of
+        from avlmaps.perception.profiles import profile, read_choices
+
+        try:
+            choices = read_choices([word for words in self.model for word in words])
+        except ValueError as problem:
+            raise UsageError(f"--model {problem}") from None
+        return encoders_of(profile(self.profile).choosing(choices))
+
+    def named_topics(self) -> dict[str, str]:
+        """Return what ``--topics`` says: names by what they are for.
+
+        Raises:
+            UsageError: a word is not of its form.
+        """
+        for word in self.topics:
+            if not all(word.partition("=")):
+                raise UsageError(f"--topics takes words like rgb=/camera/color/image_raw, not {word!r}.")
+        return dict(word.split("=", 1) for word in self.topics)

@@ -33,7 +33,7 @@ _OWN = (
 )  # fmt: skip
 # Of those that share a file.
 _FILES = {
-    "merge": "days", "changes": "days", "rooms": "things", "sources": "things", "locate": "query",
+    "calibrate": "build", "merge": "edit", "changes": "edit", "rooms": "things", "sources": "things", "locate": "query",
     "profiles": "models", "teach-sound": "models",
 }  # fmt: skip
 # As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.

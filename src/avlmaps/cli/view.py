@@ -5,13 +5,13 @@ import sys
 import threading
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import quote, urlencode
 
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit, size_of
-from avlmaps.cli.verb import MapVerb
+from avlmaps.cli.verb import Asking, MapVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ _ANSWER_S = 600.0  # the contents of a large map take their time, and the page w
 
 
 @dataclass(frozen=True, kw_only=True)
-class View(MapVerb):
+class View(Asking, MapVerb):
     """Show a map in the browser: look, click, ask in words, by photo or by sound, and drive.
 
     It is a page of `avlmaps serve`, and answers this machine alone. For another --host it makes a token, which is part
@@ -53,10 +53,6 @@ class View(MapVerb):
     """Do not open a browser."""
     scene: Annotated[str | None, arg(metavar="SCENE")] = None
     """Scene in which a simulated robot drives the commands typed in the page, as for `avlmaps go`."""
-    found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
-    """Call a query found from this probability of its first goal on, 0 to 1."""
-    at: Annotated[Literal["robot", "source"] | None, arg(metavar="robot|source")] = None
-    """Place of a sound: where the robot was when it heard it, or its source. Default: as the words say, else robot."""
     out: Annotated[Path | None, arg(metavar="FILE")] = None
     """Write one HTML file, and serve nothing."""
     questions: Annotated[tuple[str, ...], arg(metavar="SENTENCE ...")] = ()
@@ -65,7 +61,6 @@ class View(MapVerb):
     """Replace a file that exists (--out)."""
 
     def run(self) -> None:
-        """Serve the page until it is stopped, or write it."""
         _require_fitting(self)
         if self.out is not None:
             answer = _written(self, self.out)
@@ -90,9 +85,8 @@ def _require_fitting(verb: View) -> None:
 
 def _maps(verb: View) -> "list[AVLMap]":
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.settings import QuerySettings, SoundSettings
 
-    settings = QuerySettings(found_at=verb.found_at, sounds=SoundSettings(at=verb.at))
+    settings = verb.query_settings()
     return [AVLMap.open(path, settings) for path in (verb.map, verb.other) if path is not None]
 
 

@@ -65,7 +65,6 @@ class AccessGuard:
             await self._answer(scope, receive, send)
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request, or refuse it."""
         try:
             entered = self._check(scope)
         except RequestError as error:
@@ -161,8 +160,6 @@ class AccessGuard:
 
 
 class _LimitedBody:
-    """Receives a body up to a size and within a time."""
-
     def __init__(self, receive: Receive, most_bytes: int, most_s: float) -> None:
         self._receive, self._most_bytes, self._most_s = receive, most_bytes, most_s
         self._bytes, self._until, self._complete = 0, None, False
@@ -222,7 +219,6 @@ def _kept(headers: dict[str, str]) -> str:
 
 
 def _headers(scope: Scope) -> dict[str, str]:
-    """Return the headers; two Host headers or tokens are a trick, so they count as a wrong one."""
     found: dict[str, str] = {}
     for name, value in scope["headers"]:
         key = name.decode("latin-1").lower()

@@ -142,7 +142,6 @@ class Guide:
         return self._robot
 
     def _start(self) -> GroundPose:
-        """Return a place near where the walk began."""
         obstacles = self.obstacles
         costmap = costmap_of(obstacles, self._shape.radius_m)
         places = costmap.middle_of(np.argwhere(costmap.passable & (costmap.room_m >= self._shape.radius_m + _MARGIN_M)))

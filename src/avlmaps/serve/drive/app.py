@@ -254,7 +254,6 @@ async def _values(request: Request) -> dict[str, Any]:
 
 
 async def _events(service: DriveService) -> AsyncIterator[bytes]:
-    """Yield the status now and after each change, until the client leaves."""
     loop, seen, sent_s = asyncio.get_running_loop(), -1, 0.0
     while not service.ending:
         if service.dispatcher.change != seen:
@@ -307,7 +306,6 @@ def drive_agents(service: DriveService) -> AgentServer:
 
 
 def _require_showable(wanted: PlanRequest) -> None:
-    """Raise ``DriveError`` where a program is too long for a person to check its plan in one answer."""
     length = token_count(wanted.program)
     if length > MOST_PROGRAM:
         raise DriveError(

@@ -438,7 +438,6 @@ class Dispatcher:
         return {"order": order.plan.order, "state": "driving", "reading": order.plan.reading}
 
     def _begun(self, token: str) -> RunningOrder:
-        """Take the token and reserve the robot."""
         self._require_idle()
         now = self._current()
         with self._lock:
@@ -535,7 +534,6 @@ class Dispatcher:
         self._changed()
 
     def _note(self, event: str, entry: dict[str, Any]) -> None:
-        """Log what moves nothing; a log that cannot be written is reported in the server's own."""
         try:
             self._log.write(event, entry)
         except NavigationError as fault:
@@ -657,7 +655,6 @@ def _refusal(error: AvlmapsError) -> DriveError:
 
 
 def _reading(outcome: Outcome) -> str:
-    """Return in plain words what a program does, by what its rehearsal did."""
     steps = []
     for move in outcome.moves:
         what = move.skill.replace("_", " ")
