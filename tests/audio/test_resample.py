@@ -26,6 +26,7 @@ def _level_db(hz: float, rate_hz: int, wanted_hz: int) -> float:
     return float(10.0 * np.log10(2.0 * np.mean(inner**2) + 1e-30))
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("rate_hz", "wanted_hz"), PAIRS)
 @pytest.mark.parametrize("share", [1.025, 1.05, 1.08])
 def test_what_the_new_rate_cannot_hold_is_gone(rate_hz: int, wanted_hz: int, share: float) -> None:
@@ -33,6 +34,7 @@ def test_what_the_new_rate_cannot_hold_is_gone(rate_hz: int, wanted_hz: int, sha
     assert _level_db(share * wanted_hz / 2.0, rate_hz, wanted_hz) < -110.0
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(("rate_hz", "wanted_hz"), [*PAIRS, (44_100, 48_000), (16_000, 44_100)])
 @pytest.mark.parametrize("share", [0.01, 0.3, 0.85, 0.9])
 def test_what_the_new_rate_can_hold_is_as_loud_as_before(rate_hz: int, wanted_hz: int, share: float) -> None:

@@ -109,6 +109,7 @@ def test_a_command_line_that_cannot_be_read_says_what_is_wrong(run) -> None:
         assert err.splitlines()[1].startswith("For all of it: avlmaps ") and err.count("\n") == 2
 
 
+@pytest.mark.few(10)
 @pytest.mark.parametrize("name", VERBS)
 def test_what_a_verb_lacks_is_one_sentence(name: str) -> None:
     verb = VERBS[name]

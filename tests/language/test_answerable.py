@@ -23,6 +23,7 @@ THINGS = st.sampled_from(["oven", "lamp", "washing machine", "heater", "tv", "pr
 ROOMS = st.sampled_from(["kitchen", "bathroom", "office", "hallway"])
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize(
     "kind", [kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS]
 )

@@ -74,6 +74,7 @@ def test_a_program_that_does_not_parse_is_corrected(server: ChatServer) -> None:
     assert "Nothing of it was done" in server.asked[1].messages[3]["content"]
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(
     "program",
     [

@@ -30,6 +30,7 @@ ORDERS = [
 ROWS = [(kind, text) for kind, texts in NO_ORDERS.items() for text in texts]
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize(("kind", "text"), ROWS)
 def test_no_front_drives_by_what_is_no_order(kind: str, text: str) -> None:
     closed = no_order(text)

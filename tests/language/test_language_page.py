@@ -18,6 +18,7 @@ def shown(heading: str) -> list[tuple[str, str]]:
     return [row for row in rows[1:] if not row[0].startswith("-")]
 
 
+@pytest.mark.few(12)
 @pytest.mark.parametrize(("command", "plan"), [*shown("What is understood"), *shown("Questions back and refusals")])
 def test_the_page_says_what_the_parser_says(command: str, plan: str) -> None:
     assert verbalise(read_command(command).intents) == plan

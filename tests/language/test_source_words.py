@@ -32,11 +32,13 @@ OTHERS = (
 )  # fmt: skip
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("sentence", ORIGIN)
 def test_an_origin_is_asked_for(sentence: str) -> None:
     assert asks_for_source(sentence)
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("sentence", OTHERS)
 def test_others_ask_for_no_origin(sentence: str) -> None:
     assert not asks_for_source(sentence)
@@ -50,6 +52,7 @@ def places(command: str, given: Attachments = WORDS) -> list[HeardAt | None]:
     return [one.at for one in targets if one.kind in (TargetKind.SOUND, TargetKind.CLIP)]
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize(
     "command",
     [

@@ -31,6 +31,7 @@ OTHERS = (
 )  # fmt: skip
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("question", NAMED)
 def test_a_storey_is_read_and_taken_out(question: str) -> None:
     (said,) = said_storeys(question)

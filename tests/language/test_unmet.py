@@ -67,6 +67,7 @@ def test_a_signed_angle_asks_which_side(verb: str, angle: int, sign: str) -> Non
     assert len(read.stops.choices) == 2
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(
     "command",
     ["move forward -2 m", "translate -0.5 m", "move (-1)", "go back -1 m", "forward by minus one metre",
@@ -105,6 +106,7 @@ def test_a_distance_in_metres_may_be_kept() -> None:
     assert read_command("turn so that you face away from the sofa").stops is None
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize(
     "command",
     ["drive through the wall", "go through the glass door at full speed", "go straight through the closed door",
@@ -136,6 +138,7 @@ def test_a_question_does_not_drive(command: str) -> None:
     stops(command)
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize(
     "command",
     ["go to my room", "go to her room", "go to the object most likely to bark", "go to the quietest room",
@@ -147,6 +150,7 @@ def test_what_the_map_cannot_know_is_asked(command: str) -> None:
     stops(command)
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("thing", ["chair", "bag", "tv", "coffee table"])
 @pytest.mark.parametrize("form", [
     "go to the {} that is gone", "go to the {} which has been moved", "drive to the {} that is no longer there",
@@ -244,6 +248,7 @@ def test_turns_keep_their_side() -> None:
     stops("turn right 90 degrees anticlockwise")
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     "command",
     ["Geh zum Sofa", "Va dans la cuisine", "vas a la cocina por favor", "vai in cucina", "ga naar de keuken",
@@ -412,6 +417,7 @@ def test_sixteen_points_of_the_compass_are_read(verb: str) -> None:
     assert intents("go two metres south south west") == (Turn(heading=202.5), Move(2.0))
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(
     ("command", "degrees"),
     [
@@ -442,6 +448,7 @@ def test_another_thing_beside_it_is_that_thing() -> None:
     )
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize(
     "command",
     [

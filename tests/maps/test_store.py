@@ -216,6 +216,7 @@ DAMAGED: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("damage", [name for name, (_, said) in DAMAGED.items() if said])
 def test_a_damaged_map_is_one_error_with_the_files_name(copied: Path, damage: str) -> None:
     work, said = DAMAGED[damage]

@@ -155,6 +155,7 @@ SKILLS = {
 }
 
 
+@pytest.mark.few(12)
 @pytest.mark.parametrize("skill", SKILLS)
 @pytest.mark.parametrize("score", [0.05, 0.15, 0.95])
 def test_no_skill_takes_what_the_answer_calls_not_found(skill: str, score: float) -> None:

@@ -35,6 +35,7 @@ def answered(question: str, storeys: Storeys | None, *goals: Goal, count: bool =
     return answer_on_storey(avlmap, said_storeys(question), top, lambda *_: whole)
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(
     ("question", "storeys", "at"),
     [

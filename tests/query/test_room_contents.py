@@ -41,6 +41,7 @@ def test_the_embedded_table_holds_its_encoders_names_and_rooms() -> None:
     assert not {"wall", "floor", "ceiling", "other"} & set(NAMED.things)
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(
     ("thing", "kind"),
     [

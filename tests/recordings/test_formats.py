@@ -35,6 +35,7 @@ def test_the_date_of_the_first_frame_is_kept_and_poses_of_a_file_may_have_it(tmp
     assert open_recording(WRITTEN["folder"].write(tmp_path / "folder", truth)).begins_s == 0.0
 
 
+@pytest.mark.few(5)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", WRITTEN)
 @pytest.mark.nightly

@@ -15,6 +15,7 @@ from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault, pl
 FRAMES_S = np.arange(150) / 30.0
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("rate_hz", [10.0, 30.0, 100.0, 1000.0])
 @pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
 def test_poses_in_another_unit_are_named(rate_hz: float, factor: float, unit: str) -> None:
@@ -43,6 +44,7 @@ def test_dates_are_seconds() -> None:
     assert not date_fault(np.array([1.7e9, np.nan]), "frames") and not date_fault(np.zeros(0), "frames")
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("rate_hz", [1.0, 5.0, 30.0, 120.0])
 @pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
 def test_the_pace_of_a_camera_tells_the_unit(rate_hz: float, factor: float, unit: str) -> None:
@@ -70,6 +72,7 @@ def _walk(count: int = 200) -> tuple[np.ndarray, np.ndarray, list[str]]:
     return stamps_s, positions, [f"{i:06d}" for i in range(count)]
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("away_m", [10.0, 1e4, 1e5, 1e6])
 @pytest.mark.parametrize("at", [[0], [57], [199], [57, 58, 120]])
 def test_far_poses_are_left_out_by_name(away_m: float, at: list[int]) -> None:

@@ -452,6 +452,7 @@ def test_a_robot_that_never_tells_its_pose_cannot_be_opened(robot, frames, says)
     assert robot.soon(lambda: not robot.clients)  # and the connection is not left behind
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("angle", [pi / 2, -pi / 36, pi, -3.0, 5.0])
 def test_a_turn_is_to_the_left_by_a_positive_angle(robot, angle):
     robot.pose = GroundPose(1.0, 2.0, 0.7)

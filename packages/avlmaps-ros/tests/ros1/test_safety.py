@@ -37,6 +37,7 @@ LAWS: dict[str, Callable[[dict[str, Any]], bool]] = {
 }
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", list(SCENARIOS))
 def test_the_law_of(name: str, tmp_path: Path) -> None:
     saw = SCENARIOS[name](tmp_path)

@@ -48,6 +48,7 @@ def test_a_piece_stands_centred_in_plausible_size_and_few_triangles(category: st
         assert piece.category == category
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(("category", "name"), [pair for pair in _ALL if pair[0] in ("lamp", "chandelier", "candle")])
 def test_what_shines_says_where_within_its_own_box(category: str, name: str) -> None:
     for piece in pieces_of(category, name):

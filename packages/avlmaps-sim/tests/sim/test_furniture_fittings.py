@@ -30,6 +30,7 @@ _ALL = [(category, name) for category in _RANGE for name in families(category)]
 _grey = Material()
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("category", _RANGE)
 def test_a_piece_stands_on_the_floor_about_its_middle_within_plausible_sizes(category: str) -> None:
     least, greatest, tallest, _ = _RANGE[category]
@@ -44,6 +45,7 @@ def test_a_piece_stands_on_the_floor_about_its_middle_within_plausible_sizes(cat
         assert 10 <= len(mesh.triangle) <= 2000
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("category", _RANGE)
 def test_things_can_stand_on_the_supports_of_a_piece(category: str) -> None:
     for piece in every_piece(category):
@@ -55,6 +57,7 @@ def test_things_can_stand_on_the_supports_of_a_piece(category: str) -> None:
             assert near.any(), f"nothing of the piece lies at the support's height of {top.z:.3f} m"
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("category", _RANGE)
 def test_a_seed_gives_the_same_piece_again_and_another_seed_another(category: str) -> None:
     first, again, other = (make(category, np.random.default_rng(seed)).mesh for seed in (3, 3, 4))
@@ -63,6 +66,7 @@ def test_a_seed_gives_the_same_piece_again_and_another_seed_another(category: st
     assert first.vertex.shape != other.vertex.shape or not np.allclose(first.vertex, other.vertex)
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("category", _RANGE)
 def test_training_never_sees_the_held_out_families(category: str) -> None:
     every, shown, kept = (set(families(category, which)) for which in ("all", "training", "held-out"))
@@ -71,6 +75,7 @@ def test_training_never_sees_the_held_out_families(category: str) -> None:
     assert len(kept) >= 1 and len(shown) >= 2
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("category", _RANGE)
 def test_the_families_of_a_category_are_built_differently(category: str) -> None:
     made = {name: pieces_of(category, name) for name in families(category)}
@@ -81,6 +86,7 @@ def test_the_families_of_a_category_are_built_differently(category: str) -> None
         assert np.ptp(sizes, axis=0).max() > 0.005, f"every {name} has the same size"
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize(("category", "name"), [(c, n) for c, n in _ALL if n.startswith("wall ")])
 def test_what_hangs_touches_the_wall_with_a_surface(category: str, name: str) -> None:
     for piece in pieces_of(category, name):
@@ -136,6 +142,7 @@ def test_a_spindle_turns_about_the_axis_along_x() -> None:
     assert radius.max() == pytest.approx(0.1, abs=1e-5)
 
 
+@pytest.mark.few(7)
 @pytest.mark.parametrize("opens", ["left", "right", "drawer"])
 @pytest.mark.parametrize("profile", ["flat", "shaker", "panel", "planks", "glass"])
 @pytest.mark.parametrize("handle", ["bar", "knob", "cup", "strip", "none"])

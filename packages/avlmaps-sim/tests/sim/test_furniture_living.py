@@ -59,6 +59,7 @@ def every(category: str) -> Iterator[Piece]:
         yield from pieces(category, name)
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("category", SIZES)
 def test_a_piece_stands_on_the_floor_about_the_origin(category: str) -> None:
     for piece in every(category):
@@ -68,6 +69,7 @@ def test_a_piece_stands_on_the_floor_about_the_origin(category: str) -> None:
         assert np.abs((mesh.low + mesh.high)[:2]).max() < 1e-3
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("category", SIZES)
 def test_a_piece_has_the_size_of_its_kind_and_few_triangles(category: str) -> None:
     least, greatest = SIZES[category]
@@ -78,6 +80,7 @@ def test_a_piece_has_the_size_of_its_kind_and_few_triangles(category: str) -> No
         assert float(piece.mesh.areas_m2().sum()) > 0.05
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("category", SIZES)
 def test_things_may_stand_only_on_something(category: str) -> None:
     for piece in every(category):
@@ -90,6 +93,7 @@ def test_things_may_stand_only_on_something(category: str) -> None:
             assert np.abs(height - top.z).min() < 0.012, "no surface at the height of the support"
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("category", SIZES)
 def test_the_seed_decides_all(category: str) -> None:
     for name in catalogue.families(category):
@@ -99,6 +103,7 @@ def test_the_seed_decides_all(category: str) -> None:
         assert first.supports == again.supports
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("category", SIZES)
 def test_no_two_pieces_of_a_family_are_of_one_size(category: str) -> None:
     for name in catalogue.families(category):
@@ -106,6 +111,7 @@ def test_no_two_pieces_of_a_family_are_of_one_size(category: str) -> None:
         assert np.ptp(sizes, axis=0).max() > 0.01
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("category", SIZES)
 def test_a_category_has_many_builds_and_keeps_some_back(category: str) -> None:
     names = catalogue.families(category)

@@ -20,6 +20,7 @@ _RANGE = {
 _ALL = [(category, name) for category in _RANGE for name in families(category)]
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(("category", "name"), _ALL)
 def test_a_piece_stands_centred_in_plausible_size_and_few_triangles(category: str, name: str) -> None:
     least, most, tallest, _ = _RANGE[category]

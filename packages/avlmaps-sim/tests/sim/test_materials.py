@@ -19,6 +19,7 @@ def edge_ratio(image: np.ndarray, axis: int) -> float:
     return float(step[-1] / (np.quantile(step[:-1], 0.9) + 1.0))
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_has_a_picture_of_bounded_size_and_colours_in_range(kind: str) -> None:
     for seed in SEEDS:
@@ -33,6 +34,7 @@ def test_every_kind_has_a_picture_of_bounded_size_and_colours_in_range(kind: str
         assert 0.0 <= drawn.emission <= 1.0
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("kind", TILING)
 def test_a_texture_that_repeats_has_no_seam(kind: str) -> None:
     ratios = [
@@ -67,6 +69,7 @@ def test_a_material_depends_on_the_generator_alone(kind: str) -> None:
     assert np.array_equal(first.texture, again.texture)
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("kind", TILING)
 @pytest.mark.parametrize("colour", [(0.5, 0.3, 0.2), (0.06, 0.06, 0.07)])
 def test_a_colour_that_is_given_is_kept_on_average(kind: str, colour: tuple[float, float, float]) -> None:

@@ -59,6 +59,7 @@ def test_in_the_open_twice_the_distance_halves_the_pressure(distance_m: float, a
 # --- arrival
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("ear", [(1.5, 1.0, 1.3), (3.5, 3.5, 1.3), (7.5, 0.5, 1.3), (4.2, 3.5, 1.6), (7.9, 3.9, 0.4)])
 @pytest.mark.parametrize("door", [True, False])
 def test_nothing_is_heard_before_the_sound_can_arrive(ear: tuple[float, ...], door: bool) -> None:
