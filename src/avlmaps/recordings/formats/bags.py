@@ -13,7 +13,6 @@ import heapq
 import os
 import re
 import threading
-from collections import OrderedDict
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -162,16 +161,7 @@ _ADAPTED: dict[str, Callable[[Any, str], SimpleNamespace]] = {
 # Kinds of files that a bag's folder may hold without a metadata.yaml, the first that is there counts.
 SUFFIXES = (".bag", ".mcap", ".db3")
 _ZSTD = b"\x28\xb5\x2f\xfd"  # how a compressed message begins; CDR begins with 0
-_CHUNKS_HELD = 4
 _LARGEST_RECORD = 1 << 31
-
-
-@runtime_checkable
-class Connection(Protocol):
-    """A topic in one file, and the ROS type of its messages."""
-
-    topic: str
-    msgtype: str
 
 
 @runtime_checkable
@@ -227,8 +217,8 @@ class Bag:
         """The type of each topic."""
         return {c.topic: c.msgtype for c in self._container.connections}
 
-    def connections(self, topic: str) -> list[Connection]:
-        """Return the connections of a topic; each has a ``msgtype``."""
+    def connections(self, topic: str) -> list[Any]:
+        """Return the connections of a topic; each has a ``topic`` and a ``msgtype``."""
         return [connection for connection in self._container.connections if connection.topic == topic]
 
     def topics_of(self, types: tuple[str, ...]) -> list[str]:
@@ -369,108 +359,6 @@ class RosbagsContainer:
 
 
 @dataclass(frozen=True, slots=True)
-class _Place:
-    """Where a chunk lies, or a message outside of chunks; when its messages were logged, and of which channels."""
-
-    offset: int
-    first_ns: int
-    last_ns: int
-    channels: frozenset[int] | None  # None: any
-
-
-class _McapFile:
-    """An MCAP file of any profile; its index is that of the summary, else it is found by going through the file."""
-
-    def __init__(self, path: Path) -> None:
-        self.channels: dict[int, Any] = {}
-        self.schemas: dict[int, Any] = {}
-        self._lock, self._held = threading.Lock(), OrderedDict[int, list[Any]]()
-        self._stream = path.open("rb")
-        try:
-            self._places = sorted(self._indexed() or self._found(), key=lambda place: place.first_ns)
-        except Exception as error:  # mcap, struct and decompressors raise their own kinds
-            self._stream.close()
-            raise RecordingError(
-                f"{path} was cut off while recording or copying, or is damaged ({_first_line(error)}); repair it with "
-                "`mcap recover`, or copy it again."
-            ) from error
-
-    def messages(self, channel: int) -> Iterator[tuple[int, bytes]]:
-        """Yield (time of logging in ns, content) of a channel's messages, in that order."""
-        waiting: list[tuple[int, int, bytes]] = []
-        count = 0
-        for place in self._places:
-            if place.channels is not None and channel not in place.channels:
-                continue
-            while waiting and waiting[0][0] < place.first_ns:
-                logged_ns, _, raw = heapq.heappop(waiting)
-                yield logged_ns, raw
-            for message in self._messages_in(place.offset):
-                if message.channel_id == channel:
-                    heapq.heappush(waiting, (message.log_time, count, message.data))
-                    count += 1
-        while waiting:
-            logged_ns, _, raw = heapq.heappop(waiting)
-            yield logged_ns, raw
-
-    def messages_at(self, channel: int, logged_ns: int) -> Iterator[bytes]:
-        """Yield a channel's messages of one time."""
-        for place in self._places:
-            if place.first_ns > logged_ns:
-                return
-            if place.last_ns >= logged_ns and (place.channels is None or channel in place.channels):
-                for message in self._messages_in(place.offset):
-                    if message.channel_id == channel and message.log_time == logged_ns:
-                        yield message.data
-
-    def _indexed(self) -> list[_Place]:
-        from mcap.reader import SeekingReader
-
-        summary = SeekingReader(self._stream, record_size_limit=_LARGEST_RECORD).get_summary()
-        if summary is None:
-            return []
-        self.channels, self.schemas = summary.channels, summary.schemas
-        chunks = [(c, frozenset(c.message_index_offsets) or None) for c in summary.chunk_indexes]
-        return [_Place(c.chunk_start_offset, c.message_start_time, c.message_end_time, of) for c, of in chunks]
-
-    def _found(self) -> list[_Place]:
-        from mcap.records import Channel, Chunk, Message, Schema
-        from mcap.stream_reader import StreamReader, breakup_chunk
-
-        found: list[_Place] = []
-        self._stream.seek(0)
-        at = 0
-        for record in StreamReader(self._stream, emit_chunks=True, record_size_limit=_LARGEST_RECORD).records:
-            if isinstance(record, Chunk):
-                found.append(_Place(at, record.message_start_time, record.message_end_time, None))
-            elif isinstance(record, Message):
-                found.append(_Place(at, record.log_time, record.log_time, frozenset([record.channel_id])))
-            for inner in breakup_chunk(record) if isinstance(record, Chunk) else [record]:
-                if isinstance(inner, Channel):
-                    self.channels[inner.id] = inner
-                elif isinstance(inner, Schema):
-                    self.schemas[inner.id] = inner
-            at = self._stream.tell()
-        return found
-
-    def _messages_in(self, offset: int) -> list[Any]:
-        from mcap.records import Chunk, Message
-        from mcap.stream_reader import StreamReader, breakup_chunk
-
-        with self._lock:
-            if offset not in self._held:
-                self._stream.seek(offset)
-                reader = StreamReader(self._stream, True, emit_chunks=True, record_size_limit=_LARGEST_RECORD)
-                record = next(iter(reader.records))
-                records = breakup_chunk(record) if isinstance(record, Chunk) else [record]
-                self._held[offset] = [inner for inner in records if isinstance(inner, Message)]
-                if len(self._held) > _CHUNKS_HELD:
-                    self._held.popitem(last=False)
-            self._held.move_to_end(offset)
-            return self._held[offset]
-
-
-@dataclass(frozen=True, slots=True)
 class McapConnection:
     """A channel of an MCAP file.
 
@@ -484,7 +372,7 @@ class McapConnection:
 
     topic: str
     msgtype: str
-    file: _McapFile
+    file: Path
     channel: Any
     schema: Any
 
@@ -499,27 +387,37 @@ class McapContainer:
 
     def __init__(self, files: Sequence[Path]) -> None:
         self.files = files
+        self._local = threading.local()  # readers keep a file position
         self._decoders: dict[tuple[str, str, bytes], Callable[[bytes], Any]] = {}
 
-    @property
+    @cached_property
     def connections(self) -> Sequence[McapConnection]:
         """See ``Container``."""
-        return self._connections
-
-    @cached_property
-    def _connections(self) -> Sequence[McapConnection]:
-        return [
-            McapConnection(channel.topic, _msgtype(schema.name if schema else ""), file, channel, schema)
-            for file in map(_McapFile, self.files)
-            for channel in file.channels.values()
-            for schema in [file.schemas.get(channel.schema_id)]
-        ]
+        found: list[McapConnection] = []
+        for file in self.files:
+            try:
+                summary = self._reader(file).get_summary()
+                if summary is not None and summary.channels:
+                    pairs = [(summary.schemas.get(c.schema_id), c) for c in summary.channels.values()]
+                else:  # without an index the file is gone through
+                    by_id = {channel.id: (schema, channel) for schema, channel, _ in self._reader(file).iter_messages()}
+                    pairs = list(by_id.values())
+            except Exception as error:  # mcap, struct and decompressors raise their own kinds
+                raise RecordingError(
+                    f"{file} was cut off while recording or copying, or is damaged ({_first_line(error)}); repair it "
+                    "with `mcap recover`, or copy it again."
+                ) from error
+            found += [
+                McapConnection(channel.topic, _msgtype(schema.name if schema else ""), file, channel, schema)
+                for schema, channel in pairs
+            ]
+        return found
 
     def messages(self, connections: Sequence[McapConnection]) -> Iterator[tuple[McapConnection, int, bytes]]:
         """See ``Container``."""
 
         def of(connection: McapConnection) -> Iterator[tuple[McapConnection, int, bytes]]:
-            return ((connection, ns, raw) for ns, raw in connection.file.messages(connection.channel.id))
+            return ((connection, ns, raw) for ns, raw in self._of_channel(connection))
 
         return heapq.merge(*map(of, connections), key=itemgetter(1))
 
@@ -527,7 +425,8 @@ class McapContainer:
         self, connections: Sequence[McapConnection], received_ns: int
     ) -> Iterator[tuple[McapConnection, bytes]]:
         """See ``Container``."""
-        return ((c, raw) for c in connections for raw in c.file.messages_at(c.channel.id, received_ns))
+        times = {"start_time": received_ns, "end_time": received_ns + 1}
+        return ((connection, raw) for connection in connections for _, raw in self._of_channel(connection, **times))
 
     def message(self, connection: McapConnection, raw: bytes) -> Any:
         """See ``Container``."""
@@ -540,6 +439,18 @@ class McapContainer:
         if encoding in ("ros1", "cdr") and not connection.is_foxglove:
             return header_stamp_s(raw, encoding == "cdr")
         return stamp_s(self._decoded(connection, raw))
+
+    def _of_channel(self, connection: McapConnection, **times: int) -> Iterator[tuple[int, bytes]]:
+        found = self._reader(connection.file).iter_messages(topics=[connection.topic], **times)
+        return ((m.log_time, m.data) for _, channel, m in found if channel.id == connection.channel.id)
+
+    def _reader(self, file: Path) -> Any:
+        from mcap.reader import SeekingReader
+
+        known: dict[Path, Any] = self._local.__dict__.setdefault("readers", {})
+        if file not in known:
+            known[file] = SeekingReader(file.open("rb"), record_size_limit=_LARGEST_RECORD)
+        return known[file]
 
     def _decoded(self, connection: McapConnection, raw: bytes) -> Any:
         schema = connection.schema
