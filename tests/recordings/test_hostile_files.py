@@ -217,7 +217,7 @@ def test_a_flac_with_far_more_bytes_than_its_samples_take_is_a_sentence(tmp_path
     os.truncate(path, (100 << 20) - 1)
     with path.open("ab") as stream:
         stream.write(b"x")
-    with pytest.raises(AudioError, match="its length does not fit the sound that its header promises"):
+    with pytest.raises(AudioError, match="its length does not fit the 1"):
         AudioTrack.open(path, 0.0)
 
 
@@ -227,7 +227,7 @@ def test_a_sound_that_ends_in_zeros_is_a_sentence(tmp_path: Path, suffix: str) -
     path = compressed(tmp_path / f"a.{suffix}")
     assert AudioTrack.open(path).duration_s == pytest.approx(1.0, abs=0.1)
     os.truncate(path, 20_000_000_000)
-    with pytest.raises(AudioError, match=r"the last 67,108,864 of its 20,000,000,000 bytes are zeros"):
+    with pytest.raises(AudioError, match="its end holds zeros only"):
         AudioTrack.open(path)
 
 

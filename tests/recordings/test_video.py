@@ -64,5 +64,5 @@ def test_a_video_that_ends_in_zeros_is_refused(tmp_path: Path, suffix: str) -> N
     path = tmp_path / f"walk.{suffix}"
     write_video(path)
     os.truncate(path, 20_000_000_000)
-    with pytest.raises(RecordingError, match=r"the last 67,108,864 of its 20,000,000,000 bytes are zeros"):
+    with pytest.raises(RecordingError, match="its end holds zeros only"):
         VideoFrames(path)

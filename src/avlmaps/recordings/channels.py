@@ -15,7 +15,6 @@ _LOOKS, _LOOK_S = 24, 0.5
 _DEAD_DB = 40.0  # a channel this much below the loudest holds nothing of use
 _PAUSE_S, _PAUSES = 0.05, 200  # of digital silence; the number that is read at once
 _FULL_SCALE, _CLIPPED = 0.999, 1e-3
-_HUM_DB, _HUM_SHARE = 25.0, 0.9
 _WAV = ".wav"
 
 
@@ -77,13 +76,11 @@ def with_microphones(track: AudioTrack, microphones: Microphones, files: tuple[P
                         f"The channels disagree: {track.path} has {here} {name}, {path} has {there}; export them "
                         "together, from one clock."
                     )
-    else:
-        count = _count(track.path)
-        if count != len(microphones):
-            raise RecordingError(
-                f"{track.path} has {count} channel(s), but the recording describes {len(microphones)} microphone(s); "
-                "give one position for each channel."
-            )
+    elif (count := track.every_channel(0, 1).shape[1]) != len(microphones):
+        raise RecordingError(
+            f"{track.path} has {count} channel(s), but the recording describes {len(microphones)} microphone(s); give "
+            "one position for each channel."
+        )
     return replace(track, channel=0, microphones=microphones, files=files)
 
 
@@ -139,15 +136,13 @@ def write_channels(path: Path, sound: ChannelSound) -> None:
 
 
 def channel_faults(track: AudioTrack) -> list[str]:
-    """Return a sentence for each fault of a track's channels: dead, copied, clipped, or with a constant hum.
+    """Return a sentence for each fault of a track's channels: dead, copied or clipped.
 
     Looks at pieces spread over the track. Channels that are exchanged show only where they are compared with the
     geometry along the drive (``avlmaps.maps.sources.wiring``).
     """
     samples = _looked_at(track)
-    return [
-        *_dead(samples, track), *_copied(samples, track), *_clipped(samples, track), *_hum(samples, track),
-    ]  # fmt: skip
+    return [*_dead(samples, track), *_copied(samples, track), *_clipped(samples, track)]
 
 
 def level_faults(track: AudioTrack, name: str = "") -> tuple[list[str], list[str]]:
@@ -257,31 +252,3 @@ def _clipped(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str
         f"{_named(track, int(i))} is clipped in {held[i]:.1%} of its samples; record with less gain."
         for i in np.flatnonzero(held > _CLIPPED)
     ]
-
-
-def _hum(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str]:
-    """Name a tone that stands out from the spectrum around it in nearly all pieces."""
-    spectrum = np.abs(np.fft.rfft(samples * np.hanning(samples.shape[2]), axis=2)) ** 2 + 1e-20
-    hz = np.fft.rfftfreq(samples.shape[2], 1.0 / track.rate_hz)
-    if len(hz) < 64:
-        return []
-    from scipy.ndimage import median_filter
-
-    around = median_filter(spectrum, size=(1, 1, 41), mode="nearest")
-    over_db = 10.0 * np.log10(spectrum / (around + 1e-9 * spectrum.max()))
-    constant = ((over_db > _HUM_DB).mean(axis=0) > _HUM_SHARE) & (hz > 20.0)
-    said: list[str] = []
-    for channel in np.flatnonzero(constant.any(axis=1)).tolist():
-        mean = spectrum[:, channel].mean(axis=0)
-        tone_hz = hz[np.argmax(np.where(constant[channel], mean, 0.0))]
-        said.append(
-            f"{_named(track, channel)} has a constant hum at {tone_hz:.0f} Hz in all of the track; sounds beside it "
-            "are still heard, but look for its cause (mains, a fan)."
-        )
-    return said
-
-
-def _count(path: Path) -> int:
-    from avlmaps.recordings.containers import read_all_channels
-
-    return read_all_channels(path, 0, 1, 1).shape[1]

@@ -22,8 +22,6 @@ _SELF_CONTAINED = (
 )  # fmt: skip
 _PIECE_SAMPLES = 1 << 16
 _UNKNOWN = 1 << 48  # a FLAC that was written to a pipe may say that it has this many samples or more
-_SAMPLE_BYTES, _PICTURES_BYTES = 5, 64 << 20  # no FLAC takes more for a sample, and for the pictures and tags beside
-_UNKNOWN_BYTES = (0, 0xFFFFFFFF - 0xFFFF)  # and a WAV that it has none, or this many and more
 _PREROLL_S = 1.0  # a decoder that starts in the middle needs a while until its output is right
 _RESYNC_S = 0.05  # stamps are rounded (to 1 ms in mkv); only a larger jump is a gap
 _LOOKS, _LOOK_S = 20, 0.25  # of a file, to find out whether its channels cancel
@@ -31,12 +29,22 @@ _CANCELLED = 0.01
 _AUDIBLE_POWER = 1e-8
 _SLACK_S = 0.5  # containers round their durations, encoders drop or pad a few hundred samples
 
-_MOST_ZEROS_BYTES = 64 << 20
-_BLOCK_BYTES = 1 << 20
-# Formats that say where their samples lie: (offset, bytes there). Zeros at their end are silence, or are never read.
-_INDEXED = (
-    (8, b"WAVE"), (0, b"FORM"), (0, b"caff"), (0, b"riff"), (4, b"ftyp"), (4, b"moov"), (4, b"mdat"), (4, b"wide"),
-)  # fmt: skip
+
+# Formats that say where their samples lie; the decoders of others look for the next packet in all that follows: 20 GB
+# of zeros, as a full disk or a broken copy leaves them, keep a processor busy for minutes.
+_INDEXED = {".wav", ".w64", ".aif", ".aiff", ".caf", ".m4a", ".mp4", ".mov"}
+_LARGE_BYTES, _END_BYTES = 64 << 20, 1 << 20
+_SAMPLE_BYTES = 5  # no FLAC takes more for a sample
+
+
+def checked_media(path: Path) -> None:
+    """Refuse a file of sound or video that is too large, or ends in zeros as after a copy that broke off."""
+    size = checked_size(path, SOUND_BYTES)
+    if size >= _LARGE_BYTES and path.suffix.lower() not in _INDEXED:
+        with path.open("rb") as stream:
+            stream.seek(-_END_BYTES, 2)
+            if not any(stream.read()):
+                raise RefusedFileError(path, "its end holds zeros only, as after a copy that broke off")
 
 
 def self_contained_suffix(content: bytes) -> str | None:
@@ -85,12 +93,7 @@ def read_piece(path: Path, begin: int, end: int, rate_hz: int, channel: int | No
     if not _is_plain(path):
         pieces = list(_placed(path, begin, end, rate_hz, channel))
         return np.concatenate(pieces) if pieces else np.zeros(0, np.float32)
-    with _opened_plain(path) as file:
-        try:
-            file.seek(begin)
-            return _mono(file.read(end - begin, dtype="float32", always_2d=True), channel)
-        except RuntimeError as error:
-            raise _unreadable(path, error) from None
+    return _mono(read_all_channels(path, begin, end, rate_hz), channel)
 
 
 def stream(path: Path, count: int, rate_hz: int, channel: int | None = None) -> Iterator[Float32[np.ndarray, " _"]]:
@@ -120,7 +123,7 @@ def cancelling_channel(path: Path, count: int, rate_hz: int) -> int | None:
     mixed = 0.0
     length = min(count, round(_LOOK_S * rate_hz))
     for begin in np.linspace(0, count - length, min(_LOOKS, max(1, count // max(length, 1)))).astype(int).tolist():
-        piece = _channels(path, begin, begin + length, rate_hz)
+        piece = read_all_channels(path, begin, begin + length, rate_hz)
         if piece.shape[1] < 2:
             return None
         power = (power if len(power) == piece.shape[1] else np.zeros(piece.shape[1])) + (piece**2).sum(axis=0)
@@ -133,33 +136,20 @@ def cancelling_channel(path: Path, count: int, rate_hz: int) -> int | None:
 def read_all_channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, "n channels"]:
     """Return the samples ``begin:end`` of every channel; fewer where the file ends before."""
     if _is_plain(path):
-        return _channels(path, begin, end, rate_hz)
-    pieces: list[Float32[np.ndarray, "n channels"]] = []
-    for time_s, samples in _frames(path, begin / rate_hz):
-        at = round(time_s * rate_hz)
-        pieces.append(samples[max(begin - at, 0) : max(end - at, 0)])
-        if at + len(samples) >= end:
-            break
-    return np.concatenate(pieces) if pieces else np.zeros((0, 1), np.float32)
-
-
-def _channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, "n channels"]:
-    if _is_plain(path):
         with _opened_plain(path) as file:
             try:
                 file.seek(begin)
                 return file.read(end - begin, dtype="float32", always_2d=True)
             except RuntimeError as error:
                 raise _unreadable(path, error) from None
-    frames: list[Float32[np.ndarray, "n channels"]] = []
-    have = 0
-    for _, samples in _frames(path, begin / rate_hz):
-        frames.append(samples)
-        have += len(samples)
-        if have >= end - begin:
+    pieces: list[Float32[np.ndarray, "n channels"]] = []
+    for time_s, samples in _frames(path, begin / rate_hz):
+        at = round(time_s * rate_hz)
+        if not pieces or samples.shape[1] == pieces[0].shape[1]:
+            pieces.append(samples[max(begin - at, 0) : max(end - at, 0)])
+        if at + len(samples) >= end:
             break
-    alike = [f for f in frames if f.shape[1] == frames[0].shape[1]]
-    return np.concatenate(alike) if alike else np.zeros((0, 1), np.float32)
+    return np.concatenate(pieces) if pieces else np.zeros((0, 1), np.float32)
 
 
 def _is_plain(path: Path) -> bool:
@@ -192,35 +182,25 @@ def _opened_plain(path: Path) -> "soundfile.SoundFile":
 def _examine_plain(path: Path) -> tuple[int, int]:
     with _opened_plain(path) as file:
         rate_hz, count = int(file.samplerate), int(file.frames)
-        known = 0 < count < _UNKNOWN
-        most = count * file.channels * _SAMPLE_BYTES + _PICTURES_BYTES  # libsndfile looks for samples in all there is
-        padded = known and file.format == "FLAC" and path.stat().st_size > most
-        if known and not (padded or _is_short_wav(path) or _lacks_its_last_sample(file)):
-            return rate_hz, count
-        if known:
+        if 0 < count < _UNKNOWN:
+            most = count * file.channels * _SAMPLE_BYTES + _LARGE_BYTES  # a seek looks for samples in all there is
+            if (file.format != "FLAC" or path.stat().st_size <= most) and _reaches(file, count):
+                return rate_hz, count
             raise AudioError(
-                f"{path} is truncated or damaged: its length does not fit the sound that its header promises; "
-                "copy or convert it again."
+                f"{path} is truncated or damaged: its length does not fit the {count / rate_hz:.2f} s that its header "
+                "promises; copy or convert it again."
             )
         whole: Any = file
         whole.seek(0)
         return rate_hz, sum(len(piece) for piece in whole.blocks(_PIECE_SAMPLES, dtype="float32"))
 
 
-def _is_short_wav(path: Path) -> bool:
-    with path.open("rb") as file:
-        head = file.read(12)
-    promised = int.from_bytes(head[4:8], "little")
-    whole = head[:4] != b"RIFF" or head[8:] != b"WAVE" or not _UNKNOWN_BYTES[0] < promised < _UNKNOWN_BYTES[1]
-    return not whole and promised + 7 > path.stat().st_size
-
-
-def _lacks_its_last_sample(file: "soundfile.SoundFile") -> bool:
+def _reaches(file: "soundfile.SoundFile", count: int) -> bool:
     try:
-        file.seek(file.frames - 1)
-        return len(file.read(1, dtype="float32")) < 1
+        file.seek(count - 1)
+        return len(file.read(1, dtype="float32")) == 1
     except RuntimeError:
-        return True
+        return False
 
 
 def _examine_video(path: Path) -> tuple[int, int]:
@@ -306,33 +286,3 @@ def _placed(
             return
     if end - at <= _SLACK_S * rate_hz:
         yield np.zeros(end - at, np.float32)
-
-
-def checked_media(path: Path) -> int:
-    """Return the size of a file of sound or video that a decoder may open.
-
-    The decoders of the other formats (Ogg, MP3, Matroska, WebM, AVI) look for the next packet in all that follows:
-    20 GB of zeros, as a full disk or a broken copy leaves them, keep a processor busy for minutes.
-    """
-    size = checked_size(path, SOUND_BYTES)
-    if size >= _MOST_ZEROS_BYTES and not _is_indexed(path) and _ends_in_zeros(path, size):
-        raise RefusedFileError(
-            path, f"the last {_MOST_ZEROS_BYTES:,} of its {size:,} bytes are zeros, as after a copy that broke off"
-        )
-    return size
-
-
-def _is_indexed(path: Path) -> bool:
-    with path.open("rb") as stream:
-        head = stream.read(16)
-    return any(head[at : at + len(magic)] == magic for at, magic in _INDEXED)
-
-
-def _ends_in_zeros(path: Path, size: int) -> bool:
-    zeros = bytes(_BLOCK_BYTES)
-    with path.open("rb") as stream:
-        for back in range(_BLOCK_BYTES, _MOST_ZEROS_BYTES + 1, _BLOCK_BYTES):
-            stream.seek(size - back)
-            if stream.read(_BLOCK_BYTES) != zeros:
-                return False
-    return True

@@ -30,13 +30,13 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core import poses
-from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio
-from avlmaps.recordings.formats.tables import POSE, read_table
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, left_out, list_names, open_audio
+from avlmaps.recordings.formats.tables import POSE, pinhole, read_table, rigid
 from avlmaps.recordings.images import first_picture_size
 
 RATE_HZ = 25.0
@@ -88,12 +88,7 @@ def read_habitat_poses(path: Path, report: Report = stop_at_first) -> Float[np.n
         line = int(table.lines[row])
         sentence = f"{path}, line {line}: the quaternion has length {norm[row]:.3g}, so this is not a rotation."
         report(Fault(sentence, path, line))
-    usable = np.isfinite(values).all(axis=1) & ~wild
-    habitat_from_body = poses.from_quaternion(
-        values[:, :3], np.where(usable[:, None], values[:, 3:], (0.0, 0.0, 0.0, 1.0))
-    )
-    habitat_from_body[~usable] = np.nan
-    return habitat_from_body
+    return rigid(values[:, :3], values[:, 3:])
 
 
 def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
@@ -130,11 +125,9 @@ def _complete(
             f"{path} has {len(colour)} pictures in rgb/, {len(depth)} in depth/ and {poses_count} lines in poses.txt, "
             "but no number is in all of them; line 1 belongs to 000000."
         )
-    notices: list[str] = []
     partial = len(colour.keys() | depth.keys() | set(range(poses_count))) - len(numbers)
-    if partial:
-        notices.append(f"{partial} frame(s) lack their picture, their depth or their line in poses.txt; left out.")
-        report(Fault(f"{path}: {notices[-1]}", path, fatal=False))
+    lost = f"{partial} frame(s) lack their picture, their depth or their line in poses.txt; left out."
+    notices = left_out(path, report, lost) if partial else []
     if not depth:
         notices.append("There is no depth, so only sounds and views can be mapped.")
     return numbers, notices
@@ -181,8 +174,5 @@ def rig_of(path: Path, shots: Shots, given: CameraFile) -> Rig:
     fy = given.fy if given.fy is not None else fx
     cx = given.cx if given.cx is not None else width / 2
     cy = given.cy if given.cy is not None else height / 2
-    try:
-        rgb = Pinhole(fx, fy, cx, cy, width, height)
-    except ValueError as error:
-        raise RecordingError(f"{path / 'camera.json'} holds no camera: {error}; fix the file.") from None
+    rgb = pinhole(path / "camera.json", fx, fy, cx, cy, width, height)
     return Rig(rgb, rgb.resized(*first_picture_size(path, shots.depth)) if shots.depth else rgb)

@@ -425,7 +425,7 @@ class McapContainer:
         self, connections: Sequence[McapConnection], received_ns: int
     ) -> Iterator[tuple[McapConnection, bytes]]:
         """See ``Container``."""
-        times = {"start_time": received_ns, "end_time": received_ns + 1}
+        times = {"starting_at": received_ns, "ending_at": received_ns}
         return ((connection, raw) for connection in connections for _, raw in self._of_channel(connection, **times))
 
     def message(self, connection: McapConnection, raw: bytes) -> Any:

@@ -417,6 +417,18 @@ def _numbers(rig: Rig) -> list[float]:
     return [*camera(rig.rgb), *camera(rig.depth), *map(float, rig.rgb_from_depth.ravel())]
 
 
+def left_out(path: Path, report: Report, sentence: str, file: Path | None = None) -> list[str]:
+    """Report that something of a recording is not used, and return it as a notice."""
+    report(Fault(f"{path}: {sentence}", file or path, fatal=False))
+    return [sentence]
+
+
+def sizes(path: Path, shots: Shots) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return (width, height) of colour and of depth."""
+    rgb_size = images.first_picture_size(path, shots.colour)
+    return rgb_size, images.first_picture_size(path, shots.depth) if len(shots.depth) else rgb_size
+
+
 def number_of(name: str) -> int:
     """Return the number that is a file's name before its first dot, -1 where that is none."""
     stem = name.split(".", 1)[0]

@@ -35,14 +35,16 @@ from avlmaps.core.files import DESCRIPTION_BYTES
 from avlmaps.recordings.corrections import from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats import avlmaps_layout
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, left_out, list_names, sizes
 from avlmaps.recordings.formats.tables import (
-    fitted,
+    fitted_rig,
+    pinhole,
     read_json,
     read_matrix,
     read_numbers,
     read_table,
     resized_notice,
+    rigid,
     text_lines,
     unread_notice,
 )
@@ -50,6 +52,7 @@ from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES, first_pic
 from avlmaps.recordings.known_formats import why_unreadable
 
 RATE_HZ = 30.0
+_NO_CLOCK = "The recording has no clock; 30 frames/s are assumed."
 _COLOUR = rf"({'|'.join(re.escape(suffix) for suffix in COLOUR_SUFFIXES)})"
 _DEPTH = rf"({'|'.join(re.escape(suffix) for suffix in DEPTH_SUFFIXES)})"
 Z_UP = (0.0, 0.0, 1.0)
@@ -115,8 +118,8 @@ def open_layout(layout: Layout, path: Path, report: Report = stop_at_first) -> F
             f"frame with all of {layout.files}."
         )
     if partial_frames := len((colour.keys() | depth.keys() | known.keys()) - set(numbers)):
-        notices = (*notices, f"{partial_frames} frame(s) lack one of colour, depth and pose and are left out.")
-        report(Fault(f"{path}: {notices[-1]}", path, fatal=False))
+        sentence = f"{partial_frames} frame(s) lack one of colour, depth and pose and are left out."
+        notices = (*notices, *left_out(path, report, sentence))
     shots = Shots(
         names=[_digits(colour[number]) for number in numbers],
         colour=[colour[number] for number in numbers],
@@ -159,8 +162,7 @@ def _rows(
     name: str, path: Path, numbers: Sequence[int], report: Report
 ) -> tuple[Poses, Callable[[int], Path], tuple[str, ...]]:
     table = read_table(path / name, (16,), report)
-    notice = "The recording has no clock; 30 frames/s are assumed."
-    return dict(enumerate(table.values.reshape(-1, 4, 4))), lambda _: path / name, (notice,)
+    return dict(enumerate(table.values.reshape(-1, 4, 4))), lambda _: path / name, (_NO_CLOCK,)
 
 
 def _of_robot(
@@ -177,8 +179,8 @@ def _of_robot(
         )
     pose = np.full((len(rows), 4, 4), np.nan)
     for at, row in enumerate(rows.values()):
-        if len(row) == 7 and abs(np.linalg.norm(row[3:]) - 1.0) <= poses.MAX_ROTATION_FAULT:
-            pose[at] = poses.from_quaternion(row[:3], row[3:])
+        if len(row) == 7:
+            pose[at] = rigid(row[None, :3], row[None, 3:])[0]
         elif len(row) in (12, 16):
             pose[at] = np.vstack([row.reshape(-1, 4)[:3], [0.0, 0.0, 0.0, 1.0]])
     if lengths == {7}:
@@ -186,8 +188,7 @@ def _of_robot(
         pose, notice = avlmaps_layout.camera_poses(pose, given)
     else:
         pose, notice = _of_matrices(pose)
-    clock = "The recording has no clock; 30 frames/s are assumed."
-    return dict(zip(rows, pose, strict=True)), lambda number: path / files[number], (notice, clock)
+    return dict(zip(rows, pose, strict=True)), lambda number: path / files[number], (notice, _NO_CLOCK)
 
 
 def _of_matrices(pose: Float[np.ndarray, "n 4 4"]) -> tuple[Float[np.ndarray, "n 4 4"], str]:
@@ -368,23 +369,7 @@ def fitted_cameras(
     path: Path, shots: Shots, camera: Pinhole, file: Path, units_per_m: float, notices: tuple[str, ...] = ()
 ) -> Cameras:
     """Return one camera for colour and depth, at the size that each has."""
-    rgb_size, depth_size = sizes(path, shots)
-    rig = Rig(fitted(camera, rgb_size, file, "colour"), fitted(camera, depth_size, file, "depth"))
-    return Cameras(rig, units_per_m, notices)
-
-
-def sizes(path: Path, shots: Shots) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return (width, height) of colour and of depth."""
-    rgb_size = first_picture_size(path, shots.colour)
-    return rgb_size, first_picture_size(path, shots.depth) if len(shots.depth) else rgb_size
-
-
-def pinhole(file: Path, fx: float, fy: float, cx: float, cy: float, width: int, height: int) -> Pinhole:
-    """Return a camera, or raise ``RecordingError`` that names the file whose numbers are of none."""
-    try:
-        return Pinhole(fx, fy, cx, cy, width, height)
-    except ValueError as error:
-        raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None
+    return Cameras(fitted_rig(camera, *sizes(path, shots), file), units_per_m, notices)
 
 
 _LAYOUTS = (
@@ -450,11 +435,11 @@ def open_redwood(path: Path, report: Report = stop_at_first) -> FileRecording:
         raise RecordingError(f"{path} has {len(colour)} colour and {len(depth)} depth pictures and {len(pose)} poses.")
     rows, notices = _matched(path, colour, depth, ids)
     for sentence in notices:
-        report(Fault(f"{path}: {sentence}", log, fatal=False))
+        left_out(path, report, sentence, log)
     colour, depth = [colour[row[0]] for row in rows], [depth[row[1]] for row in rows]
     stamps_s = _microseconds(depth)
     if stamps_s is None:
-        notices.append("The recording has no clock; 30 frames/s are assumed.")
+        notices.append(_NO_CLOCK)
         stamps_s = np.array([row[3] for row in rows], np.float64) / RATE_HZ
     shots = Shots(
         names=[name.rsplit(".", 1)[0] for name in colour],

@@ -22,9 +22,18 @@ from avlmaps.core import poses, timeline
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, natural_key
-from avlmaps.recordings.formats.layouts import Z_UP, Cameras, Poses, fitted_cameras, pinhole, sizes
-from avlmaps.recordings.formats.tables import POSE, read_opencv_yaml, read_table, resized_notice, text_lines
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, left_out, list_names, natural_key, sizes
+from avlmaps.recordings.formats.layouts import Z_UP, Cameras, Poses, fitted_cameras
+from avlmaps.recordings.formats.tables import (
+    DISTORTED,
+    POSE,
+    pinhole,
+    read_opencv_yaml,
+    read_table,
+    resized_notice,
+    rigid,
+    text_lines,
+)
 from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES
 from avlmaps.recordings.plausible import clock_fault, date_fault, repeat_fault
 
@@ -217,8 +226,7 @@ def _orb_camera(file: Path, size: tuple[int, int]) -> tuple[Pinhole, float, tupl
     width, height = number("width") or size[0], number("height") or size[1]
     camera = pinhole(file, fx, fy, cx + 0.5, cy + 0.5, round(width), round(height))
     if any(abs(number(name) or 0.0) > 1e-9 for name in ("k1", "k2", "p1", "p2", "k3")):
-        more = "The pictures have lens distortion, which a pinhole leaves out; undistorted pictures make a better map."
-        return camera, units, (*resized_notice(camera, size), more)
+        return camera, units, (*resized_notice(camera, size), DISTORTED)
     return camera, units, resized_notice(camera, size)
 
 
@@ -230,18 +238,13 @@ def _associations(file: Path, report: Report) -> list[tuple[float, str, str]]:
         try:
             if len(words) != 4:
                 raise ValueError(text)
-            key, one, _, other = (
-                float(words[0]),
-                words[1].removeprefix("./"),
-                float(words[2]),
-                words[3].removeprefix("./"),
-            )
+            key, other_key, (one, other) = float(words[0]), float(words[2]), words[1::2]
         except ValueError:
             sentence = f"{file}, line {number}: {text[:40]!r} is not a number, a file, the number again and a file."
             report(Fault(sentence, file, number))
             continue
         one, other = one.removeprefix("./"), other.removeprefix("./")
-        rows.append((float(words[2]), other, one) if "depth" in one else (key, one, other))
+        rows.append((other_key, other, one) if "depth" in one else (key, one, other))
     return rows
 
 
@@ -261,10 +264,8 @@ def open_icl_nuim(path: Path, report: Report = stop_at_first) -> FileRecording:
     posed = [row for row in rows if row[0] in known]
     if not posed:
         raise RecordingError(f"{truth} has a pose for none of the {len(rows)} frames of {listed.name}.")
-    notices: list[str] = []
-    if len(posed) < len(rows):
-        notices.append(f"{len(rows) - len(posed)} frame(s) have no pose in {truth.name} and are left out.")
-        report(Fault(f"{path}: {notices[-1]}", truth, fatal=False))
+    lost = f"{len(rows) - len(posed)} frame(s) have no pose in {truth.name} and are left out."
+    notices = left_out(path, report, lost, truth) if len(posed) < len(rows) else []
     mirror, numbers = np.diag([1.0, -1.0, 1.0, 1.0]), np.array([row[0] for row in posed], np.float64)
     shots = Shots(
         names=[f"{number}" for number, _, _ in posed],
@@ -282,9 +283,8 @@ def open_icl_nuim(path: Path, report: Report = stop_at_first) -> FileRecording:
 
 def _freiburg(file: Path, report: Report) -> Poses:
     rows = read_table(file, (8,), report, names=POSE).values
-    rows = rows[np.abs(np.linalg.norm(rows[:, 4:], axis=1) - 1.0) <= poses.MAX_ROTATION_FAULT]
-    found = poses.from_quaternion(rows[:, 1:4], rows[:, 4:])
-    return {int(row[0]): pose for row, pose in zip(rows, found, strict=True)}
+    found = zip(rows[:, 0].tolist(), rigid(rows[:, 1:4], rows[:, 4:]), strict=True)
+    return {int(number): pose for number, pose in found if np.isfinite(pose).all()}
 
 
 def _sim(file: Path, rows: list[tuple[int, str, str]]) -> Poses:
@@ -354,10 +354,7 @@ def _exported_poses(values: Float[np.ndarray, "n c"]) -> tuple[Float[np.ndarray,
         pose = np.tile(np.eye(4), (len(values), 1, 1))
         pose[:, :3] = values.reshape(-1, 3, 4)
         return pose, np.zeros((len(values), 0))
-    usable = np.abs(np.linalg.norm(values[:, 4:8], axis=1) - 1.0) <= poses.MAX_ROTATION_FAULT
-    pose = poses.from_quaternion(values[:, 1:4], np.where(usable[:, None], values[:, 4:8], (0.0, 0.0, 0.0, 1.0)))
-    pose[~usable] = np.nan
-    return pose, values[:, [0, *range(8, values.shape[1])]]
+    return rigid(values[:, 1:4], values[:, 4:8]), values[:, [0, *range(8, values.shape[1])]]
 
 
 def _exported_rows(

@@ -21,27 +21,28 @@ import msgspec
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
-from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import MANIFEST_BYTES, PICTURE_BYTES, SOUND_BYTES
 from avlmaps.recordings import images
 from avlmaps.recordings.corrections import UP_IN_WORLD, from_opengl
-from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.faults import Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import (
     Shots,
     StoredRecording,
+    left_out,
     likeliest_sound,
     list_names,
     number_of,
     open_audio,
 )
 from avlmaps.recordings.formats.tables import (
-    fitted,
+    fitted_rig,
     median_camera,
     parse_json,
     read_json,
     resized_notice,
+    rigid,
     unread_notice,
 )
 from avlmaps.recordings.plausible import pace_fault
@@ -213,9 +214,9 @@ def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording
         )
     notices = [*unread_notice(file, plain, (*_Metadata.__struct_fields__, *_IDLE), strict=False)]
     if len(numbers) < max(len(given.poses), len(colour)):
-        left = max(len(given.poses), len(colour)) - len(numbers)
-        notices.append(f"{left} frame(s) lack one of colour, depth and pose and are left out.")
-        report(Fault(f"{inside}: {notices[-1]}", file, fatal=False))
+        lost = max(len(given.poses), len(colour)) - len(numbers)
+        sentence = f"{lost} frame(s) lack one of colour, depth and pose and are left out."
+        notices += left_out(inside, report, sentence, file)
     given_s = _stamps(file, given, notices)
     shots = Shots(
         names=[str(n) for n in numbers],
@@ -267,11 +268,7 @@ def _poses(file: Path, given: _Metadata) -> Float[np.ndarray, "n 4 4"]:
     if any(len(row) != 7 for row in given.poses):
         raise RecordingError(f"{file} has a pose of other than seven numbers (qx qy qz qw tx ty tz); share it again.")
     rows = np.array(given.poses, np.float64).reshape(-1, 7)
-    length = np.linalg.norm(rows[:, :4], axis=1)
-    usable = np.abs(length - 1.0) <= poses.MAX_ROTATION_FAULT
-    found = poses.from_quaternion(rows[:, 4:], np.where(usable[:, None], rows[:, :4], (0.0, 0.0, 0.0, 1.0)))
-    found[~usable] = np.nan
-    return from_opengl(found)
+    return from_opengl(rigid(rows[:, 4:], rows[:, :4]))
 
 
 def _rig(files: _Files, file: Path, given: _Metadata, shots: Shots) -> tuple[Rig, tuple[str, ...]]:
@@ -293,7 +290,7 @@ def _rig(files: _Files, file: Path, given: _Metadata, shots: Shots) -> tuple[Rig
         depth_size = (width, height)
     elif not (given.dw > 0 and given.dh > 0):
         depth_size = _size_like(files, shots.depth[0], camera)
-    rig = Rig(fitted(camera, rgb_size, file, "colour"), fitted(camera, depth_size, file, "depth"))
+    rig = fitted_rig(camera, rgb_size, depth_size, file)
     return rig, (*notices, *resized_notice(camera, rgb_size))
 
 

@@ -13,12 +13,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion, inverse
+from avlmaps.core.poses import inverse
 from avlmaps.core.timeline import Trajectory, in_order
 from avlmaps.recordings.faults import stop_at_first
 from avlmaps.recordings.formats.bags import Bag
 from avlmaps.recordings.formats.ros_messages import pose_of, stamp_of
-from avlmaps.recordings.formats.tables import POSE, read_table
+from avlmaps.recordings.formats.tables import POSE, read_table, rigid
 from avlmaps.recordings.types import BaseHeight
 
 # A correction such as map -> odom may come seldom: past its ends it is held for this long, as tf holds the last one,
@@ -365,11 +365,9 @@ def _tree_of_file(file: Path, camera_frame: str) -> TransformTree:
     Its columns are stamp tx ty tz qx qy qz qw, as TUM writes them, or what its header says.
     """
     tree = TransformTree()
-    for row in read_table(file, (8,), stop_at_first, names=POSE).values:
-        length = float(np.linalg.norm(row[4:]))
-        usable = np.isfinite(row).all() and abs(length - 1.0) <= MAX_ROTATION_FAULT
-        pose = from_quaternion(row[1:4], row[4:]) if usable else np.full((4, 4), np.nan)
-        tree.add("world", camera_frame, pose, float(row[0]), static=False)
+    rows = read_table(file, (8,), stop_at_first, names=POSE).values
+    for stamp_s, pose in zip(rows[:, 0].tolist(), rigid(rows[:, 1:4], rows[:, 4:]), strict=True):
+        tree.add("world", camera_frame, pose, stamp_s, static=False)
     if not tree.moves(camera_frame):
         raise RecordingError(f"{file} holds no pose (stamp tx ty tz qx qy qz qw a line).")
     return tree

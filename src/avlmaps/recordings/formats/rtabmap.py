@@ -12,7 +12,7 @@ import sqlite3
 import struct
 import threading
 import zlib
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,9 +26,9 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import SAMPLED_BYTES, checked_size
 from avlmaps.core.rvl import decode_rvl
 from avlmaps.recordings import images
-from avlmaps.recordings.faults import Fault, Report, readable, stop_at_first
-from avlmaps.recordings.formats.file_recording import Shots, StoredRecording, settle
-from avlmaps.recordings.formats.tables import fitted, resized_notice
+from avlmaps.recordings.faults import Report, readable, stop_at_first
+from avlmaps.recordings.formats.file_recording import Shots, StoredRecording, left_out, settle
+from avlmaps.recordings.formats.tables import DISTORTED, fitted_rig, pinhole, resized_notice
 
 _SQLITE = b"SQLite format 3\0"
 _RVL = b"DEPTHRVL"
@@ -166,8 +166,8 @@ def open_rtabmap(path: Path, report: Report = stop_at_first) -> StoredRecording:
     if not used:
         raise RecordingError(f"{path} has optimised poses for none of its {len(whole)} nodes with pictures.")
     if len(used) < len(rows):
-        notices.append(f"{len(rows) - len(used)} node(s) lack colour, depth, calibration or pose and are left out.")
-        report(Fault(f"{path}: {notices[-1]}", path, fatal=False))
+        sentence = f"{len(rows) - len(used)} node(s) lack colour, depth, calibration or pose and are left out."
+        notices += left_out(path, report, sentence)
     with database.told():
         seen = [_calibration(path, row[0], row[3], version) for row in used]
         base = np.stack([optimised[row[0]] if optimised else _transform(row[2] or b"") for row in used])
@@ -179,9 +179,7 @@ def open_rtabmap(path: Path, report: Report = stop_at_first) -> StoredRecording:
         world_from_camera=base @ np.stack([own.base_from_camera for own in seen]),
     )
     if seen[0].distorted:
-        notices.append(
-            "The pictures have lens distortion, which a pinhole leaves out; rectified ones make a better map."
-        )
+        notices.append(DISTORTED)
     rig, unit_m, more = _rig(path, database, shots, seen[0].camera)
     shots, settled = settle(path, shots, report, lambda _: path)
     start_s = float(shots.stamps_s[0]) if len(shots.names) else 0.0
@@ -294,12 +292,10 @@ def _old_calibration(path: Path, node: int, blob: bytes) -> _Calibration:
     return _Calibration(_pinhole(path, node, tuple(numbers[:4]), size), _matrix(numbers[6:]), False)
 
 
-def _pinhole(path: Path, node: int, numbers: tuple[float, ...], size: tuple[int, int]) -> Pinhole:
+def _pinhole(path: Path, node: int, numbers: Sequence[float], size: tuple[int, int]) -> Pinhole:
     fx, fy, cx, cy = numbers
-    try:
-        return Pinhole(fx, fy, cx + 0.5, cy + 0.5, *size)  # OpenCV counts pixel centres as whole numbers
-    except ValueError as error:
-        raise RecordingError(f"The calibration of node {node} of {path} is of no camera: {error}.") from None
+    # OpenCV counts pixel centres as whole numbers
+    return pinhole(path / f"node {node}, calibration", fx, fy, cx + 0.5, cy + 0.5, *size)
 
 
 def _rig(path: Path, database: _Database, shots: Shots, camera: Pinhole) -> tuple[Rig, float, tuple[str, ...]]:
@@ -307,6 +303,6 @@ def _rig(path: Path, database: _Database, shots: Shots, camera: Pinhole) -> tupl
     rgb_size = images.picture_size(path / f"node {first}, colour", database.blob("image", first))
     blob = database.blob("depth", first)
     height, width = _unpacked_depth(path / f"node {first}, depth", blob).shape
-    rig = Rig(fitted(camera, rgb_size, path, "colour"), fitted(camera, (width, height), path, "depth"))
+    rig = fitted_rig(camera, rgb_size, (width, height), path)
     floats = not blob.startswith(_RVL) and blob[25:26] == b"\x06"  # a PNG's colour type: four channels
     return rig, 1.0 if floats else 1e-3, resized_notice(camera, rgb_size)

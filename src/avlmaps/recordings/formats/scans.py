@@ -30,20 +30,22 @@ import msgspec
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core import poses
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES
 from avlmaps.recordings.corrections import UP_IN_WORLD, from_opengl
-from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, number_of
+from avlmaps.recordings.faults import Report, stop_at_first
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, left_out, list_names, number_of, sizes
 from avlmaps.recordings.formats.tables import (
+    DISTORTED,
     fitted,
+    fitted_rig,
     median_camera,
     read_json,
     read_matrix,
     read_table,
     resized_notice,
+    rigid,
     text_lines,
     unread_notice,
 )
@@ -109,9 +111,8 @@ def open_nerfstudio(path: Path, report: Report = stop_at_first) -> FileRecording
             f"{file} names no depth (depth_file_path) for any of its {len(given.frames)} frames, and a map needs it; "
             "convert the scan again with its depth (ns-process-data polycam --use-depth, or record3d)."
         )
-    if len(frames) < len(given.frames):
-        notices.append(f"{len(given.frames) - len(frames)} frame(s) have no depth_file_path and are left out.")
-        report(Fault(f"{file}: {notices[-1]}", file, fatal=False))
+    if lost := len(given.frames) - len(frames):
+        notices += left_out(file, report, f"{lost} frame(s) have no depth_file_path and are left out.")
     units = _units_per_m(file, given)
     colour = [_found(path, frame.file_path) for frame in frames]
     shots = Shots(
@@ -185,18 +186,16 @@ def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> 
             "the pictures first."
         )
     rgb_size = first_picture_size(file.parent, shots.colour)
-    sizes = {(round(f.w or given.w or rgb_size[0]), round(f.h or given.h or rgb_size[1])) for f in frames}
-    if len(sizes) > 1:
-        shown = " and ".join(f"{width}x{height}" for width, height in sorted(sizes)[:2])
+    said = {(round(f.w or given.w or rgb_size[0]), round(f.h or given.h or rgb_size[1])) for f in frames}
+    if len(said) > 1:
+        shown = " and ".join(f"{width}x{height}" for width, height in sorted(said)[:2])
         raise RecordingError(f"{file} has frames of {shown}; the frames of a recording must have one size.")
-    size = sizes.pop()
+    size = said.pop()
     numbers = np.array([_numbers(file, frame, given, size) for frame in frames])
     camera, notices = median_camera(file, numbers, *size)
     if any(abs(getattr(camera_, name)) > 1e-9 for camera_ in (given, *frames) for name in _DISTORTION):
-        more = "The pictures have lens distortion, which a pinhole leaves out; undistorted pictures make a better map."
-        notices = (*notices, more)
-    depth_size = first_picture_size(file.parent, shots.depth)
-    rig = Rig(fitted(camera, rgb_size, file, "colour"), fitted(camera, depth_size, file, "depth"))
+        notices = (*notices, DISTORTED)
+    rig = fitted_rig(camera, *sizes(file.parent, shots), file)
     return rig, (*notices, *resized_notice(camera, rgb_size))
 
 
@@ -268,9 +267,8 @@ def open_polycam(path: Path, report: Report = stop_at_first) -> FileRecording:
     if not names:
         raise RecordingError(f"{frames} holds no frame with all of {images}/N.jpg, depth/N.png and {cameras}/N.json.")
     partial = len((colour.keys() | depth.keys() | described.keys()) - set(names))
-    notices = [f"{partial} frame(s) lack one of colour, depth and camera and are left out."] if partial else []
-    for sentence in notices:
-        report(Fault(f"{path}: {sentence}", path, fatal=False))
+    lost = f"{partial} frame(s) lack one of colour, depth and camera and are left out."
+    notices = left_out(path, report, lost) if partial else []
     files = [frames / cameras / described[stem] for stem in names]
     read = [read_json(file, _PolycamCamera, DESCRIPTION_BYTES) for file in files]
     found = [camera for camera, _ in read]
@@ -286,10 +284,10 @@ def open_polycam(path: Path, report: Report = stop_at_first) -> FileRecording:
         confidence=[f"{below}confidence/{sure[s]}" for s in names] if all(s in sure for s in names) else (),
     )
     numbers = np.array([(c.fx, c.fy, c.cx, c.cy) for c in found])
-    rgb_size, depth_size = first_picture_size(path, shots.colour), first_picture_size(path, shots.depth)
+    rgb_size, depth_size = sizes(path, shots)
     # corrected cameras have no size: it is that of the corrected pictures
     camera, more = median_camera(files[0], numbers, found[0].width or rgb_size[0], found[0].height or rgb_size[1])
-    rig = Rig(fitted(camera, rgb_size, files[0], "colour"), fitted(camera, depth_size, files[0], "depth"))
+    rig = fitted_rig(camera, rgb_size, depth_size, files[0])
     return FileRecording.settled(
         path, "polycam", rig, shots, (*notices, *more, *resized_notice(camera, rgb_size)), report, files.__getitem__,
         up_in_world=UP_IN_WORLD.copy(),
@@ -300,13 +298,9 @@ def _by_stem(folder: Path, suffixes: tuple[str, ...]) -> dict[str, str]:
     return {name.split(".", 1)[0]: name for name in list_names(folder, suffixes)}
 
 
-def _matrix(c: _PolycamCamera) -> Float[np.ndarray, "4 4"]:
-    return np.array([
-        [c.t_00, c.t_01, c.t_02, c.t_03],
-        [c.t_10, c.t_11, c.t_12, c.t_13],
-        [c.t_20, c.t_21, c.t_22, c.t_23],
-        [0.0, 0.0, 0.0, 1.0],
-    ])  # fmt: skip
+def _matrix(camera: _PolycamCamera) -> Float[np.ndarray, "4 4"]:
+    rows = [[getattr(camera, f"t_{row}{column}") for column in range(4)] for row in range(3)]
+    return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
 
 
 def _keyframe_stamps(cameras: list[_PolycamCamera], names: list[str], notices: list[str]) -> Float[np.ndarray, " n"]:
@@ -331,28 +325,21 @@ def open_stray_scanner(path: Path, report: Report = stop_at_first) -> FileRecord
     rows = _odometry(path / "odometry.csv", report)
     video = VideoFrames(path / "rgb.mp4")
     depth = {number_of(name): name for name in list_names(path / "depth", (".png",))}
-    sure = {number_of(name): name for name in _confidence(path)}
+    inside = path / "confidence"
+    sure = {number_of(name): name for name in (list_names(inside, (".png",)) if inside.is_dir() else ())}
     numbers = rows[:, 1].astype(int)
     whole = np.array([n in depth and 0 <= n < len(video) for n in numbers], bool)
-    notices: list[str] = []
     if not whole.any():
         raise RecordingError(f"{path} has no frame with all of a picture in rgb.mp4, depth/ and a row in odometry.csv.")
-    if not whole.all():
-        notices.append(
-            f"{int((~whole).sum())} row(s) of odometry.csv have no depth or no video frame and are left out."
-        )
-        report(Fault(f"{path}: {notices[-1]}", path / "odometry.csv", fatal=False))
+    lost = f"{int((~whole).sum())} row(s) of odometry.csv have no depth or no video frame and are left out."
+    notices = [] if whole.all() else left_out(path, report, lost, path / "odometry.csv")
     rows, numbers = rows[whole], numbers[whole]
-    quaternion = rows[:, 5:9]
-    usable = np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) <= poses.MAX_ROTATION_FAULT
-    pose = poses.from_quaternion(rows[:, 2:5], np.where(usable[:, None], quaternion, (0.0, 0.0, 0.0, 1.0)))
-    pose[~usable] = np.nan
     shots = Shots(
         names=[f"{n:06d}" for n in numbers],
         colour=[],
         depth=[f"depth/{depth[int(n)]}" for n in numbers],
         stamps_s=rows[:, 0] - rows[0, 0],
-        world_from_camera=pose,
+        world_from_camera=rigid(rows[:, 2:5], rows[:, 5:9]),
         video_frames=numbers.tolist(),
         confidence=[f"confidence/{sure[int(n)]}" for n in numbers] if all(int(n) in sure for n in numbers) else (),
     )
@@ -377,10 +364,6 @@ def _odometry(file: Path, report: Report) -> np.ndarray:
     if len(finite) == 0:
         raise RecordingError(f"{file} holds no pose, so there is nothing to map.")
     return finite
-
-
-def _confidence(path: Path) -> list[str]:
-    return list_names(path / "confidence", (".png",)) if (path / "confidence").is_dir() else []
 
 
 def _stray_rig(path: Path, rows: np.ndarray, video: VideoFrames, shots: Shots) -> tuple[Rig, tuple[str, ...]]:

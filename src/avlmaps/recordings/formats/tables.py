@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from jaxtyping import Float, Int
 
-from avlmaps.core.camera import Pinhole
+from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import (
     DESCRIPTION_BYTES,
@@ -334,15 +334,31 @@ def unread_notice(
 _WANDERS = 0.01
 
 
+DISTORTED = "The pictures have lens distortion, which a pinhole leaves out; undistorted pictures make a better map."
+
+
+def rigid(xyz: Float[np.ndarray, "n 3"], xyzw: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 4 4"]:
+    """Return poses of positions and quaternions; NaN where one is not finite, or no rotation."""
+    usable = np.isfinite(xyz).all(axis=1) & (np.abs(np.linalg.norm(xyzw, axis=1) - 1.0) <= MAX_ROTATION_FAULT)
+    pose = from_quaternion(xyz, np.where(usable[:, None], xyzw, (0.0, 0.0, 0.0, 1.0)))
+    pose[~usable] = np.nan
+    return pose
+
+
+def pinhole(file: Path, fx: float, fy: float, cx: float, cy: float, width: int, height: int) -> Pinhole:
+    """Return a camera, or raise ``RecordingError`` that names the file whose numbers are of none."""
+    try:
+        return Pinhole(fx, fy, cx, cy, width, height)
+    except ValueError as error:
+        raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None
+
+
 def median_camera(
     file: Path, fx_fy_cx_cy: Float[np.ndarray, "n 4"], width: int, height: int
 ) -> tuple[Pinhole, tuple[str, ...]]:
     """Return the camera that stands for all frames', and a notice where they differ much."""
-    try:
-        fx, fy, cx, cy = (float(value) for value in np.median(fx_fy_cx_cy, axis=0))
-        camera = Pinhole(fx, fy, cx, cy, width, height)
-    except ValueError as error:
-        raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None
+    fx, fy, cx, cy = (float(value) for value in np.median(fx_fy_cx_cy, axis=0))
+    camera = pinhole(file, fx, fy, cx, cy, width, height)
     low, high = float(fx_fy_cx_cy[:, 0].min()), float(fx_fy_cx_cy[:, 0].max())
     if high > low * (1.0 + _WANDERS):
         return camera, (f"The focal length wanders between {low:.1f} and {high:.1f} pixels; {fx:.1f} is used for all.",)
@@ -367,6 +383,11 @@ def fitted(camera: Pinhole, size: tuple[int, int], file: Path, what: str) -> Pin
     return camera.resized(width, height)
 
 
+def fitted_rig(camera: Pinhole, rgb_size: tuple[int, int], depth_size: tuple[int, int], file: Path) -> Rig:
+    """Return one camera for colour and depth, at the size that each has."""
+    return Rig(fitted(camera, rgb_size, file, "colour"), fitted(camera, depth_size, file, "depth"))
+
+
 def resized_notice(camera: Pinhole, size: tuple[int, int]) -> tuple[str, ...]:
     """Return a notice where pictures have another size than their intrinsics, or nothing."""
     if size == (camera.width, camera.height):
@@ -381,15 +402,16 @@ def read_pose_file(path: Path) -> tuple[Float[np.ndarray, " n"], Float[np.ndarra
     table = read_table(path, (8,), stop_at_first, names=POSE)
     if not len(table.values):
         raise RecordingError(f"{path} holds no pose; it needs a line of stamp tx ty tz qx qy qz qw for each.")
-    length = np.linalg.norm(table.values[:, 4:], axis=1)
-    wrong = ~np.isfinite(table.values).all(axis=1) | ~(np.abs(length - 1.0) <= MAX_ROTATION_FAULT)
+    pose = rigid(table.values[:, 1:4], table.values[:, 4:])
+    wrong = ~np.isfinite(pose).all(axis=(1, 2)) | ~np.isfinite(table.values[:, 0])
     if wrong.any():
         row = int(np.flatnonzero(wrong)[0])
+        length = np.linalg.norm(table.values[row, 4:])
         raise RecordingError(
-            f"{path}, line {int(table.lines[row])}: this is no pose (NaN, or a quaternion of length {length[row]:.3g}, "
+            f"{path}, line {int(table.lines[row])}: this is no pose (NaN, or a quaternion of length {length:.3g}, "
             "where 1 belongs); fix or remove the line."
         )
-    return table.values[:, 0], from_quaternion(table.values[:, 1:4], table.values[:, 4:])
+    return table.values[:, 0], pose
 
 
 def on_clock_of(stamps_s: Float[np.ndarray, " n"], recording: Recording) -> Float[np.ndarray, " n"]:
