@@ -22,9 +22,8 @@ from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.recordings.audio import Sound, write_flac
 from avlmaps.recordings.formats.ros_sound import GAP_S, Pcm, PictureClock, SoundTopic, extract_audio, silences
 from avlmaps.recordings.formats.rosbag import open_rosbag
-from avlmaps.recordings.images import DisplayTurn, exif_turn
+from avlmaps.recordings.images import DisplayTurn, VideoFrames, exif_turn
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.video import VideoFrames
 
 CHUNK_S = 0.1
 

@@ -13,16 +13,15 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings import known_formats
+from avlmaps.recordings import open as known_formats
 from avlmaps.recordings.conformance import NonConformanceError, Truth, check, check_damage, example_truth
-from avlmaps.recordings.known_formats import FORMATS, Format, formats, register
-from avlmaps.recordings.open import find_format, open_recording
+from avlmaps.recordings.open import FORMATS, Format, find_format, formats, open_recording, register
 
 SOURCE = Path(__file__).parent / "example_format"
 USED = """
 import json, sys
 from pathlib import Path
-from avlmaps.recordings.known_formats import formats
+from avlmaps.recordings.open import formats
 from avlmaps.recordings.open import open_recording
 recording = open_recording(sys.argv[1])
 print(json.dumps({"format": recording.format, "frames": len(recording), "known": [f.name for f in formats()]}))

@@ -7,8 +7,7 @@ import pytest
 from avlmaps.recordings.conformance import check, check_damage
 from avlmaps.recordings.corrections import Corrections, corrected
 from avlmaps.recordings.formats.tables import on_clock_of
-from avlmaps.recordings.known_formats import FORMATS
-from avlmaps.recordings.open import find_format, open_recording
+from avlmaps.recordings.open import FORMATS, find_format, open_recording
 from avlmaps.recordings.types import Subset
 from helpers.format_writers import START_S, WRITTEN
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.video import VideoFrames
+from avlmaps.recordings.images import VideoFrames
 
 COUNT = 60
 

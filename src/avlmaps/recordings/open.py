@@ -1,21 +1,382 @@
-"""Opening a recording of any known format in place, found by what the folder or file holds."""
+"""Opening a recording of any known format in place, found by what the folder or file holds.
 
+Other packages add theirs through the entry point group ``avlmaps.formats``; an entry's name is the format's name and
+its value ``package.module:FORMAT``, a ``Format``. A built-in format goes before another package's where both
+recognise a folder; ``--format NAME`` chooses.
+"""
+
+import importlib
 import os
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from fnmatch import fnmatch
+from functools import cache
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import lasting_path, user_path
+from avlmaps.core.registry import entry_points
+from avlmaps.core.timeline import is_in_future
+from avlmaps.core.wording import option
 from avlmaps.core.words import did_you_mean, near_path
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import with_microphones
 from avlmaps.recordings.corrections import Corrections, corrected
-from avlmaps.recordings.known_formats import FORMATS, LOOKED_AT, Format, formats, settle_sound, why_unreadable
+from avlmaps.recordings.faults import Report, stop_at_first
 from avlmaps.recordings.microphones import microphones_named
 from avlmaps.recordings.types import Recording
+
+ENTRY_POINT_GROUP = "avlmaps.formats"
+# A folder of a million files must not be listed to be recognised.
+LOOKED_AT = 2000
+# A sound track that covers a smaller share of the frames is worth a notice.
+_LEAST_SHARED = 0.5
+_YEAR_9999_S = 253_402_300_799.0
+_HERE = "avlmaps.recordings.formats"
+_BAG_SUFFIXES = (".bag", ".mcap", ".db3")
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """One format of recordings.
+
+    Attributes:
+        name: its name on the command line.
+        looks_for: what makes a folder or file this format, in words.
+        matches: the same as a quick test.
+        opener: ``package.module:function`` (ours begin with a dot), or a key of the module's ``OPENERS``; called with
+            the path, and with ``report=`` if it tells faults.
+        tells_faults: whether the opener takes ``report``.
+        has_topics: whether the opener takes topics by name, and several files of one recording.
+    """
+
+    name: str
+    looks_for: str
+    matches: Callable[[Path], bool]
+    opener: str
+    tells_faults: bool = True
+    has_topics: bool = False
+
+    def open(
+        self,
+        path: Path,
+        report: Report = stop_at_first,
+        topics: Mapping[str, str] | None = None,
+        more: Sequence[Path] = (),
+    ) -> Recording:
+        """Open a recording with this format's opener.
+
+        Args:
+            path: the recording.
+            report: called with every fault.
+            topics: names by what they are for.
+            more: further files of the same recording.
+        """
+        module, _, function = self.opener.partition(":")
+        found = importlib.import_module(module, _HERE)
+        opener = getattr(found, function, None) or found.OPENERS[function]
+        if self.has_topics:
+            recording = opener(path, topics or {}, more)
+        elif more:
+            raise RecordingError(
+                f"{path} is of the format {self.name}, which is one folder or file; leave {more[0]} "
+                "out, or build a map of each and `avlmaps merge` them."
+            )
+        elif topics:
+            raise RecordingError(f"{path} is of the format {self.name}, which has no topics; leave them out.")
+        else:
+            recording = opener(path, report=report) if self.tells_faults else opener(path)
+        settle_sound(recording)
+        if is_in_future(recording.begins_s):
+            when = datetime.fromtimestamp(min(recording.begins_s, _YEAR_9999_S), UTC).date()
+            notice = f"The stamps begin on {when}, in the future: the clock was wrong, and no day is taken from it."
+            recording.notices = (*recording.notices, notice)
+        return recording
+
+
+def settle_sound(recording: Recording) -> None:
+    """Hold a recording's sound track against its frames, and add what is worth knowing of it to the notices."""
+    track = recording.audio
+    if track is None:
+        return
+    notices = track.notices
+    if len(recording):
+        first_s, last_s = float(recording.stamps_s[0]), float(recording.stamps_s[-1])
+        span = f"from {track.start_s:.2f} to {track.end_s:.2f} s, and the frames from {first_s:.2f} to {last_s:.2f} s"
+        shared_s = min(track.end_s, last_s) - max(track.start_s, first_s)
+        if shared_s < 0.0:
+            raise RecordingError(
+                f"The sound track {track.path.name} of {recording.path} goes {span}, so that no sound has a place; "
+                "give the recording's time at which it begins (audio_start_s of recording.json), another track "
+                f"({option('audio')}), or none."
+            )
+        if shared_s < _LEAST_SHARED * (last_s - first_s):
+            notices = (*notices, f"The sound track {track.path.name} goes {span}; the rest has no sound.")
+    recording.notices = (*recording.notices, *notices)
+
+
+def holds(*names: str) -> Callable[[Path], bool]:
+    """Return a test for a folder that has entries of all these names."""
+    return lambda path: all((path / name).exists() for name in names)
+
+
+def some_name(folder: Path, *patterns: str) -> bool:
+    """Return whether one of a folder's first entries has a name like one of the patterns."""
+    if not folder.is_dir():
+        return False
+    with os.scandir(folder) as entries:
+        return any(fnmatch(entry.name, pattern) for entry in islice(entries, LOOKED_AT) for pattern in patterns)
+
+
+def _is_folder(path: Path) -> bool:
+    return (path / layout.DESCRIPTION).exists() or (path / layout.UNFINISHED).exists()
+
+
+def _called(target: str, path: Path) -> Any:
+    module, _, function = target.partition(":")
+    return getattr(importlib.import_module(f".{module}", _HERE), function)(path)
+
+
+def _is_rosbag(path: Path) -> bool:
+    if not path.is_dir():
+        return path.suffix.lower() in _BAG_SUFFIXES
+    packed = (path / "metadata.yaml").exists() and some_name(path, "*.db3.*", "*.mcap.*")
+    return packed or some_name(path, *(f"*{suffix}" for suffix in _BAG_SUFFIXES))
+
+
+FORMATS: tuple[Format, ...] = (
+    Format(
+        "folder",
+        "recording.json with rgb/ (or rgb.mp4), depth/ and poses.csv",
+        _is_folder,
+        ".folder:open_folder",
+    ),
+    Format(
+        "7scenes",
+        "frame-000000.color.jpg or .png, .depth.png and .pose.txt",
+        lambda path: some_name(path, "frame-*.pose.txt", "frame-*.color.*"),
+        ".layouts:7scenes",
+    ),
+    Format("tum", "rgb.txt, depth.txt and groundtruth.txt", holds("rgb.txt", "depth.txt"), ".listed:open_tum"),
+    Format("replica", "traj.txt and results/", holds("traj.txt", "results"), ".layouts:replica"),
+    Format("scannet", "color/, depth/, pose/ and intrinsic/", holds("color", "depth", "pose"), ".layouts:scannet"),
+    Format(
+        "avlmaps",
+        "poses.txt and rgb/ (with depth/ of .npy)",
+        holds("poses.txt", "rgb"),
+        ".avlmaps_layout:open_avlmaps",
+    ),
+    Format(
+        "rosbag",
+        "a .bag, .mcap or .db3 file, or a folder of them",
+        _is_rosbag,
+        ".rosbag:open_rosbag",
+        tells_faults=False,
+        has_topics=True,
+    ),
+    Format(
+        "record3d",
+        "a .r3d file, or EXR_RGBD/metadata.json with rgb/ and depth/",
+        lambda path: _called("scans:is_record3d", path),
+        ".scans:open_record3d",
+    ),
+    Format(
+        "stray-scanner",
+        "odometry.csv, camera_matrix.csv, rgb.mp4 and depth/",
+        holds("odometry.csv", "camera_matrix.csv"),
+        ".scans:open_stray_scanner",
+    ),
+    Format(
+        "nerfstudio",
+        "transforms.json with depth_file_path",
+        holds("transforms.json"),
+        ".scans:open_nerfstudio",
+    ),
+    Format(
+        "polycam",
+        "keyframes/ with images/, depth/ and cameras/",
+        lambda path: _called("scans:is_polycam", path),
+        ".scans:open_polycam",
+    ),
+    Format(
+        "redwood",
+        "trajectory.log (or NAME-traj.txt), color/ and depth/",
+        lambda path: (path / "depth").is_dir() and _called("layouts:find_redwood_log", path),
+        ".layouts:redwood",
+    ),
+    Format(
+        "hov-sg",
+        "rgb/, depth/ and pose/ of numbered files (VLMaps, HOV-SG)",
+        holds("rgb", "depth", "pose"),
+        ".layouts:hov-sg",
+    ),
+    Format(
+        "orb-slam",
+        "associations.txt and CameraTrajectory.txt, or another trajectory with stamps",
+        lambda path: bool(_called("listed:find_associations", path) and _called("listed:find_trajectory", path)),
+        ".listed:open_orb_slam",
+    ),
+    Format(
+        "icl-nuim",
+        "associations.txt, rgb/, depth/ and a .gt.freiburg",
+        holds("associations.txt", "rgb", "depth"),
+        ".listed:open_icl_nuim",
+    ),
+    Format(
+        "rtabmap-export",
+        "NAME_rgb/, NAME_depth/, NAME_calib/ and NAME_poses.txt of rtabmap-export",
+        lambda path: bool(_called("listed:export_of", path)),
+        ".listed:open_rtabmap_export",
+    ),
+    Format(
+        "rtabmap",
+        "a .db file of RTAB-Map",
+        lambda path: _called("rtabmap:is_rtabmap", path),
+        ".rtabmap:open_rtabmap",
+    ),
+)
+_BUILT_IN = frozenset(known.name for known in FORMATS)
+_registered: dict[str, Format] = {}
+
+
+def register(format: Format) -> None:
+    """Add a format for this process (a notebook's, a test's); packages use the entry point."""
+    _registered[format.name] = format
+
+
+def formats() -> tuple[Format, ...]:
+    """Return every format that is known: built in, registered, or brought by another package."""
+    own = {known.name: known for known in (*_brought_formats(), *_registered.values(), *FORMATS)}
+    return (*FORMATS, *(known for name, known in own.items() if name not in _BUILT_IN))
+
+
+def forget_brought() -> None:
+    """Look for other packages' formats again at the next call of ``formats``."""
+    _brought_formats.cache_clear()
+
+
+@cache
+def _brought_formats() -> tuple[Format, ...]:
+    return tuple(_brought(entry.name, entry.value) for entry in entry_points(group=ENTRY_POINT_GROUP))
+
+
+def _brought(name: str, target: str) -> Format:
+    module, _, attribute = target.partition(":")
+    try:
+        brought = getattr(importlib.import_module(module), attribute)
+    except Exception as fault:  # an import runs another's code
+        raise RecordingError(
+            f"The recording format {name!r} cannot be loaded from {target} ({fault}); fix or remove the package that "
+            "brings it."
+        ) from fault
+    if not isinstance(brought, Format) or brought.name != name:
+        raise RecordingError(
+            f"The entry point {name!r} of {ENTRY_POINT_GROUP} leads to {target}, which is no Format of that name; fix "
+            "or remove the package that brings it."
+        )
+    return brought
+
+
+_EXPORT = "export its colour, depth and poses as a folder of recording.json, rgb/, depth/ and poses.csv"
+
+
+@dataclass(frozen=True, slots=True)
+class _Unreadable:
+    """Something that is recognised and not read.
+
+    Attributes:
+        matches: recognises it.
+        why: what it is, what is missing, and what to do: a sentence without its subject.
+    """
+
+    matches: Callable[[Path], bool]
+    why: str
+
+
+def _suffix(*suffixes: str) -> Callable[[Path], bool]:
+    return lambda path: path.is_file() and path.suffix.lower() in suffixes
+
+
+def _euroc(path: Path) -> bool:
+    inside = path / "mav0" if (path / "mav0").is_dir() else path
+    return some_name(inside, "imu[0-9]*", "imu.csv") and not (inside / "depth").exists()
+
+
+def _euroc_cameras(path: Path) -> bool:
+    inside = path / "mav0" if (path / "mav0").is_dir() else path
+    return _euroc(path) and some_name(inside, "cam[0-9]*")
+
+
+_UNREADABLE = (
+    _Unreadable(
+        _euroc_cameras,
+        "is a recording of EuRoC's layout: an IMU and cameras without depth, from which no map is built; compute depth "
+        "from the stereo pair first, and give a folder of recording.json, rgb/, depth/ and poses.csv.",
+    ),
+    _Unreadable(
+        _euroc,
+        "holds measurements of an IMU and no pictures, from which no map can be built; record colour and depth "
+        "beside it.",
+    ),
+    _Unreadable(
+        _suffix(".sens"),
+        "is ScanNet's packed recording; unpack it with ScanNet's SensReader (color/, depth/, pose/, intrinsic/), and "
+        "open that folder.",
+    ),
+    _Unreadable(
+        lambda path: some_name(path, "frame-*.depth.pgm"),
+        "is of 3RScan, or unpacked by ScanNet's C++ reader: its .depth.pgm is not read; convert it to 16-bit .png, "
+        "or unpack the .sens with the Python reader (color/, depth/, pose/, intrinsic/).",
+    ),
+    _Unreadable(
+        _suffix(".svo", ".svo2"),
+        f"is a recording of a ZED camera, which its own SDK alone reads; {_EXPORT} with it, or record a ROS bag.",
+    ),
+    _Unreadable(
+        _suffix(".oni", ".klg", ".rrf", ".rrd", ".xef"),
+        f"is a packed recording that is not read; {_EXPORT}.",
+    ),
+    _Unreadable(
+        _suffix(".db"),
+        "is no database of RTAB-Map (it is no SQLite file); copy it again.",
+    ),
+    _Unreadable(
+        _suffix(".ply", ".pcd", ".las", ".laz", ".obj", ".glb", ".usdz", ".splat"),
+        "is a finished model, without the pictures that a map is built from; give the recording it was made of.",
+    ),
+    _Unreadable(
+        lambda path: some_name(path, "scene_*_*.depth"),
+        "is ICL-NUIM in POV-Ray's own files; download its TUM RGB-D compatible PNGs and open those.",
+    ),
+    _Unreadable(
+        _suffix(".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz", ".7z", ".rar"),
+        "is an archive; unpack it, and give the folder or the file inside.",
+    ),
+    _Unreadable(
+        lambda path: some_name(path, "image_[0-9]*") or (path / "sequences").is_dir(),
+        f"is of KITTI's layout: cameras without depth, and poses of twelve numbers a line; {_EXPORT} (poses as stamp, "
+        "position and quaternion).",
+    ),
+    _Unreadable(
+        holds("lowres_wide", "lowres_depth"),
+        f"is of ARKitScenes' layout, which is not read; {_EXPORT}.",
+    ),
+    _Unreadable(
+        holds("images", "sparse"),
+        "is a reconstruction of COLMAP, whose scale is not metres and which has no depth; record with a depth "
+        f"camera, or {_EXPORT}.",
+    ),
+)
+
+
+def why_unreadable(path: Path) -> str:
+    """Return a sentence about a place that is recognised and not read, or nothing."""
+    return next((f"{path} {known.why}" for known in _UNREADABLE if known.matches(path)), "")
+
 
 # Files that a map's folder holds and no recording's does.
 _MAP = "map.json"

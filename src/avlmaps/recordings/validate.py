@@ -104,29 +104,19 @@ def _check_frame(recording: Recording, index: int, report: Report) -> None:
     try:
         depth_m = recording.frame(index).depth_m
     except RecordingError as error:
+        found: list[Fault] = []
         if isinstance(recording, FileRecording):
-            before = _Counting(report)
-            _check_files(recording, index, before)
-            if before.count:
-                return
+            _check_files(recording, index, found.append)
+        for fault in found:
+            report(fault)
+        if found:
+            return
         report(Fault(str(error), recording.colour_file(index), fatal=False))
         return
     if not (depth_m > 0.0).any() and not (isinstance(recording, FileRecording) and not len(recording.shots.depth)):
         file = recording.depth_file(index)
         where = file or f"{recording.path}, frame {recording.name(index)}"
         report(Fault(f"{where}: the depth is zero everywhere, so this frame adds nothing to a map.", file, fatal=False))
-
-
-class _Counting:
-    """Passes faults on and counts them."""
-
-    def __init__(self, report: Report) -> None:
-        self._report = report
-        self.count = 0
-
-    def __call__(self, fault: Fault) -> None:
-        self.count += 1
-        self._report(fault)
 
 
 def _check_truth(folder: Path, report: Report) -> None:

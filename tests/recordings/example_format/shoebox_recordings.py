@@ -11,7 +11,7 @@ import numpy as np
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.formats.file_recording import add_files
-from avlmaps.recordings.known_formats import Format, some_name
+from avlmaps.recordings.open import Format, some_name
 from avlmaps.recordings.types import Frame, Recording
 
 

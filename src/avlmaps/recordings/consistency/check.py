@@ -191,7 +191,6 @@ def door_verdict(evidence: Evidence) -> Verdict:
 
 
 def _cameras(evidence: Evidence) -> Iterator[tuple[Pinhole, str, str, str]]:
-    """Yield each camera, which it is, the size of its pictures, and how to give another."""
     rig = evidence.recording.rig
     for what, camera in (("colour", rig.rgb), ("depth", rig.depth))[: 1 if rig.registered else 2]:
         size, given = f"{camera.width}x{camera.height}", option("intrinsics", "fx,fy,cx,cy")

@@ -214,8 +214,6 @@ def _grown(
 
 @dataclass(frozen=True, slots=True)
 class _Spread:
-    """Quartiles of what surfaces or pairs say, each by its weight, and how many would count equally."""
-
     low: float
     middle: float
     high: float

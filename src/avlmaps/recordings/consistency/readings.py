@@ -213,7 +213,6 @@ _OF_PICTURES = ("turn_colour", "turn_depth", "along_ray", "farther_m", "depth_la
 
 
 def _turned(pictures: Float[np.ndarray, "f h w"], turn: Turn) -> Float[np.ndarray, "f h w"]:
-    """Turn pictures; a quarter is stretched to the size that they had."""
     import cv2
 
     mirror, quarters = turn
@@ -355,7 +354,6 @@ def _farther() -> Iterator[Reading]:
 
 
 def _delays(pace_s: float) -> Iterator[Reading]:
-    """Yield delays of up to a second, and beyond it of whole frames where these come seldom."""
     whole = (sign * step * pace_s for step in range(1, _MOST_LATE + 1) for sign in (1.0, -1.0))
     delays_s = (*_DELAYS_S, *(delay_s for delay_s in whole if 1.0 < abs(delay_s) <= _LONGEST_DELAY_S))
     return (Reading(Corrections(pose_delay_s=round(delay_s, 3))) for delay_s in delays_s)

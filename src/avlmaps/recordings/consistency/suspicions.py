@@ -51,8 +51,6 @@ _MOST_THROUGH_PARTS, _SAME_PARTS = 0.06, 0.7
 
 @dataclass(eq=False)
 class _Closer(Evidence):
-    """What is measured beside by the rows of this file."""
-
     @cached_property
     def flats(self) -> Flats:
         return Flats.of(self.sample)

@@ -390,9 +390,13 @@ class McapContainer:
         self._local = threading.local()  # readers keep a file position
         self._decoders: dict[tuple[str, str, bytes], Callable[[bytes], Any]] = {}
 
-    @cached_property
+    @property
     def connections(self) -> Sequence[McapConnection]:
         """See ``Container``."""
+        return self._connections
+
+    @cached_property
+    def _connections(self) -> Sequence[McapConnection]:
         found: list[McapConnection] = []
         for file in self.files:
             try:

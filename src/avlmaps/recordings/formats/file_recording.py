@@ -29,9 +29,9 @@ from avlmaps.core.wording import option
 from avlmaps.recordings import images
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report
+from avlmaps.recordings.images import VideoFrames
 from avlmaps.recordings.plausible import date_fault, plausible_walk, repeat_fault
 from avlmaps.recordings.types import BaseHeight, Frame, Recording
-from avlmaps.recordings.video import VideoFrames
 
 RECORDING_BUDGET_BYTES = 1 << 30
 LEAST_BUDGET_BYTES = 4096

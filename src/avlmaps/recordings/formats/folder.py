@@ -19,12 +19,11 @@ from avlmaps.recordings.directions import DIRECTIONS, read_directions
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
 from avlmaps.recordings.formats.tables import NAMED_FILE, POSE, named_order, read_table, split_header, text_lines
-from avlmaps.recordings.images import DisplayTurn, file_turn, first_picture_size
+from avlmaps.recordings.images import DisplayTurn, VideoFrames, file_turn, first_picture_size
 from avlmaps.recordings.layout import Description
 from avlmaps.recordings.microphones import MicrophoneNumbers
 from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault
 from avlmaps.recordings.types import Recording
-from avlmaps.recordings.video import VideoFrames
 
 # Stamps beyond this are a date (seconds since 1970), not seconds from the start of a recording.
 _DATE_S = 1e8
@@ -127,7 +126,6 @@ def _check_clocks(folder: Path, description: Description, found: "_Pictures", kn
 def _open_audio(
     path: Path, start_s: float, video: VideoFrames | None, first_s: float, microphones: MicrophoneNumbers | None
 ) -> tuple[AudioTrack | None, tuple[str, ...]]:
-    """Open the sound track: a file of its own, else the video's (most have none, which is not a fault)."""
     if microphones is not None and microphones.files:
         track, notices = AudioTrack.open(path / microphones.files[0], start_s=start_s), ()
     else:
@@ -153,8 +151,6 @@ def _turned_notices(video: VideoFrames | None) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Poses:
-    """Rows of poses.csv, as they stand there: ``usable`` ones have a finite pose and a rotation."""
-
     stamps_s: Float[np.ndarray, " n"]
     world_from_camera: Float[np.ndarray, "n 4 4"]
     usable: Bool[np.ndarray, " n"]
@@ -162,8 +158,6 @@ class _Poses:
 
 @dataclass(frozen=True, slots=True)
 class _Pictures:
-    """The pictures' files and, where it is known, when each was taken."""
-
     names: list[str]
     colour: list[str]
     depth: list[str]

@@ -49,7 +49,7 @@ from avlmaps.recordings.formats.tables import (
     unread_notice,
 )
 from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES, first_picture_size
-from avlmaps.recordings.known_formats import why_unreadable
+from avlmaps.recordings.open import why_unreadable
 
 RATE_HZ = 30.0
 _NO_CLOCK = "The recording has no clock; 30 frames/s are assumed."

@@ -45,8 +45,6 @@ RATE_HZ = 30.0
 
 @dataclass(frozen=True, slots=True)
 class _Stream:
-    """Pictures in the order of time."""
-
     stamps_s: Float[np.ndarray, " n"]
     files: list[str]
     notices: tuple[str, ...]
@@ -254,13 +252,13 @@ def open_icl_nuim(path: Path, report: Report = stop_at_first) -> FileRecording:
     rows = [(int(key), colour, depth) for key, colour, depth in _associations(listed, report)]
     if not rows:
         raise RecordingError(f"{listed} lists no frame, so there is nothing to map.")
-    truth = next((f for kind in ("*.gt.freiburg", "*.gt.sim") for f in sorted(path.glob(kind))), None)
+    truth = next(iter(sorted(path.glob("*.gt.freiburg"))), None)
     if truth is None:
         raise RecordingError(
             f"{path} has no poses: put ICL-NUIM's livingRoomN.gt.freiburg or trajN.gt.freiburg, or a trajectory with "
             f"stamps (CameraTrajectory.txt), beside {listed.name}."
         )
-    known = _sim(truth, rows) if truth.name.endswith(".sim") else _freiburg(truth, report)
+    known = _freiburg(truth, report)
     posed = [row for row in rows if row[0] in known]
     if not posed:
         raise RecordingError(f"{truth} has a pose for none of the {len(rows)} frames of {listed.name}.")
@@ -285,21 +283,6 @@ def _freiburg(file: Path, report: Report) -> Poses:
     rows = read_table(file, (8,), report, names=POSE).values
     found = zip(rows[:, 0].tolist(), rigid(rows[:, 1:4], rows[:, 4:]), strict=True)
     return {int(number): pose for number, pose in found if np.isfinite(pose).all()}
-
-
-def _sim(file: Path, rows: list[tuple[int, str, str]]) -> Poses:
-    faults: list[Fault] = []
-    table = read_table(file, (4,), faults.append)
-    if faults:
-        raise RecordingError(faults[0].sentence)
-    if len(table.values) != 3 * len(rows):
-        raise RecordingError(
-            f"{file} has {len(table.values)} lines, but {len(rows)} frames of associations.txt need three each; is it "
-            "the ground truth of another sequence, or cut off?"
-        )
-    found = np.tile(np.eye(4), (len(rows), 1, 1))
-    found[:, :3] = table.values.reshape(-1, 3, 4)
-    return {row[0]: pose for row, pose in zip(rows, found, strict=True)}
 
 
 # What rtabmap-export writes

@@ -47,8 +47,6 @@ def is_rtabmap(path: Path) -> bool:
 
 
 class _Database:
-    """A database that is only read; one connection for each thread."""
-
     def __init__(self, path: Path) -> None:
         self.path = path
         self._local = threading.local()
@@ -89,8 +87,6 @@ class _Database:
 
 
 class _Pictures:
-    """The pictures of nodes, by their ids."""
-
     def __init__(self, database: _Database) -> None:
         self._database = database
 
@@ -139,8 +135,6 @@ def _rvl(place: Path, content: bytes) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class _Calibration:
-    """One camera of a node: its pinhole, and where it sits on the base."""
-
     camera: Pinhole
     base_from_camera: Float[np.ndarray, "4 4"]
     distorted: bool
@@ -258,7 +252,9 @@ def _matrix(numbers: np.ndarray) -> Float[np.ndarray, "4 4"]:
 
 def _calibration(path: Path, node: int, blob: bytes, version: tuple[int, ...]) -> _Calibration:
     if version and version < (0, 18):
-        return _old_calibration(path, node, blob)
+        raise RecordingError(
+            f"{path} is of a version of RTAB-Map before 0.18; open it in today's RTAB-Map, which converts it."
+        )
     head = _HEADER.unpack_from(blob)
     kind, width, height, (k, d, r, p, local) = head[3], head[4], head[5], head[6:]
     if kind == _STEREO:
@@ -279,17 +275,6 @@ def _calibration(path: Path, node: int, blob: bytes, version: tuple[int, ...]) -
     base_from_camera = _matrix(np.frombuffer(blob, "<f4", local, size - 4 * local)) if local else np.eye(4)
     camera = _pinhole(path, node, (fx, fy, cx, cy), (width, height))
     return _Calibration(camera, base_from_camera, bool(np.abs(distortion).max(initial=0.0) > 1e-9))
-
-
-def _old_calibration(path: Path, node: int, blob: bytes) -> _Calibration:
-    numbers = np.frombuffer(blob[: len(blob) // 4 * 4], "<f4").astype(np.float64)
-    if len(numbers) != 6 + _TRANSFORM_NUMBERS:
-        raise RecordingError(
-            f"Node {node} of {path} has a calibration of {len(numbers)} numbers; of old databases one RGB-D camera a "
-            "node is read (18 numbers). Open it in today's RTAB-Map, which converts it."
-        )
-    size = (round(numbers[4]), round(numbers[5]))
-    return _Calibration(_pinhole(path, node, tuple(numbers[:4]), size), _matrix(numbers[6:]), False)
 
 
 def _pinhole(path: Path, node: int, numbers: Sequence[float], size: tuple[int, int]) -> Pinhole:
