@@ -432,15 +432,6 @@ def test_parts_of_turns_are_degrees(command: str, degrees: float) -> None:
     assert intents(command) == (Turn(degrees=degrees),)
 
 
-@given(things, st.sampled_from(["one", "{}"]), st.sampled_from(["beside", "next to", "by", "close to", "nearest to"]))
-@FEW
-def test_one_beside_the_one_before_is_another(thing: str, name: str, beside: str) -> None:
-    read = read_command(f"go to the {thing} and then to the {name.format(thing)} {beside} it")
-    one = Target(TargetKind.OBJECT, thing)
-    assert read.intents == (Go(one), Go(Target(TargetKind.OBJECT, thing, pick=Pick.OTHER)))
-    assert any("the other one" in note for note in read.notes)
-
-
 def test_another_thing_beside_it_is_that_thing() -> None:
     sofa = Target(TargetKind.OBJECT, "sofa")
     assert intents("go to the sofa and then to the lamp beside it")[1] == Go(

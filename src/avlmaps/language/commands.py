@@ -29,7 +29,6 @@ from avlmaps.language.learned.name_resolver import EXAMPLE, REFUSALS, NameResolv
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.own_names import StandIns, stand_ins
-from avlmaps.language.rephrase import behind_remark
 from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps.language.storey_words import SaidStorey, said_storeys
 from avlmaps.language.verbalise import verbalise
@@ -153,11 +152,6 @@ def _read(text: str, given: Attachments | None) -> Command:
     if stop is not None:
         stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
         return Command((stop,), (), (), "words")
-    order = behind_remark(sentence.tokens)
-    if order is not None:
-        said = _read(text[order:], given)
-        remark = f"'{text[:order].strip(' ,;.:')}' is taken as a remark: it is not where to go."
-        return replace(said, notes=(remark, *said.notes))
     storeys = said_storeys(text)
     if storeys:
         named = _on_storey(text, storeys, given)

@@ -17,7 +17,7 @@ import numpy as np
 
 from avlmaps.core.errors import BackendError
 from avlmaps.language.lexer import tokenise
-from avlmaps.language.rephrase import said_to_it
+from avlmaps.language.rephrase import rewritten
 from avlmaps.perception.embedded.words import WordPieces
 from avlmaps.perception.models.networks import open_network
 
@@ -52,10 +52,10 @@ class _Row:
 
 def no_order(text: str) -> NoOrder | None:
     """Return why a sentence may be no order, to the robot, now; None where it is one."""
-    tokens = tokenise(text)
-    said = " ".join(token.text for token in tokens)
+    said = " ".join(token.text for token in tokenise(text))
     # What is said of the robot ("send the rover to the door") is judged as if it were said to it.
-    ordered = " ".join(token.text for token in said_to_it(tokens))
+    to_it, _ = rewritten(text, only_robot=True)
+    ordered = " ".join(token.text for token in tokenise(to_it))
     closed = (NoOrder(row.kind, row.answer) for row in _rows() if row.kind != _ORDER and row.says.search(said))
     found = next(closed, None)
     if found is not None or any(row.says.search(ordered) for row in _rows() if row.kind == _ORDER):

@@ -9,7 +9,7 @@ from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
 from avlmaps.language.numbers import in_figures
 from avlmaps.language.own_names import OwnName
-from avlmaps.language.rephrase import rephrased
+from avlmaps.language.rephrase import in_degrees, rewritten
 from avlmaps.language.spelling import respelt
 
 # Words that may mean a file that came along.
@@ -66,8 +66,9 @@ class Sentence:
     def __init__(self, text: str, given: "Attachments | None" = None) -> None:
         given = given or Attachments()
         self.text = text
-        tokens, self.respelt = respelt(lexer.tokenise(text))
-        self.tokens, self.order_notes = rephrased(in_figures(tokens))
+        plain, self.order_notes = rewritten(text)
+        tokens, self.respelt = respelt(lexer.tokenise(plain))
+        self.tokens = in_degrees(in_figures(tokens))
         self.tokens += given.tokens((token.text for token in self.tokens), len(text))
         self.given = given
 
