@@ -161,17 +161,6 @@ def test_the_translator_is_one() -> None:
     assert translator.repair("go to the sofa", "robot.move_to_object('sofa')", "no path") is None
 
 
-def test_the_former_name_works_with_a_warning() -> None:
-    from avlmaps.language import rules
-
-    with pytest.warns(DeprecationWarning, match="LearnedTranslator"):
-        assert rules.RulesTranslator is LearnedTranslator
-    with pytest.warns(DeprecationWarning, match="learned_translator"):
-        assert rules.command_to_program is command_to_program
-    with pytest.raises(AttributeError, match="nothing_of_this_name"):
-        _ = rules.nothing_of_this_name
-
-
 def test_the_plan_is_in_plain_words() -> None:
     plan = LearnedTranslator().program_for(
         "go to the armchair nearest to where breathing was heard, then face the window"

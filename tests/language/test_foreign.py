@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.language.commands import read_command
-from avlmaps.language.foreign import language_of
 from avlmaps.language.intents import Clarify
+from avlmaps.language.sentence import language_of
 
 NAMED = {
     "va a la cocina": "Spanish", "va en la cuisine": "French", "va alla porta": "Italian",

@@ -5,8 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.language.learned_translator import LearnedTranslator
-from avlmaps.language.lexer import duration_at, length_at, number_at, tokenise
-from avlmaps.language.numbers import SMALL, TENS, in_figures
+from avlmaps.language.lexer import SMALL, TENS, duration_at, in_figures, length_at, number_at, tokenise
 
 
 @pytest.mark.parametrize(

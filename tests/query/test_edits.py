@@ -31,8 +31,7 @@ from avlmaps.core.poses import apply as moved
 from avlmaps.core.poses import plain_point
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import targets_of
-from avlmaps.language.own_names import stand_ins
-from avlmaps.language.sentence import Attachments
+from avlmaps.language.sentence import Attachments, stand_ins
 from avlmaps.maps.store.edits import (
     EDITS,
     Edit,

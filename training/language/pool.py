@@ -12,11 +12,11 @@ from training.language.augment import joinable, names_of, variant, with_manners
 from training.language.plain import plain
 from training.language.rows import Example, examples_of, lists
 
-from avlmaps.language.asking_back import strange_word
 from avlmaps.language.intents import Clarify
 from avlmaps.language.learned.features import features
 from avlmaps.language.learned.grammar import INDEX, SYMBOLS
 from avlmaps.language.sentence import Sentence
+from avlmaps.language.verbalise import strange_word
 
 _MOST_TOKENS = 70
 # The voices of the first fold of `leave_out`: three learners of English, three ordinary users.

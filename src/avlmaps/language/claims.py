@@ -38,8 +38,8 @@ from avlmaps.language.intents import (
     VisitEach,
     targets_of,
 )
+from avlmaps.language.lexer import Token
 from avlmaps.language.names import describes, is_entry, sounding_words, sounds_like
-from avlmaps.language.token import Token
 from avlmaps.language.word_classes import pattern_of
 
 _ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
@@ -167,10 +167,10 @@ def unmet(tokens: Sequence[Token], intents: Sequence[Intent], used: frozenset[in
 
 def unmet_by(tokens: Sequence[Token], inquiry: Inquiry, used: frozenset[int]) -> str | None:
     """Return the question back for what a question claims and its reading leaves out; None where it does all."""
+    about = inquiry.of[0]
     targets = [each for one in inquiry.of for each in (one, *one.near)]
     marked = _Marked(tokens, used, _kinds(targets))
     facts = {str(inquiry.ask), *_facts_of_targets(targets)} | ({"several"} if len(inquiry.of) > 1 else set())
-    about = inquiry.of[0]
     if about.kind in (TargetKind.SOUND, TargetKind.CLIP):
         facts |= {"sound"} | ({"heard sound"} if _HEARD & {token.text for token in tokens} else set())
         facts |= {"no sound"} if "heard sound" not in facts and not _sounds(about.name) else set()

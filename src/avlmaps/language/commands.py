@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.claims import claimed_words, forbidden
-from avlmaps.language.foreign import ASK, language_of
 from avlmaps.language.gate import NoOrder, no_order
 from avlmaps.language.intents import (
     Beside,
@@ -28,8 +27,7 @@ from avlmaps.language.learned.decision import Weighed, decided
 from avlmaps.language.learned.name_resolver import EXAMPLE, REFUSALS, NameResolver, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
-from avlmaps.language.own_names import StandIns, stand_ins
-from avlmaps.language.sentence import Attachments, Sentence
+from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, language_of, stand_ins
 from avlmaps.language.storey_words import SaidStorey, said_storeys
 from avlmaps.language.verbalise import verbalise
 from avlmaps.language.word_classes import load_word_classes

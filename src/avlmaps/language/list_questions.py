@@ -12,7 +12,7 @@ from enum import StrEnum
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.lexer import without_spoken_end
 from avlmaps.language.names import mended, sounding_words
-from avlmaps.language.own_names import OwnName, stand_ins
+from avlmaps.language.sentence import OwnName, stand_ins
 
 NUMBERS = {
     "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10,

@@ -52,10 +52,9 @@ from avlmaps.language.learned.name_resolver import NameResolver, weighed
 from avlmaps.language.learned.reader import Read
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.names import is_known
-from avlmaps.language.own_names import stand_ins
 from avlmaps.language.program.vocabulary import SKILLS, Skill, ValueType
 from avlmaps.language.program.writing import write_program
-from avlmaps.language.sentence import Attachments, Sentence
+from avlmaps.language.sentence import Attachments, Sentence, stand_ins
 from avlmaps.language.translator import Translation
 from avlmaps.language.verbalise import verbalise
 from avlmaps.perception.user_folder import cache_folder

@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
-from avlmaps.language.asking_back import lacks_file
 from avlmaps.language.claims import unmet_by
-from avlmaps.language.foreign import ASK, language_of
 from avlmaps.language.intents import Ask, Inquiry, Pick, Target, TargetKind
 from avlmaps.language.learned.decision import is_doubtful
 from avlmaps.language.learned.limits import ReadingLimits
@@ -17,8 +15,8 @@ from avlmaps.language.learned.name_resolver import NameResolver, kind_of
 from avlmaps.language.learned.reader import Read, learned_reader
 from avlmaps.language.list_questions import SUPPORTED
 from avlmaps.language.names import is_entry, is_known, sounding_forms, sounds_like, third_forms
-from avlmaps.language.own_names import stand_ins
-from avlmaps.language.sentence import Attachments, Sentence
+from avlmaps.language.sentence import ASK, Attachments, Sentence, language_of, stand_ins
+from avlmaps.language.verbalise import lacks_file
 from avlmaps.language.word_classes import listed, load_word_classes
 
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"

@@ -13,7 +13,7 @@ from functools import cache
 from importlib.resources import files
 
 from avlmaps.language import lexer
-from avlmaps.language.token import Token
+from avlmaps.language.lexer import Token
 from avlmaps.language.word_classes import listed, load_word_classes
 
 _TURNS = frozenset({

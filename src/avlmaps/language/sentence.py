@@ -1,17 +1,35 @@
-"""A sentence as tokens, misspelt words put right, and what besides the lexicon knows its names."""
+"""A sentence as tokens, and what comes with it: files, the map's own names, and the language that it is in.
+
+Names that people gave to things and rooms ("my charging dock") are in no lexicon. A sentence is read with a known word
+in the place of each, since what was learnt reads such words best; what was read has the own name again.
+"""
 
 import re
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+import tomllib
+import unicodedata
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.resources import files
 
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
-from avlmaps.language import lexer
-from avlmaps.language.lexer import Token
-from avlmaps.language.numbers import in_figures
-from avlmaps.language.own_names import OwnName
+from avlmaps.language.claims import claimed_words
+from avlmaps.language.intents import Target
+from avlmaps.language.lexer import WORDS, Token, in_figures, tokenise
+from avlmaps.language.names import class_words, is_known, respelt, sounding_words
 from avlmaps.language.rephrase import in_degrees, rewritten
-from avlmaps.language.spelling import respelt
+from avlmaps.perception.embedded.words import is_word
 
+OwnName = tuple[str, bool]
+"""A name without its article, in lower case, and whether it is that of a room."""
+_DETERMINERS = frozenset({"the", "this", "that", "my", "your", "our", "her", "his", "their", "a", "an", "any", "every"})
+_THINGS = ("lamp", "clock", "vase", "suitcase", "printer", "basket")
+_ROOMS = ("kitchen", "garage", "library", "bathroom", "gym")
+ASK = "This seems to be {language}. Commands and questions have to be in English, such as: go to the kitchen."
+_ANOTHER = "another language than English"
+_LATIN = "LATIN"
+_SEVERAL = 3  # words; fewer may be a name that English borrowed
 # Words that may mean a file that came along.
 _PICTURE = frozenset({
     "photo", "photos", "photograph", "photographed", "picture", "pictured", "image", "pic", "snapshot", "shot", "view",
@@ -67,7 +85,7 @@ class Sentence:
         given = given or Attachments()
         self.text = text
         plain, self.order_notes = rewritten(text)
-        tokens, self.respelt = respelt(lexer.tokenise(plain))
+        tokens, self.respelt = respelt(tokenise(plain))
         self.tokens = in_degrees(in_figures(tokens))
         self.tokens += given.tokens((token.text for token in self.tokens), len(text))
         self.given = given
@@ -88,3 +106,102 @@ class Sentence:
         return tuple(
             f"'{side}' is read as 'near': distance counts, the side does not." for side in dict.fromkeys(sides)
         )
+
+
+@dataclass(frozen=True, slots=True)
+class StandIns:
+    """A sentence with known words in the place of own names.
+
+    Attributes:
+        text: the sentence.
+        own: the own name of each word.
+    """
+
+    text: str
+    own: dict[str, str] = field(default_factory=dict)
+
+    def back(self, text: str) -> str:
+        """Return words with the own names."""
+        for word, name in self.own.items():
+            text = re.sub(rf"\b{word}\b", lambda _, name=name: name, text, flags=re.IGNORECASE)
+        return text
+
+    def target(self, target: Target) -> Target:
+        """Return a target with its own name."""
+        return replace(target, name=self.own.get(target.name, target.name), near=tuple(map(self.target, target.near)))
+
+
+def is_reserved(name: str) -> bool:
+    """Return whether a name would take a word of orders: "stop", "left", "5 m", "near the bed"."""
+    said = [token.text for token in tokenise(name) if token.kind != "punct"]
+    said = said[1:] if said[:1] and said[0] in _DETERMINERS and len(said) > 1 else said
+    taken = claimed_words("reserved") | claimed_words("stops") | WORDS
+    return bool(said) and (
+        said[0] in claimed_words("leading") or all(word in taken or word[0].isdigit() for word in said)
+    )
+
+
+def stand_ins(text: str, names: Sequence[OwnName]) -> StandIns:
+    """Return a sentence with a known word for each own name in it that the lexicon does not have."""
+    out, own = text, dict[str, str]()
+    for name, is_room in sorted(names, key=lambda one: -len(one[0])):
+        if is_reserved(name) or lexicon().find(name, EntryKind.ROOM if is_room else EntryKind.THING) is not None:
+            continue
+        said = re.compile(rf"(?<![\w-])(?:(?:the|a|an|my|your|our) )?{re.escape(name)}(?![\w-])", re.IGNORECASE)
+        if not said.search(out):
+            continue
+        free = (one for one in (_ROOMS if is_room else _THINGS) if one not in own and one not in text.casefold())
+        word = next(free, None)
+        if word is None:
+            break
+        out = said.sub(f"the {word}", out)
+        own[word] = name
+    return StandIns(out, own)
+
+
+def language_of(text: str) -> str | None:
+    """Return the language that a sentence is in, where it is plainly another than English; else None."""
+    letters = [mark for mark in text if mark.isalpha()]
+    strange = [mark for mark in letters if not unicodedata.name(mark, _LATIN).startswith(_LATIN)]
+    if letters and len(strange) * 2 > len(letters):
+        return _ANOTHER
+    found = re.findall(r"[^\W\d_]+", text.lower())
+    counted = {
+        language: sum(word in sure | also for word in found) for language, (sure, also) in _foreign_words().items()
+    }
+    plainly = [
+        language
+        for language, (sure, _) in _foreign_words().items()
+        if counted[language] * 2 >= len(found) and not sure.isdisjoint(found)
+    ]
+    if not plainly:
+        return _ANOTHER if _is_unknown(found) else None
+    most = [language for language in counted if counted[language] == max(counted.values())]
+    return most[0] if len(most) == 1 and not _its_own(most[0]).isdisjoint(found) else _ANOTHER
+
+
+def _is_unknown(found: list[str]) -> bool:
+    """Return whether of several words hardly one is English, and none usual or one has letters that English lacks."""
+    several = [word for word in found if len(word) > 1]
+    english = 3 * sum(map(is_word, several)) <= len(several) >= 1
+    if len(found) < _SEVERAL or not english:
+        return False
+    usual = [word for word in several if word in class_words() | WORDS | sounding_words() or is_known(word)]
+    if not usual and len(several) >= _SEVERAL:
+        return True
+    strange = any(not word.isascii() for word in several if word not in usual)
+    return strange and 2 * len(usual) < len(several)
+
+
+@cache
+def _its_own(language: str) -> frozenset[str]:
+    """Return the words of a language that no other of the book has."""
+    book = {name: sure | also for name, (sure, also) in _foreign_words().items()}
+    return book[language].difference(*(words for name, words in book.items() if name != language))
+
+
+@cache
+def _foreign_words() -> dict[str, tuple[frozenset[str], frozenset[str]]]:
+    """Return for each language its words that English lacks, and those that it has too."""
+    told = tomllib.loads(files("avlmaps.language").joinpath("foreign.toml").read_text(encoding="utf-8"))
+    return {name: (frozenset(of["sure"].split()), frozenset(of["also"].split())) for name, of in told.items()}

@@ -29,8 +29,8 @@ from avlmaps.query.whereabouts import own_names
 
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
-    from avlmaps.language.own_names import OwnName
     from avlmaps.language.questions import AskedSentence
+    from avlmaps.language.sentence import OwnName
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.queryable import Attachment

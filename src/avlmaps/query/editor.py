@@ -392,7 +392,7 @@ def _name(name: str) -> str:
 
 
 def _own_name(name: str) -> str:
-    from avlmaps.language.own_names import is_reserved
+    from avlmaps.language.sentence import is_reserved
 
     word = _name(name)
     if is_reserved(word):

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
-from avlmaps.language.asking_back import missing_file, strange_word, unclear, unknown
 from avlmaps.language.claims import in_direction, unmet
 from avlmaps.language.intents import (
     Beside,
@@ -28,6 +27,7 @@ from avlmaps.language.learned.reader import Read
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import is_known, is_place, may_name, mended, past_forms, sounding_forms
 from avlmaps.language.sentence import Sentence
+from avlmaps.language.verbalise import missing_file, strange_word, unclear, unknown
 
 EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
 REFUSALS = {
