@@ -74,8 +74,9 @@ def build_map(
         resume=resume,
         overwrite=overwrite,
         progress=progress,
+        finds=with_findings,
     )
-    return with_findings(AVLMap(data, _asked_with(data, encoders), path=folder))
+    return AVLMap(data, _asked_with(data, encoders), path=folder)
 
 
 def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap":

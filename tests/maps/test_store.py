@@ -20,6 +20,7 @@ from safetensors.numpy import load_file
 
 from avlmaps.core.columns import axes_of
 from avlmaps.core.errors import MapError
+from avlmaps.core.files import sha256_of_file
 from avlmaps.core.registry import Kind
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store import folder, tables
@@ -122,8 +123,19 @@ def test_what_is_written_in_the_place_of_a_map_is_that_map(copied: Path) -> None
         assert same(after.voxels, before.voxels) and same(after.keyframes, before.keyframes)
         assert same(after.sounds, before.sounds) and after.findings["best"].tolist() == [0, 1, 2, 3]
         assert all(clip.is_file() for clip in after.sounds.clips) and not damaged_files(copied)
-        assert len(list(copied.glob("*.safetensors"))) == 4
+        assert len(list(copied.glob("*.safetensors"))) == 3
     assert all(array[0] == before.voxels.index[0, 0] for array in before.voxels.index[:1])  # its old file is still read
+
+
+def test_a_map_whose_names_lie_in_a_file_of_their_own_is_read(copied: Path) -> None:
+    before, path = read(copied), copied / "names.safetensors"
+    write_arrays(path, {"best": np.arange(4)})
+    manifest = json.loads((copied / "map.json").read_text())
+    manifest["files"][path.name] = {"bytes": path.stat().st_size, "sha256": sha256_of_file(path)}
+    (copied / "map.json").write_text(json.dumps(manifest))
+    assert read(copied).findings["best"].tolist() == [0, 1, 2, 3] and not damaged_files(copied)
+    write(copied, replace(before, findings={}))
+    assert not path.exists() and not read(copied).findings
 
 
 def test_a_map_of_schema_1_comes_back_with_its_days_edits_submaps_and_sources(tmp_path: Path) -> None:

@@ -134,7 +134,7 @@ def test_arithmetic_of_heat_is_that_of_its_arrays(m: avlmaps.AVLMap, a: float, b
 
 
 def test_heat_of_two_maps_does_not_mix(m: avlmaps.AVLMap) -> None:
-    other = avlmaps.AVLMap(m)
+    other = avlmaps.AVLMap(m.data, m.encoders, path=m.path)
     with pytest.raises(ValueError, match="different maps cannot be added"):
         m.object("chair") + other.object("chair")
     with pytest.raises(TypeError):

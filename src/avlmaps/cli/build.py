@@ -170,13 +170,14 @@ def build(verb: "Build") -> dict[str, Any]:
                 allow=verb.allow,
                 resume=not verb.fresh,
                 overwrite=verb.overwrite,
+                finds=with_findings,
             )
             avlmap = AVLMap(data, path=user_path(verb.out))
     answer: dict[str, Any] = {}
     if poses is not None:
         from avlmaps.maps.corrected import correct_map
 
-        answer["corrected"] = asdict(correct_map(avlmap.path, *poses, recording))
+        answer["corrected"] = asdict(correct_map(avlmap.path, *poses, recording, with_findings))
         avlmap = AVLMap.open(avlmap.path)
     if verb.close_loops:
         from avlmaps.days.loops import close_loops
@@ -184,7 +185,7 @@ def build(verb: "Build") -> dict[str, Any]:
         done, found = close_loops(avlmap, recording=recording)
         answer["corrected"] = {**asdict(done), "loops": found.report()}
         avlmap = AVLMap.open(avlmap.path)
-    return {**describe_map(with_findings(avlmap)), **answer, "elapsed_s": round(perf_counter() - begin, 3)}
+    return {**describe_map(avlmap), **answer, "elapsed_s": round(perf_counter() - begin, 3)}
 
 
 def _openings(verb: "Build") -> "list[Callable[[], Recording]]":

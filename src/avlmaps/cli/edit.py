@@ -227,7 +227,7 @@ class Merge(ModelVerb):
 def merge(verb: Merge) -> dict[str, Any]:
     """Merge two maps and return by what the place was found, and what changed."""
     from avlmaps.days.merge import merge_maps
-    from avlmaps.query.avlmap import AVLMap, with_findings
+    from avlmaps.query.avlmap import AVLMap
 
     begin_s = perf_counter()
     made = merge_maps(
@@ -235,7 +235,6 @@ def merge(verb: Merge) -> dict[str, Any]:
         first_day=verb.first_day or "",
         overwrite=verb.overwrite,
     )  # fmt: skip
-    made = with_findings(made)
     return {**merged_answer(made), "elapsed_s": round(perf_counter() - begin_s, 3)}
 
 

@@ -21,7 +21,7 @@ from avlmaps.core.poses import from_rotation, inverse, mean_rotation, rotation_a
 from avlmaps.core.progress import progress
 from avlmaps.days.find import NEEDED, local_features, spread_out
 from avlmaps.maps.corrected import Corrected, correct_map, require_submaps
-from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.avlmap import AVLMap, with_findings
 from avlmaps.query.locate import LocatableMap, LocateSettings, locate_features
 from avlmaps.recordings.types import Recording
 
@@ -184,7 +184,7 @@ def close_loops(stored: AVLMap, recording: Recording | None = None) -> tuple[Cor
     """
     require_submaps(stored.path, stored.data)  # before the long search
     found = find_loops(stored)
-    return correct_map(stored.path, found.stamps_s, found.poses, recording), found
+    return correct_map(stored.path, found.stamps_s, found.poses, recording, with_findings), found
 
 
 def find_loops(stored: AVLMap) -> Loops:

@@ -43,7 +43,7 @@ from avlmaps.maps.store.manifest import Counts, MapBounds, MapInfo, RecordingInf
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.tables import EDITING, key_of, lock_folder
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Voxels
-from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.avlmap import AVLMap, with_findings
 from avlmaps.query.contents import Thing
 
 ThingsOf = Callable[[AVLMap], Sequence[Thing]]
@@ -135,7 +135,7 @@ def merge_maps(
     info = _manifest(stored, other, data, visits, perf_counter() - begin_s, why_not)
     with lock_folder(out), lock_folder(out, EDITING):
         edits = _edits(stored, other, read_edits(out), keyframes, moved)
-        write(out, replace(data, info=info))
+        write(out, with_findings(replace(data, info=info), stored.encoders))
         if edits:
             write_edits(out, edits)
     return AVLMap(read(out), stored.encoders, path=out)

@@ -28,7 +28,7 @@ from avlmaps.maps.store.folder import MANIFEST
 from avlmaps.maps.store.tables import explain_write_errors
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.encoders import Encoders
-from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.avlmap import AVLMap, with_findings
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ def build_together(
     else:
         for reopen, path in zip(recordings, paths, strict=True):
             build_map(reopen(), path, encoders, settings, cache=cache, workers=ClusterWorkers(pool, reopen, cache),
-                      allow=allow, overwrite=overwrite)  # fmt: skip
+                      allow=allow, overwrite=overwrite, finds=with_findings)  # fmt: skip
     return merge_in_turn([AVLMap.open(path) for path in paths], folder, out, overwrite=overwrite)
 
 
@@ -88,7 +88,7 @@ def build_job(job: BuildJob) -> None:
             raise unseen(f"The worker on {host}", job.token.parent)
         recording = reopened(job.reopen, host)
         build_map(recording, job.path, job.models.encoders(), job.settings, cache=job.models.cache, allow=job.allow,
-                  overwrite=job.overwrite)  # fmt: skip
+                  overwrite=job.overwrite, finds=with_findings)  # fmt: skip
 
 
 def _build_each(

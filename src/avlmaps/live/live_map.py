@@ -36,7 +36,7 @@ from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.tables import lock_folder
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
-from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.avlmap import AVLMap, with_findings
 from avlmaps.query.settings import QuerySettings
 from avlmaps.query.voxel_map import IN_MEMORY, direction, require_kinds
 from avlmaps.recordings.directions import given_directions
@@ -369,7 +369,7 @@ class LiveMap:
         if not self._closed:
             try:
                 if len(self._mapper):
-                    write(self.path, self._mapper.finish())
+                    write(self.path, with_findings(self._mapper.finish(), self._mapper.encoders))
             except BaseException as fault:
                 if not len(self._mapper) or not self.path.is_dir():
                     self._held.close()

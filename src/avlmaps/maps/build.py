@@ -26,7 +26,7 @@ from avlmaps.maps.plan import BuildPlan, Span, claim, make_plan, require_unchang
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.folder import MANIFEST, is_map_or_free, read, write
 from avlmaps.maps.store.manifest import BadFrame
-from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.store.map_data import Finds, MapData, find_nothing
 from avlmaps.maps.store.tables import lock_folder
 from avlmaps.perception.cache.cached_encoders import cache_note, with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
@@ -59,6 +59,7 @@ def build_map(
     resume: bool = True,
     overwrite: bool = False,
     progress: bool = True,
+    finds: Finds = find_nothing,
 ) -> MapData:
     """Build a map of a recording, or finish one that was begun.
 
@@ -76,6 +77,7 @@ def build_map(
         resume: continue with what a stopped build had finished; otherwise begin again.
         overwrite: replace a finished map there that came from another recording, or with other settings.
         progress: show how far it is on standard error.
+        finds: what is stored with the map of what its encoders see; see ``query.avlmap.with_findings``.
 
     Raises:
         MapError: the folder is something else, holds another map, is in use or cannot be written.
@@ -95,7 +97,7 @@ def build_map(
             mapper.began_s = began_s
             for file in plan.spans():
                 mapper.add_state(load_state(file))
-            made = mapper.finish()
+            made = finds(mapper.finish(), plan.encoders)
             require_unchanged(plan, stamp)
             write(plan.path, made)
     return read(plan.path)

@@ -26,7 +26,8 @@ from avlmaps.maps.hearing import locate_sources
 from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.manifest import MapBounds, Removed, Timings, UpInfo
-from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.store.map_data import Finds, MapData, find_nothing
+from avlmaps.maps.store.reader import encoders_of_map
 from avlmaps.maps.store.tables import lock_folder
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps
 from avlmaps.recordings.types import Recording
@@ -53,7 +54,9 @@ class Corrected:
     elapsed_s: float
 
 
-def correct_map(path: Path, stamps_s: Any, poses: Any, recording: Recording | None = None) -> Corrected:
+def correct_map(
+    path: Path, stamps_s: Any, poses: Any, recording: Recording | None = None, finds: Finds = find_nothing
+) -> Corrected:
     """Make a map follow corrected poses, in its folder. Later corrections replace this one and do not add to it.
 
     Args:
@@ -61,6 +64,7 @@ def correct_map(path: Path, stamps_s: Any, poses: Any, recording: Recording | No
         stamps_s: (k,) of the corrected poses, rising, on the recording's clock.
         poses: (k, 4, 4) world_from_camera of the depth camera then, metres. Between them frames follow smoothly.
         recording: that the map is of: by it, where sounds came from is found again; without it that is not known.
+        finds: see ``build_map``.
 
     Raises:
         MapError: the map has no submaps, the poses are not of its frames, or it cannot be written.
@@ -85,21 +89,19 @@ def correct_map(path: Path, stamps_s: Any, poses: Any, recording: Recording | No
         doubts = tuple(carving_doubts(removed, count))
         others = [one for one in info.notices if not one.startswith(MOVED) and one not in info.doubts]
         kept = [one for one in info.doubts if "seen through by other frames" not in one]
-        write(
-            path,
-            replace(content, info=structs.replace(
-                info,
-                up=UpInfo.of(motion.turn @ info.up.vector(), info.up.known_from, info.up.support),
-                counts=structs.replace(info.counts, voxels=count),
-                bounding_box_m=MapBounds.of(content.voxels.index, info.voxel_size_m),
-                removed=removed,
-                doubts=(*kept, *doubts),
-                notices=(*kept, *doubts, *others, said),
-                timings=Timings(finished=finished, elapsed_s=info.timings.elapsed_s + elapsed_s,
-                                stages_s={**info.timings.stages_s, "correcting": elapsed_s, **sources_s}),
-            )),
+        info = structs.replace(
+            info,
+            up=UpInfo.of(motion.turn @ info.up.vector(), info.up.known_from, info.up.support),
+            counts=structs.replace(info.counts, voxels=count),
+            bounding_box_m=MapBounds.of(content.voxels.index, info.voxel_size_m),
+            removed=removed,
+            doubts=(*kept, *doubts),
+            notices=(*kept, *doubts, *others, said),
+            timings=Timings(finished=finished, elapsed_s=info.timings.elapsed_s + elapsed_s,
+                            stages_s={**info.timings.stages_s, "correcting": elapsed_s, **sources_s}),
         )  # fmt: skip
-    return Corrected(median_m, most_m, info.counts.voxels, count, perf_counter() - begin_s)
+        write(path, finds(replace(content, info=info), encoders_of_map(info)))
+    return Corrected(median_m, most_m, data.info.counts.voxels, count, perf_counter() - begin_s)
 
 
 def _sources(

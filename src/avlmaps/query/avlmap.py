@@ -804,18 +804,6 @@ def _role(primary: bool) -> Role:
     return Role.PRIMARY if primary else Role.CONTEXT
 
 
-def with_findings(avlmap: AVLMap) -> AVLMap:
-    """Return a map on the disk with its findings: those that it has, or what is found now and stored in its folder.
-
-    Where the folder cannot be written, the map is returned as it is, and what a question needs is found then.
-    """
-    from avlmaps.maps.store.folder import add_findings, read
-
-    found = {} if avlmap.data.findings else avlmap.found()
-    if not found:
-        return avlmap
-    try:
-        add_findings(avlmap.path, found)
-    except MapError:
-        return avlmap
-    return avlmap.of_data(read(avlmap.path))
+def with_findings(data: "MapData", encoders: "Encoders") -> "MapData":
+    """Return a map with what encoders find in it by their names: the closest names of each voxel, things and rooms."""
+    return replace(data, findings=AVLMap(data, encoders, edits=()).found())

@@ -214,10 +214,11 @@ class VoxelMap:
         with self._lock:
             place = lasting_path(path)
             require_place(place, overwrite)
-            made = self._mapper.finish()
+            encoders = self._mapper.encoders
+            made = with_findings(self._mapper.finish(), encoders)
             with lock_folder(place):
                 write(place, made)
-            return with_findings(AVLMap(read(place), self._mapper.encoders, path=place, settings=self._query))
+            return AVLMap(read(place), encoders, path=place, settings=self._query)
 
     def __len__(self) -> int:
         """Return how many frames are in the map."""

@@ -8,7 +8,6 @@ import re
 import shutil
 from collections.abc import Container, Mapping
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -43,7 +42,6 @@ from avlmaps.maps.store.tables import (
     explain_write_errors,
     fields_of,
     is_locked,
-    lock_folder,
     read_arrays,
     sync_file,
     write_arrays,
@@ -121,12 +119,12 @@ MANIFEST = "map.json"
 PARTS = "parts"
 _PART = re.compile(r"[a-z_]+-[0-9a-f]{12}|clips|clips\.unfinished")  # the folders that builds make there
 SECTIONS = ("voxels", "keyframes", "sounds")
-NAMES = "names"  # what was found by the names of the encoders; a map may lack it
+_NAMES = "names"  # a file of maps before 1.0, whose arrays are in that of the voxels now
 CLIPS = "clips"
-_LIFE, _SUBMAPS, _STATE, _SOURCES = "life.", "submaps.", "state.", "sources."
-_TABLE = re.compile(rf"({'|'.join((*SECTIONS, NAMES))})(\.2)?\.safetensors")
+_LIFE, _SUBMAPS, _STATE, _SOURCES, _FOUND = "life.", "submaps.", "state.", "sources.", "found."
+_TABLE = re.compile(rf"({'|'.join((*SECTIONS, _NAMES))})(\.2)?\.safetensors")
 _CLIP = re.compile(r"\d{6}-[0-9a-f]{16}\.\w+")
-_PARTIAL = re.compile(rf"\.({re.escape(MANIFEST)}|{'|'.join((*SECTIONS, NAMES))})\..*(partial|part\.safetensors)")
+_PARTIAL = re.compile(rf"\.({re.escape(MANIFEST)}|{'|'.join((*SECTIONS, _NAMES))})\..*(partial|part\.safetensors)")
 _MOST_CLIP_BYTES = 1 << 40
 # Folders and files of a map of schema 1.
 _OLD_SECTIONS = (*SECTIONS, "life", "submaps", "sources", ".derived")
@@ -224,23 +222,6 @@ def write(path: Path, data: MapData) -> MapInfo:
             _copy_clip(clip, path / name, file.bytes)
             files[name] = file
         return _commit(path, data.info, files)
-
-
-def add_findings(path: Path, findings: Mapping[str, np.ndarray]) -> None:
-    """Store what was found in the map of a folder; a kill at any instant leaves the map with it or without.
-
-    Raises:
-        MapError: there is no map, another process writes it, or the folder cannot be written.
-    """
-    with lock_folder(path), explain_write_errors(path):
-        info = _info(path, _manifest(path))
-        if info.schema_version == 1:
-            write(path, replace(read(path), findings=dict(findings)))
-            return
-        name = _free_name(NAMES, info.files)
-        write_arrays(path / name, findings)
-        files = {other: file for other, file in info.files.items() if not other.startswith(NAMES)}
-        _commit(path, info, {**files, name: FileInfo.of(path / name)})
 
 
 def _commit(path: Path, info: MapInfo, files: dict[str, FileInfo]) -> MapInfo:
@@ -401,7 +382,7 @@ def assembled(
         _optional(SourceEvidence, sounds, at_sounds, _SOURCES),
         submaps=_optional(Submaps, voxels, at_voxels, _SUBMAPS),
         life=read_life(life, f"{at_voxels}", len(info.visits)) if life else None,
-        findings=dict(tables[NAMES][1]) if NAMES in tables else {},
+        findings=dict(tables[_NAMES][1]) if _NAMES in tables else _named(voxels, _FOUND),
     )
 
 
@@ -420,8 +401,8 @@ def _sections(data: MapData) -> dict[str, dict[str, np.ndarray]]:
     voxels |= {} if data.life is None else {_LIFE + name: array for name, array in life_arrays(data.life).items()}
     keyframes |= {_STATE + name: array for name, array in data.place_state.items()}
     sounds |= {} if data.sources is None else fields_of(data.sources, _SOURCES)
-    found = {NAMES: dict(data.findings)} if data.findings else {}
-    return {**dict(zip(SECTIONS, (voxels, keyframes, sounds), strict=True)), **found}
+    voxels |= {_FOUND + name: array for name, array in data.findings.items()}
+    return dict(zip(SECTIONS, (voxels, keyframes, sounds), strict=True))
 
 
 def _free_name(section: str, taken: Container[str]) -> str:

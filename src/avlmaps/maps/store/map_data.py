@@ -1,5 +1,6 @@
 """A map as a value: its arrays and what ``map.json`` says of them; it knows no folder and no encoders."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +11,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.life import Life
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps, Voxels
+from avlmaps.perception.encoders import Encoders
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -57,3 +59,13 @@ class MapData:
     def rig(self) -> Rig:
         """The recording's cameras."""
         return self.info.rig.rig()
+
+
+Finds = Callable[[MapData, Encoders], MapData]
+"""Adds what encoders find in a map by their names, before it is written; the queries' room has one."""
+
+
+def find_nothing(data: MapData, encoders: Encoders) -> MapData:
+    """Return a map as it is."""
+    del encoders
+    return data

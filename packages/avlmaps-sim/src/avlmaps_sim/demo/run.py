@@ -62,7 +62,7 @@ def run_demo(
     """
     from avlmaps.maps.build import build_map
     from avlmaps.maps.store.reader import describe
-    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.avlmap import AVLMap, with_findings
     from avlmaps_sim.demo.drive import drive
     from avlmaps_sim.demo.evidence import Evidence
     from avlmaps_sim.demo.home import choose_home
@@ -77,7 +77,7 @@ def run_demo(
     with _stage("record", seconds, f"A robot with a depth camera and a microphone drives through {_rooms(scene)}."):
         recording = _record(scene, out, settings, seed)
     with _stage("build", seconds, "The recording becomes a map."):
-        data = build_map(recording, out / MAP)
+        data = build_map(recording, out / MAP, finds=with_findings)
     with _stage("choose", seconds, "Questions are chosen by what is truly there."):
         evidence = Evidence.of(recording)
         asks, photo = _choose(scene, recording, evidence, out, for_questions, for_photos)
