@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError
-from avlmaps.maps.audio import growing as growing_module
+from avlmaps.maps.audio import events
 from avlmaps.maps.audio.background import PowerStream, band_powers
 from avlmaps.maps.audio.events import ENDED_S, GrowingSounds, detect_events
 from avlmaps.maps.audio.segmentation import segment
@@ -99,7 +99,7 @@ def test_a_sound_is_listed_within_a_second_of_its_end() -> None:
 def test_the_window_of_a_long_track_moves_on_and_keeps_what_was_heard(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(growing_module, "_WINDOW_S", 45.0)
+    monkeypatch.setattr(events, "_WINDOW_S", 45.0)
     samples = noisy(240.0, [(float(at), 0.5, 0.3) for at in range(5, 240, 10)])
     walk, sounds, encoder = straight_walk(240.0, 0.1), GrowingSounds(FakeEncoder(), PLAIN), FakeEncoder()
     for at in range(0, len(samples), 5 * RATE_HZ):

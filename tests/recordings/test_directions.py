@@ -11,7 +11,7 @@ from avlmaps.cli.build import Build, _openings
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import from_quaternion
-from avlmaps.maps import located as sources
+from avlmaps.maps import hearing
 from avlmaps.maps.plan import audio_key
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.directions import DIRECTIONS, DirectionTrack, read_directions, write_directions
@@ -62,8 +62,8 @@ def test_what_opens_a_recording_on_another_machine_knows_its_device(
 ) -> None:
     folder = recorded(tmp_path / "rec")
     write_directions(folder / DIRECTIONS, TRACK)
-    earlier = SimpleNamespace(sources=lambda: SimpleNamespace(device=np.array([[0.5, 0.1, 0.0, 3.0]])))
-    monkeypatch.setattr(sources, "read", lambda path: earlier)
+    earlier = SimpleNamespace(sources=SimpleNamespace(device=np.array([[0.5, 0.1, 0.0, 3.0]])))
+    monkeypatch.setattr(hearing, "read", lambda path: earlier)
     (opened,) = _openings(Build(recording=folder, out=tmp_path / "map", same_device=tmp_path / "earlier"))
     audio = opened().audio
     assert audio is not None and audio.directions is not None and audio.directions.known_rad == (0.5, 0.1)
