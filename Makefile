@@ -27,7 +27,7 @@ NUMERIC := tests/query/test_heatmap.py tests/query/test_goals.py tests/query/tes
   tests/perception/test_words.py tests/perception/test_vlad.py tests/perception/test_pose.py tests/perception/test_sounds.py \
   tests/core tests/audio/test_segmentation.py tests/audio/test_sound_changes.py tests/audio/test_resample.py \
   tests/maps/test_gravity.py tests/maps/test_grid.py
-NUMERIC_COMPILED := tests/query/test_heatmap.py tests/query/test_objects.py tests/query/test_scores.py tests/query/test_storey_kernels.py tests/maps/test_fusion.py
+NUMERIC_COMPILED := tests/query/test_heatmap.py tests/query/test_objects.py tests/query/test_scores.py tests/maps/test_fusion.py
 
 # What `make test-fast` runs: the quick tests of each room that is changed most.
 FAST := tests/core tests/test_imports.py tests/query/test_goals.py tests/query/test_instances.py \
