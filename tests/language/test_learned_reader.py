@@ -37,11 +37,10 @@ from avlmaps.language.intents import (
     on_targets,
     to_json,
 )  # fmt: skip
-from avlmaps.language.learned.decision import DANGERS, Weighed, decided, is_doubtful, is_same
+from avlmaps.language.learned.decision import DANGERS, NameResolver, Weighed, decided, is_doubtful, is_same, weighed
 from avlmaps.language.learned.features import columns, features
-from avlmaps.language.learned.grammar import SYMBOLS
-from avlmaps.language.learned.limits import ReadingLimits
 from avlmaps.language.learned.linear import (
+    SYMBOLS,
     MalformedError,
     Pointable,
     State,
@@ -50,8 +49,7 @@ from avlmaps.language.learned.linear import (
     inquiry_of,
     intents_of,
 )  # fmt: skip
-from avlmaps.language.learned.name_resolver import NameResolver, weighed
-from avlmaps.language.learned.reader import LearnedReader, learned_reader
+from avlmaps.language.learned.reader import LearnedReader, ReadingLimits, learned_reader
 from avlmaps.language.learned_translator import LearnedTranslator, explanation
 from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps.language.word_classes import load_word_classes

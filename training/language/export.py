@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from training.language.network import Network
 
 from avlmaps.language.learned.features import MOST_PIECES, columns
-from avlmaps.language.learned.grammar import SYMBOLS
+from avlmaps.language.learned.linear import SYMBOLS
 from avlmaps.perception.embedded.words import words_checksum
 
 OPSET = 17

@@ -17,8 +17,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.language.commands import weighed_readings
 from avlmaps.language.intents import Clarify, Intent, to_json
 from avlmaps.language.learned.decision import Weighed, decided, is_same
-from avlmaps.language.learned.limits import ReadingLimits
-from avlmaps.language.learned.reader import LearnedReader, Read
+from avlmaps.language.learned.reader import LearnedReader, Read, ReadingLimits
 from avlmaps.language.questions import asked, by_name
 from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps_sim.bench.language import OUTCOMES, judge_intents, judge_question, read_list

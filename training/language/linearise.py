@@ -1,11 +1,10 @@
-"""From intents to a line of symbols, by the table of `avlmaps.language.learned.grammar`: what the networks learn."""
+"""From intents to a line of symbols, by the table of `avlmaps.language.learned.linear`: what the networks learn."""
 
 from collections.abc import Sequence
 from typing import Any
 
 from avlmaps.language.intents import Inquiry, Intent, Pick, Target, TargetKind
-from avlmaps.language.learned.grammar import ROWS, Amount, Row, Slot
-from avlmaps.language.learned.linear import MalformedError, Pointable, State, Symbol
+from avlmaps.language.learned.linear import ROWS, Amount, MalformedError, Pointable, Row, Slot, State, Symbol
 
 _ALIKE = 0.01
 

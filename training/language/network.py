@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from avlmaps.language.learned.features import BUCKETS, columns
-from avlmaps.language.learned.grammar import SYMBOLS
+from avlmaps.language.learned.linear import SYMBOLS
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,8 @@ from training.language.plain import plain
 from training.language.rows import Example, examples_of, lists
 
 from avlmaps.language.intents import Clarify
-from avlmaps.language.learned.features import features
-from avlmaps.language.learned.grammar import INDEX, SYMBOLS
+from avlmaps.language.learned.features import features, seen_as
+from avlmaps.language.learned.linear import INDEX, SYMBOLS
 from avlmaps.language.sentence import Sentence
 from avlmaps.language.verbalise import strange_word
 
@@ -73,14 +73,11 @@ class _Words:
         seen = features(one.tokens, {})
         numbers: list[int] = []
         for at, token in enumerate(one.tokens):
-            key = (
-                "#" if token.kind == "number" else f"<{token.kind}>" if token.kind in ("image", "clip") else token.text
-            )
+            key = seen_as(token)
             if key not in self.index:
                 self.index[key] = len(self.index)
                 self.meaning.append(seen.meaning[at].astype(np.float16))
-                letters = seen.pieces[at] if token.kind == "word" else np.zeros_like(seen.pieces[at])
-                self.pieces.append(letters.astype(np.int16))
+                self.pieces.append(seen.pieces[at].astype(np.int16))
             numbers.append(self.index[key])
         base = len(SYMBOLS)
         line = np.array([INDEX[s] if isinstance(s, str) else base + s for s in one.line], np.int32)

@@ -23,8 +23,7 @@ from avlmaps.language.intents import (
     on_targets,
     targets_of,
 )
-from avlmaps.language.learned.decision import Weighed, decided
-from avlmaps.language.learned.name_resolver import EXAMPLE, REFUSALS, NameResolver, weighed
+from avlmaps.language.learned.decision import EXAMPLE, REFUSALS, NameResolver, Weighed, decided, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, language_of, stand_ins

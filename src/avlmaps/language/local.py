@@ -46,9 +46,8 @@ from avlmaps.language.intents import (
     on_targets,
     targets_of,
 )  # fmt: skip
-from avlmaps.language.learned.decision import Weighed, is_same, which
+from avlmaps.language.learned.decision import NameResolver, Weighed, is_same, weighed, which
 from avlmaps.language.learned.linear import amount, amount_end
-from avlmaps.language.learned.name_resolver import NameResolver, weighed
 from avlmaps.language.learned.reader import Read
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.names import is_known

@@ -9,10 +9,8 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 from avlmaps.language.claims import unmet_by
 from avlmaps.language.intents import Ask, Inquiry, Pick, Target, TargetKind
-from avlmaps.language.learned.decision import is_doubtful
-from avlmaps.language.learned.limits import ReadingLimits
-from avlmaps.language.learned.name_resolver import NameResolver, kind_of
-from avlmaps.language.learned.reader import Read, learned_reader
+from avlmaps.language.learned.decision import NameResolver, is_doubtful, kind_of
+from avlmaps.language.learned.reader import Read, ReadingLimits, learned_reader
 from avlmaps.language.list_questions import SUPPORTED
 from avlmaps.language.names import is_entry, is_known, sounding_forms, sounds_like, third_forms
 from avlmaps.language.sentence import ASK, Attachments, Sentence, language_of, stand_ins

@@ -1,38 +1,41 @@
 """What to do of the readings of a command: drive, stop, or ask a person.
 
-The robot drives where a reading is likely enough, names known things, and leaves no number and no word such as "not"
-unread; for the others it must be likelier. Where no reading is, a person decides. A danger that is likely at all stops.
+A reading's names are put right and its files found; what is not known becomes a question. The robot drives where a
+reading is likely enough, names known things, and leaves no number and no word such as "not" unread; for the others it
+must be likelier. Where no reading is, a person decides. A danger that is likely at all stops.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.question import HeardAt
 from avlmaps.core.words import singulars_of, stem_of
+from avlmaps.language import intents as act
 from avlmaps.language import lexer
-from avlmaps.language.claims import claimed_words
-from avlmaps.language.intents import (
-    Clarify,
-    Face,
-    Go,
-    Intent,
-    Pick,
-    RefusalReason,
-    Refuse,
-    Repeat,
-    StopAt,
-    Target,
-    TargetKind,
-    Turn,
-    Wait,
-    on_targets,
-)  # fmt: skip
-from avlmaps.language.intents import Move as MoveIntent
-from avlmaps.language.learned.limits import ReadingLimits
+from avlmaps.language.claims import claimed_words, in_direction, unmet
+from avlmaps.language.intents import Clarify, Intent, RefusalReason, Refuse, Target, TargetKind, on_targets
 from avlmaps.language.learned.linear import amount_end
+from avlmaps.language.learned.reader import Read, ReadingLimits
 from avlmaps.language.lexer import Token
-from avlmaps.language.verbalise import verbalise
+from avlmaps.language.names import is_known, is_place, may_name, mended, past_forms, sounding_forms
+from avlmaps.language.sentence import Sentence
+from avlmaps.language.verbalise import missing_file, strange_word, unclear, unknown, verbalise
 
+EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
+REFUSALS = {
+    RefusalReason.MANIPULATION: "The robot has no hands and no voice; it can only drive, turn and look.",
+    RefusalReason.ENDLESS: "The robot does not drive without an end; say how often.",
+    RefusalReason.HARM: "The robot does not do what could hurt someone or break something.",
+    RefusalReason.FLYING: "The robot stays on its floor; it cannot fly, jump or climb stairs.",
+    RefusalReason.CONDITION: "The robot cannot wait for a condition; say what to do now.",
+    RefusalReason.NEGATION: "Say only what to do: nothing to avoid, no choice between two.",
+    RefusalReason.CHAT: "The robot does not talk; say where it should go.",
+    RefusalReason.QUESTION: 'This is a question; ask the map: avlmaps query MAP "QUESTION".',
+    RefusalReason.UNKNOWN: f"This is not understood; say it like: {EXAMPLE}.",
+}
+_FAR_M, _LONG_TIMES = 100.0, 50
+_ROOM_WORDS = frozenset({"room", "area", "zone", "hall", "corner", "wing", "bay", "ward", "lab", "office", "aisle"})
 DANGERS = (
     RefusalReason.HARM,
     RefusalReason.FLYING,
@@ -65,6 +68,124 @@ class Weighed:
         """The refusal or the question; None where the robot may drive."""
         first = self.intents[0]
         return first if isinstance(first, Refuse | Clarify) else None
+
+
+@dataclass(slots=True)
+class NameResolver:
+    """Puts right the names of one sentence, and keeps what is to be told or asked about them."""
+
+    sentence: Sentence
+    notes: list[str] = field(default_factory=list)
+    problem: Clarify | None = None
+
+    def resolve(self, target: Target) -> Target:
+        """Return a target with the name that is meant; what is not known becomes a question."""
+        near = tuple(self.resolve(one) for one in target.near)
+        match target.kind:
+            case TargetKind.IMAGE | TargetKind.CLIP if not target.name:
+                given = self.sentence.given
+                path = given.image if target.kind is TargetKind.IMAGE else given.clip
+                if path is None:
+                    self._ask(missing_file(target.kind))
+                return replace(target, name=path or "", near=near, at=self._place(target))
+            case TargetKind.OBJECT | TargetKind.AREA:
+                return replace(self._thing(target), near=near)
+            case TargetKind.SOUND:
+                return replace(target, name=_sound(target.name), near=near, at=self._place(target))
+            case _:
+                return replace(target, near=near, at=self._place(target))
+
+    def _place(self, target: Target) -> HeardAt | None:
+        """Return the place of a sound that is meant: the one that was chosen for all, else as the words say."""
+        given = self.sentence.given
+        sounds = target.kind in (TargetKind.SOUND, TargetKind.CLIP)
+        if not sounds or given.at is not None:
+            return "source" if sounds and given.at == "source" else None
+        why = given.no_sources() if target.at == "source" else ""
+        if why:
+            self.notes.append(why)
+        return None if why else target.at
+
+    def _thing(self, target: Target) -> Target:
+        name = target.name
+        if not is_known(name) and not self.sentence.knows(name):
+            better = mended(name)
+            is_room = target.kind is TargetKind.AREA and set(name.split()) & _ROOM_WORDS
+            if better is None and not is_room and not may_name(name):
+                self._ask(unknown(name))
+                return target
+            if better is not None:
+                self.notes.append(f"'{name}' is read as '{better}'.")
+                name = better
+        return replace(target, name=name.replace(" 's", "'s"), kind=kind_of(name, target.kind))
+
+    def _ask(self, question: Clarify) -> None:
+        self.problem = self.problem or question
+
+
+def kind_of(name: str, kind: TargetKind) -> TargetKind:
+    """Return whether a name is of a thing or of a room, where only one is possible; else what it was read as."""
+    words = name.split()
+    for start in range(len(words)):
+        tail = " ".join(words[start:])
+        thing, room = (lexicon().find(tail, each) is not None for each in (EntryKind.THING, EntryKind.ROOM))
+        if thing and not room and not start:
+            return TargetKind.OBJECT
+        if room and not thing:
+            return TargetKind.AREA
+        if thing or room:
+            return kind
+    return TargetKind.AREA if is_place(name) else kind
+
+
+def _sound(name: str) -> str:
+    """Return the name of a sound with its verb as sounds are named: "dog barked" is "dog barking"."""
+    forms = sounding_forms()
+    words = name.split()
+    if len(words) > 1 and words[-1] in past_forms() and words[-1] in forms:
+        words[-1] = forms[words[-1]]
+    return " ".join(words)
+
+
+def weighed(read: Read, names: NameResolver) -> Weighed:
+    """Return a reading of a command, checked."""
+    assert isinstance(read.meaning, tuple)
+    tokens, intents, stop = names.sentence.tokens, read.meaning, None
+    refused = next((one for one in intents if isinstance(one, Refuse)), None)
+    if refused is not None:
+        strange = refused.reason is RefusalReason.UNKNOWN and strange_word(tokens)
+        stop = unclear(tokens) if strange else refused
+    elif any(isinstance(one, Clarify) for one in intents):
+        stop = unclear(tokens)
+    else:
+        intents = tuple(on_targets(one, names.resolve) for one in intents)
+        stop = names.problem or _too_much(intents) or unmet(tokens, intents, read.used)
+    if stop is None:
+        turned = in_direction(tokens, intents)
+        intents, stop = (intents, turned) if isinstance(turned, Clarify) else (turned, None)
+    if stop is not None:
+        stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
+        return Weighed((stop,), read.probability)
+    doubtful = is_doubtful(tokens, read.used, waits=any(isinstance(one, act.Wait) for one in intents))
+    return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(names.notes)))
+
+
+def _too_much(intents: Sequence[Intent]) -> Clarify | None:
+    for one in intents:
+        metres = one.metres if isinstance(one, act.Move | act.StopAt | act.Beside) else None
+        if metres is not None and not 0.0 < abs(metres) <= _FAR_M:
+            return Clarify(f"{metres:g} m is too far, or no distance; say a distance of up to {_FAR_M:g} m.")
+        if isinstance(one, act.Between) and one.of[0] == one.of[1]:
+            return Clarify("Between which two things? Name two different ones.")
+        if isinstance(one, act.Turn) and one.degrees is not None and abs(one.degrees) > 360.0 * _LONG_TIMES:
+            return Clarify(f"{one.degrees:g} degrees is too far to turn.")
+        if isinstance(one, act.Repeat):
+            if one.times > _LONG_TIMES:
+                return Clarify(f"{one.times} times is too often; say up to {_LONG_TIMES}.")
+            inner = _too_much(one.body)
+            if inner is not None:
+                return inner
+    return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,22 +236,23 @@ def is_same(a: Sequence[Intent], b: Sequence[Intent]) -> bool:
 
 
 def _places(intents: Sequence[Intent]) -> list[Intent]:
-    flat = [part for one in intents for part in (one.body * one.times if isinstance(one, Repeat) else (one,))]
-    moves = any(isinstance(one, MoveIntent) for one in flat)
-    kept = [one for one in flat if not isinstance(one, Wait) and (moves or not isinstance(one, Face | Turn))]
-    plain = [_rounded(on_targets(one, _plain)) for one in (kept or flat)]
-    nearer = zip(plain, [*plain[1:], None], strict=True)  # "go to it, stop 1 m from it" ends as "stop 1 m from it"
-    return [
-        one for one, after in nearer if not (isinstance(one, Go) and isinstance(after, StopAt) and one.to == after.of)
-    ]
+    flat = [part for one in intents for part in (one.body * one.times if isinstance(one, act.Repeat) else (one,))]
+    looks = (act.Wait,) if any(isinstance(one, act.Move) for one in flat) else (act.Wait, act.Face, act.Turn)
+    kept = [one for one in flat if not isinstance(one, looks)]
+    found: list[Intent] = []
+    for one in (_rounded(on_targets(each, _plain)) for each in (kept or flat)):
+        if found and isinstance(one, act.StopAt) and found[-1] == act.Go(one.of):
+            found.pop()  # "go to it, stop 1 m from it" ends as "stop 1 m from it"
+        found.append(one)
+    return found
 
 
 def _rounded(intent: Intent) -> Intent:
     match intent:
-        case MoveIntent(metres=metres):
-            return MoveIntent(round(metres, 2))
-        case Turn(degrees=degrees) if degrees is not None:
-            return Turn(180.0 if degrees == -180.0 else round(degrees, 1))
+        case act.Move(metres=metres):
+            return act.Move(round(metres, 2))
+        case act.Turn(degrees=degrees) if degrees is not None:
+            return act.Turn(180.0 if degrees == -180.0 else round(degrees, 1))
         case _:
             return intent
 
@@ -146,7 +268,7 @@ def _plain(target: Target) -> Target:
     else:
         name = " ".join([*own[:-1], next(iter(singulars_of(own[-1])), own[-1])]) if own else ""
     kind = TargetKind.OBJECT if target.kind is TargetKind.AREA else target.kind
-    return Target(kind, name, near, Pick.ANY if target.pick is Pick.NEAREST else target.pick)
+    return Target(kind, name, near, act.Pick.ANY if target.pick is act.Pick.NEAREST else target.pick)
 
 
 def _flat_near(target: Target) -> list[Target]:
@@ -178,12 +300,9 @@ def _is_name(token: Token, said: set[str]) -> bool:
 
 
 def _is_number(tokens: Sequence[Token], at: int) -> bool:
+    """Return whether a number is said at a token that numbers no list: "1. go to the sofa"."""
     token = tokens[at]
-    if token.kind == "number":
-        listed = (
-            at + 1 < len(tokens)
-            and tokens[at + 1].text in (".", ")", ":")
-            and (at == 0 or tokens[at - 1].kind == "punct")
-        )
-        return not listed
-    return token.kind == "word" and token.text not in _SMALL_WORDS and bool(lexer.number_at(list(tokens), at))
+    if token.kind != "number":
+        return token.kind == "word" and token.text not in _SMALL_WORDS and bool(lexer.number_at(list(tokens), at))
+    begins = at == 0 or tokens[at - 1].kind == "punct"
+    return not (begins and [each.text for each in tokens[at + 1 : at + 2]] in (["."], [")"], [":"]))

@@ -7,8 +7,8 @@ learnt of one holds for all.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float32, Int64
@@ -36,8 +36,7 @@ BUCKETS = 2048
 MOST_PIECES = 12
 
 
-@dataclass(frozen=True, slots=True)
-class Features:
+class Features(NamedTuple):
     """One sentence as arrays.
 
     Attributes:
@@ -55,14 +54,20 @@ class Features:
 
 def features(tokens: Sequence[Token], vocabulary: Mapping[str, int]) -> Features:
     """Return the features of a tokenised sentence."""
-    texts = [token.text for token in tokens]
-    spoken = [text if token.kind == "word" else "" for text, token in zip(texts, tokens, strict=True)]
+    spoken = [token.text if token.kind == "word" else "" for token in tokens]
     return Features(
         word_vectors(spoken),
-        np.array([vocabulary.get(text, 0) for text in texts], np.int64).reshape(-1),
-        np.array([_pieces(text) for text in texts], np.int64).reshape(-1, MOST_PIECES),
+        np.array([vocabulary.get(seen_as(token), 0) for token in tokens], np.int64).reshape(-1),
+        np.array(list(map(_pieces, spoken)), np.int64).reshape(-1, MOST_PIECES),
         _marked(list(tokens)),
     )
+
+
+def seen_as(token: Token) -> str:
+    """Return the entry of the vocabulary that a token is: all numbers are one, all files of a kind are one."""
+    if token.kind == "number":
+        return "#"
+    return f"<{token.kind}>" if token.kind in ("image", "clip") else token.text
 
 
 @cache

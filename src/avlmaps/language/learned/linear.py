@@ -6,17 +6,149 @@ A target is its kind, its words, a pick, and what it is near; an amount stands b
 
     stop_at ^5 object ^9 ^10 near area ^13 end      "stop 2 m from the blue chair in the hall"
 
-`grammar` has the table of the intents.
+`ROWS` is the table of the intents: a row is one way to write an intent, the symbols that begin it and its fields in the
+order in which they are written. Lines are read by it here, and written by it in `training.language.linearise`. A new
+intent is a new row, its words (`verbalise`) and its program (`program.writing`). The networks know `SYMBOLS` by their
+numbers, so another order needs other networks.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum, auto
+from functools import cached_property
 from typing import Any
 
-from avlmaps.language import lexer
+from avlmaps.language import intents, lexer
 from avlmaps.language.intents import Inquiry, Intent, Pick, Target, TargetKind
-from avlmaps.language.learned.grammar import ASKS, KINDS, PICKS, STARTS, STOPS, Amount, Slot, rows_of
 from avlmaps.language.lexer import Token
+
+
+class Slot(Enum):
+    """What is written in a place of a line that is no amount."""
+
+    START = auto()
+    HEAD = auto()  # the second symbol of an intent, or its first field
+    TARGET = auto()
+    BODY = auto()
+    END = auto()
+    OVER = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Amount:
+    """An amount: a pointer to where it is said, or a symbol for one that is said without a number.
+
+    Attributes:
+        of: ``metres``, ``degrees``, ``clock``, ``seconds`` or ``count``.
+        said: the symbols and what they stand for: "a bit", "around".
+        optional: whether it may be missing.
+        sign: −1 where the value is the negative amount; half a turn is 180 degrees either way.
+        wraps: whether it is a heading, from 0 to 360 degrees.
+    """
+
+    of: str
+    said: Mapping[str, float] = field(default_factory=dict)
+    optional: bool = False
+    sign: int = 1
+    wraps: bool = False
+
+    def value(self, amount: float) -> float:
+        """Return the value of a field for an amount."""
+        if self.of == "count":
+            return int(amount)
+        if self.wraps:
+            return amount % 360.0
+        return amount if self.sign > 0 or (self.of == "degrees" and amount == 180.0) else -amount
+
+    def amount(self, value: float) -> float | None:
+        """Return the amount to write for the value of a field; None where another row writes such values."""
+        if self.of == "clock":
+            return value
+        if self.wraps:
+            return value % 360.0
+        return abs(value) if (value < 0.0) == (self.sign < 0) else None
+
+
+@dataclass(frozen=True)
+class Row:
+    """One way to write an intent.
+
+    Attributes:
+        symbols: what begins it.
+        intent: its class.
+        fields: its fields, in the order in which they are written: an `Amount`, a `Slot`, a pair of those, or the
+            constant that the symbols stand for.
+    """
+
+    symbols: tuple[str, ...]
+    intent: type[intents.Intent]
+    fields: Mapping[str, Any]
+
+    @cached_property
+    def slots(self) -> tuple[Slot | Amount, ...]:
+        """What is written behind the symbols."""
+        if issubclass(self.intent, intents.Refuse | intents.Clarify):
+            return (Slot.END,)
+        every = [one for each in self.fields.values() for one in (each if isinstance(each, tuple) else (each,))]
+        return tuple(one for one in every if isinstance(one, Amount | Slot))
+
+
+def _row(symbols: str, intent: type[intents.Intent], **fields: Any) -> Row:
+    return Row(tuple(symbols.split()), intent, fields)
+
+
+# Amounts that are said without a number: "around", "a quarter turn", "a bit", "twice".
+DEGREES = {"d30": 30.0, "d45": 45.0, "d90": 90.0, "d135": 135.0, "d180": 180.0, "d270": 270.0, "d360": 360.0}
+HEADINGS = {f"h{at}": float(at) for at in range(0, 360, 45)}
+TIMES = {"twice": 2.0, "thrice": 3.0}
+VIEWS = {"views_2": 2.0, "views_3": 3.0, "views_4": 4.0}
+BIT = {"bit": 0.5}
+_METRES = Amount("metres", BIT)
+ROWS = (
+    _row("go", intents.Go, to=Slot.TARGET),
+    _row("face", intents.Face, to=Slot.TARGET, side=intents.Side.AHEAD),
+    *(
+        _row(f"face_{side}", intents.Face, to=Slot.TARGET, side=side)
+        for side in (intents.Side.LEFT, intents.Side.RIGHT, intents.Side.BEHIND)
+    ),
+    _row("turn", intents.Turn, degrees=Amount("clock"), heading=None),
+    _row("turn left", intents.Turn, degrees=Amount("degrees", DEGREES, sign=-1), heading=None),
+    _row("turn right", intents.Turn, degrees=Amount("degrees", DEGREES), heading=None),
+    _row("turn_to", intents.Turn, degrees=None, heading=Amount("degrees", HEADINGS, wraps=True)),
+    _row("forward", intents.Move, metres=_METRES),
+    _row("back", intents.Move, metres=Amount("metres", BIT, sign=-1)),
+    _row("between", intents.Between, of=(Slot.TARGET, Slot.TARGET)),
+    *(
+        _row(f"beside_{side}", intents.Beside, metres=Amount("metres", BIT, optional=True), of=Slot.TARGET, side=side)
+        for side in intents.Side
+        if side is not intents.Side.AHEAD
+    ),
+    _row("stop_at", intents.StopAt, metres=_METRES, of=Slot.TARGET),
+    _row("circle", intents.Circle, of=Slot.TARGET, views=None),
+    _row("views", intents.Circle, views=Amount("count", VIEWS), of=Slot.TARGET),
+    _row("each", intents.VisitEach, of=Slot.TARGET),
+    _row("wait", intents.Wait, seconds=Amount("seconds", optional=True)),
+    _row("return", intents.Return),
+    _row("repeat", intents.Repeat, times=Amount("count", TIMES), body=Slot.BODY),
+    *(_row(f"refuse_{reason}", intents.Refuse, reason=reason) for reason in intents.RefusalReason),
+    _row("clarify", intents.Clarify),
+)
+ASKS = {f"ask_{ask}": ask for ask in intents.Ask}
+KINDS = tuple(str(kind) for kind in intents.TargetKind)
+PICKS = {f"pick_{pick}": pick for pick in intents.Pick if pick}
+STOPS = tuple(row.symbols[0] for row in ROWS if row.slots == (Slot.END,))
+STARTS = tuple(dict.fromkeys(row.symbols[0] for row in ROWS if row.slots != (Slot.END,)))
+SYMBOLS = (
+    "start_command", "start_question", "end", *STARTS, "close", *STOPS, "refuse", "purpose", *ASKS, *KINDS, *PICKS,
+    "near", "inside", "left", "right", *DEGREES, *HEADINGS, *TIMES, *VIEWS, *BIT,
+)  # fmt: skip
+INDEX = {symbol: at for at, symbol in enumerate(SYMBOLS)}
+
+
+def rows_of(symbols: tuple[str, ...]) -> list[Row]:
+    """Return the rows that begin with some symbols."""
+    return [row for row in ROWS if row.symbols[: len(symbols)] == symbols]
+
 
 MOST_SYMBOLS = 80
 _MOST_WORDS = 6
@@ -221,10 +353,12 @@ def intents_of(
     Raises:
         MalformedError: it means nothing.
     """
-    intents, at = _Line(line, tokens, at_source).intents(0)
-    if not intents or at != len(line) - 1 or line[at] != "end":
+    written = _Line(line, tokens, at_source)
+    found = written.intents()
+    written.take("end")
+    if not found or written.at != len(line):
         raise MalformedError("the line ends too early or too late")
-    return tuple(intents)
+    return found
 
 
 def inquiry_of(
@@ -237,100 +371,97 @@ def inquiry_of(
     """
     if list(line) == ["refuse", "end"]:
         return None
-    written, targets, at = _Line(line, tokens, at_source), [], 1
-    while line[at : at + 1] and line[at] != "end":
-        target, at = written.target(at)
-        targets.append(target)
-    if not targets or line[-1] != "end" or not isinstance(line[0], str) or line[0] not in ASKS:
+    written = _Line(line, tokens, at_source)
+    ask, targets = written.take(*ASKS), list[Target]()
+    while written.next in KINDS:
+        targets.append(written.target())
+    written.take("end")
+    if not targets or written.at != len(line):
         raise MalformedError("the line is no question")
-    return Inquiry(ASKS[line[0]], tuple(targets))
+    return Inquiry(ASKS[ask], tuple(targets))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Line:
-    """A line of symbols that is read back; each method returns what begins at a symbol, and where it ends."""
+    """A line of symbols that is read from its beginning; ``at`` is the next one."""
 
     symbols: Sequence[Symbol]
     tokens: Sequence[Token]
-    at_source: Callable[[Sequence[int]], bool] = lambda _: False
+    at_source: Callable[[Sequence[int]], bool]
+    at: int = 0
 
-    def intents(self, at: int) -> tuple[list[Intent], int]:
+    @property
+    def next(self) -> Symbol:
+        return self.symbols[self.at] if self.at < len(self.symbols) else ""
+
+    def take(self, *expected: str) -> str:
+        symbol = self.next
+        if isinstance(symbol, int) or symbol not in expected:
+            raise MalformedError(f"{symbol} stands where {' or '.join(expected)} should")
+        self.at += 1
+        return symbol
+
+    def intents(self) -> tuple[Intent, ...]:
         found: list[Intent] = []
-        while at < len(self.symbols) and self.symbols[at] not in ("end", "close"):
-            intent, at = self.intent(at)
-            found.append(intent)
-        return found, at
+        while self.next not in ("end", "close", ""):
+            found.append(self.intent())
+        return tuple(found)
 
-    def intent(self, at: int) -> tuple[Intent, int]:
-        symbol = self.symbols[at]
-        rows = [] if isinstance(symbol, int) else rows_of((symbol,))
-        fits = [row for row in rows if tuple(self.symbols[at : at + len(row.symbols)]) == row.symbols]
+    def intent(self) -> Intent:
+        fits = [row for row in ROWS if tuple(self.symbols[self.at : self.at + len(row.symbols)]) == row.symbols]
         if not fits:
-            raise MalformedError(f"no intent begins with {symbol}")
+            raise MalformedError(f"no intent begins with {self.next}")
         row = max(fits, key=lambda each: len(each.symbols))
-        at += len(row.symbols)
-        values: dict[str, Any] = {}
-        for name, field in row.fields.items():
-            values[name], at = self.field(field, at)
-        return row.intent(**values), at
+        self.at += len(row.symbols)
+        return row.intent(**{name: self.field(of) for name, of in row.fields.items()})
 
-    def field(self, field: Any, at: int) -> tuple[Any, int]:
-        if isinstance(field, Amount):
-            return self.amount(field, at)
-        if isinstance(field, tuple):
-            values: list[Any] = []
-            for each in field:
-                value, at = self.field(each, at)
-                values.append(value)
-            return tuple(values), at
-        if field is Slot.TARGET:
-            return self.target(at)
-        if field is Slot.BODY:
-            body, at = self.intents(at)
-            if not body or self.peek(at) != "close":
-                raise MalformedError("a repeat without a body")
-            return tuple(body), at + 1
-        return field, at
+    def field(self, of: Any) -> Any:
+        match of:
+            case Amount():
+                return self.amount(of)
+            case tuple():
+                return tuple(map(self.field, of))
+            case Slot.TARGET:
+                return self.target()
+            case Slot.BODY:
+                body = self.intents()
+                self.take("close")
+                return body
+            case _:
+                return of
 
-    def amount(self, field: Amount, at: int) -> tuple[float | None, int]:
-        symbol = self.peek(at)
-        if isinstance(symbol, str):
-            if symbol in field.said:
-                return field.value(float(field.said[symbol])), at + 1
-            if field.optional:
-                return None, at
-            raise MalformedError(f"{symbol} is no amount")
-        value = amount(self.tokens, symbol, field.of) if symbol < len(self.tokens) else None
-        if value is None:
-            raise MalformedError("no amount begins there")
-        return field.value(value), at + 1
+    def amount(self, of: Amount) -> float | None:
+        symbol = self.next
+        if isinstance(symbol, int):
+            value = amount(self.tokens, symbol, of.of) if symbol < len(self.tokens) else None
+            if value is None:
+                raise MalformedError("no amount begins there")
+            self.at += 1
+            return of.value(value)
+        if of.optional and symbol not in of.said:
+            return None
+        return of.value(float(of.said[self.take(*of.said)]))
 
-    def peek(self, at: int) -> Symbol:
-        return self.symbols[at] if at < len(self.symbols) else "end"
-
-    def target(self, at: int) -> tuple[Target, int]:
-        target, at = self.own(at)
-        while self.peek(at) == "near":
-            near, at = self.own(at + 1)
-            while self.peek(at) == "inside":
-                inner, at = self.own(at + 1)
-                near = near.with_near(inner)
+    def target(self) -> Target:
+        target = self.own()
+        while self.next == "near":
+            self.at += 1
+            near = self.own()
+            while self.next == "inside":
+                self.at += 1
+                near = near.with_near(self.own())
             target = target.with_near(near)
-        return target, at
+        return target
 
-    def own(self, at: int) -> tuple[Target, int]:
+    def own(self) -> Target:
         """Return the target without what it is near."""
-        kind = self.peek(at)
-        if not isinstance(kind, str) or kind not in KINDS:
-            raise MalformedError("a target without a kind")
-        at += 1
-        words: list[int] = []
-        while isinstance(symbol := self.peek(at), int):
+        kind, words = self.take(*KINDS), list[int]()
+        while isinstance(symbol := self.next, int):
             words.append(symbol)
-            at += 1
-        pick = PICKS.get(symbol, Pick.ANY)
+            self.at += 1
         if not words and kind in ("object", "sound", "area"):
             raise MalformedError("a target without a name")
+        pick = PICKS[self.take(*PICKS)] if symbol in PICKS else Pick.ANY
         name = " ".join(self.tokens[word].text for word in words)
         place = "source" if kind in ("sound", "clip") and self.at_source(words) else None
-        return Target(TargetKind(kind), name, (), pick, place), at + (pick is not Pick.ANY)
+        return Target(TargetKind(kind), name, (), pick, place)

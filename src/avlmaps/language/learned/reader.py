@@ -6,9 +6,9 @@ before that: where it would rather write nonsense, its readings are unlikely.
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
@@ -20,8 +20,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.language.intents import Inquiry, Intent, Target, on_targets
 from avlmaps.language.learned import linear
 from avlmaps.language.learned.features import columns, features
-from avlmaps.language.learned.grammar import INDEX, SYMBOLS
-from avlmaps.language.learned.limits import ReadingLimits
+from avlmaps.language.learned.linear import INDEX, SYMBOLS
 from avlmaps.language.lexer import Token
 from avlmaps.language.source_words import seeks_source
 from avlmaps.perception.embedded.words import words_checksum
@@ -31,6 +30,25 @@ _BEAM = 4
 _MOST_TOKENS = 100
 _LEAST = -12.0  # lines less likely than e to this are not followed
 _NAMED = frozenset({"object", "sound", "area"})
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingLimits:
+    """How likely a reading must be; chosen on voices that the networks were not fitted to.
+
+    Attributes:
+        command: to drive.
+        doubtful: to drive where a number, a name or a word such as "not" is not part of the reading.
+        danger: a refusal for danger, to stop.
+        question: to answer a question.
+        question_doubtful: the same, where such a word is not part of the reading.
+    """
+
+    command: float = 0.7
+    doubtful: float = 0.85
+    danger: float = 0.3
+    question: float = 0.4
+    question_doubtful: float = 0.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,42 +114,31 @@ class LearnedReader:
 
     def command(self, tokens: Sequence[Token]) -> list[Read]:
         """Return the readings of a command, the likeliest first; none where it is empty or too long."""
-        found: dict[Any, Read] = {}
-        for line in self.lines(tokens, is_question=False):
-            try:
-                meaning = linear.intents_of(line.symbols, tokens, _at_source(line, tokens))
-            except linear.MalformedError:
-                continue
-            _add(found, Read(meaning, float(np.exp(line.log)), _pointed(line)))
-        return _sorted(found)
+        return self._reads(tokens, is_question=False)
 
     def question(self, tokens: Sequence[Token]) -> list[Read]:
         """Return the readings of a question, the likeliest first; none where it is empty or too long."""
+        return self._reads(tokens, is_question=True)
+
+    def _reads(self, tokens: Sequence[Token], *, is_question: bool) -> list[Read]:
+        meaning_of = linear.inquiry_of if is_question else linear.intents_of
         found: dict[Any, Read] = {}
-        for line in self.lines(tokens, is_question=True):
-            purpose = line.symbols == ("purpose", "end")
-            try:
-                meaning = None if purpose else linear.inquiry_of(line.symbols, tokens, _at_source(line, tokens))
-            except linear.MalformedError:
-                continue
-            _add(found, Read(meaning, float(np.exp(line.log)), _pointed(line), purpose))
-        return _sorted(found)
+        for line in self.lines(tokens, is_question=is_question):
+            used = frozenset(symbol for symbol in line.symbols if isinstance(symbol, int))
+            is_purpose = line.symbols == ("purpose", "end")
+            at_source = partial(_at_source, tokens, used)
+            meaning = None if is_purpose else meaning_of(line.symbols, tokens, at_source)
+            key = (_placeless(meaning), is_purpose)
+            before = found.get(key, Read(meaning, 0.0, used, is_purpose))
+            found[key] = replace(before, probability=before.probability + float(np.exp(line.log)))
+        return sorted(found.values(), key=lambda read: -read.probability)
 
     def lines(self, tokens: Sequence[Token], *, is_question: bool) -> list[Line]:
         """Return the likeliest lines for a sentence, the likeliest first."""
         if not 0 < len(tokens) <= _MOST_TOKENS:
             return []
         seen = features(tokens, self._vocabulary)
-        numbers = np.array([token.kind == "number" for token in tokens])
-        meaning = np.where(numbers[:, None], np.float32(0.0), seen.meaning)
-        words = np.where(numbers, self._vocabulary.get("#", 0), seen.words)
-        for kind in ("image", "clip"):
-            of_kind = np.array([token.kind == kind for token in tokens])
-            words = np.where(of_kind, self._vocabulary.get(f"<{kind}>", 0), words)
-        pieces = np.where((numbers | np.array([t.kind in ("image", "clip") for t in tokens]))[:, None], 0, seen.pieces)
-        outputs: Any = self._words.run(
-            None, {"meaning": meaning[None], "words": words[None], "pieces": pieces[None], "marks": seen.marks[None]}
-        )
+        outputs: Any = self._words.run(None, {name: array[None] for name, array in seen._asdict().items()})
         states, begin = outputs
         start = INDEX["start_question" if is_question else "start_command"]
         return self._search(tokens, states, begin[0, 0], start, is_question=is_question)
@@ -192,33 +199,22 @@ def _number(symbol: linear.Symbol) -> int:
     return INDEX[symbol] if isinstance(symbol, str) else len(SYMBOLS) + symbol
 
 
-def _pointed(line: Line) -> frozenset[int]:
-    return frozenset(symbol for symbol in line.symbols if isinstance(symbol, int))
+def _at_source(tokens: Sequence[Token], used: frozenset[int], own: Sequence[int]) -> bool:
+    """Return whether the place is meant that a sound came from which a reading names by some of its words."""
+    return seeks_source(tokens, own, used - frozenset(own))
 
 
-def _at_source(line: Line, tokens: Sequence[Token]) -> Callable[[Sequence[int]], bool]:
-    """Return what says whether the place is meant that a sound came from which a line names by some of its words."""
-    return lambda own: seeks_source(tokens, own, _pointed(line) - frozenset(own))
-
-
-def _add(found: dict[Any, Read], read: Read) -> None:
-    key = (read.meaning, read.is_purpose)
-    if isinstance(read.meaning, tuple):  # where a sound is meant to be is no other reading
-        key = (tuple(on_targets(one, _anywhere) for one in read.meaning), read.is_purpose)
-    elif read.meaning is not None:
-        key = (replace(read.meaning, of=tuple(map(_anywhere, read.meaning.of))), read.is_purpose)
-    before = found.get(key)
-    if before is not None:
-        read = Read(before.meaning, before.probability + read.probability, before.used, before.is_purpose)
-    found[key] = read
-
-
-def _anywhere(target: Target) -> Target:
-    return replace(target, at=None, near=tuple(map(_anywhere, target.near)))
-
-
-def _sorted(found: dict[Any, Read]) -> list[Read]:
-    return sorted(found.values(), key=lambda read: -read.probability)
+def _placeless(meaning: Any) -> Any:
+    """Return a meaning that says of no sound where it is meant to be, which makes no other reading."""
+    match meaning:
+        case Target():
+            return replace(meaning, at=None, near=tuple(map(_placeless, meaning.near)))
+        case Inquiry():
+            return replace(meaning, of=tuple(map(_placeless, meaning.of)))
+        case tuple():
+            return tuple(on_targets(one, _placeless) for one in meaning)
+        case _:
+            return meaning
 
 
 def _check(facts: dict[str, Any]) -> None:
