@@ -42,6 +42,10 @@ class KeptModel(LocalModel):
         self.seconds: list[float] = []
         self.read: list[tuple[int, int]] = []
 
+    def has(self, command: str) -> bool:
+        """Return whether a program for a command was kept."""
+        return command in self._answers
+
     def write(self, command: str, tokens: Sequence[Any]) -> Written:
         """Return the program of before, or ask the model."""
         if command not in self._answers:
@@ -140,14 +144,18 @@ def main() -> None:
     )
     parser.add_argument("--count", type=int, default=50, help="sentences of each of the three sources")
     parser.add_argument("--answers", type=Path, default=Path("local_answers.jsonl"), help="what the model wrote")
+    parser.add_argument("--most", type=int, default=1000, help="sentences in all")
+    parser.add_argument("--alone", action="store_true", help="ask the model about every order, not only unsure ones")
     parser.add_argument("--seed", type=int, default=1, help="of the choice of sentences")
     given = parser.parse_args()
     model = KeptModel(given.model, given.answers)
     translator = LocalTranslator(model, replace(Attachments(), at=None))
     ways = dict(zip(WAYS, (_by_reader, _by_model, _by_both), strict=True))
     counts: dict[tuple[str, str], Counter[str]] = {}
-    for number, said in enumerate(sentences(given.no_orders, given.count, given.seed), 1):
+    for number, said in enumerate(sentences(given.no_orders, given.count, given.seed)[: given.most], 1):
         for way, read in ways.items():
+            if way == "model" and not given.alone and not model.has(said.text):
+                continue
             kind = "no orders" if said.row is None else "held out" if said.list in HELD_OUT else "other lists"
             became = outcome(said, read, translator)
             counts.setdefault((kind, way), Counter())[became] += 1

@@ -23,29 +23,9 @@ from urllib.request import Request, urlopen
 
 from avlmaps.core.errors import BackendError, LanguageError
 from avlmaps.core.extras import install_command
+from avlmaps.language import intents as act
 from avlmaps.language.commands import Command, UnclearError, check_order, read_command
-from avlmaps.language.intents import (
-    Beside,
-    Between,
-    Circle,
-    Face,
-    Go,
-    Intent,
-    Move,
-    Pick,
-    Refuse,
-    Repeat,
-    Return,
-    Side,
-    StopAt,
-    Target,
-    TargetKind,
-    Turn,
-    VisitEach,
-    Wait,
-    on_targets,
-    targets_of,
-)  # fmt: skip
+from avlmaps.language.intents import Intent, Pick, Refuse, Side, Target, TargetKind, on_targets, targets_of
 from avlmaps.language.learned.decision import NameResolver, Weighed, is_same, weighed, which
 from avlmaps.language.learned.linear import amount, amount_end
 from avlmaps.language.learned.reader import Read
@@ -88,7 +68,7 @@ def grammar(tokens: Sequence[Token]) -> str:
     words = dict.fromkeys(word for word in said if word not in _ARTICLES)
     sought = " | ".join(_literal(f"{name}=") for name in SKILLS["get_major_map"].alternatives if name != "img")
     rules = {
-        "root": r'("start = robot.current_pos()\n")? step+ "\n"',
+        "root": r'("start = robot.current_pos()\n")? step{1,10} "\n"',  # small models repeat themselves
         "step": r'call "\n" | each | round | again',
         "each": r'"for place in robot.get_all_pos(" target "):\n    robot.move_to(place)\n"',
         "round": r'"outline = robot.get_contour(" name ")\nfor i in range(8):\n'
@@ -133,11 +113,12 @@ def _literal(text: str) -> str:
 _SIDES = {"left": Side.LEFT, "right": Side.RIGHT, "behind": Side.BEHIND, "north": Side.NORTH, "south": Side.SOUTH,
           "east": Side.EAST, "west": Side.WEST}  # fmt: skip
 _STEPS: Mapping[str, Callable[..., Intent]] = {
-    "move_to": Go, "move_to_object": Go, "face": Face, "move_forward": Move, "turn": Turn, "wait": Wait,
-    "turn_absolute": lambda heading: Turn(None, heading), "move_in_between": lambda a, b: Between((a, b)),
-    **{f"with_object_on_{side}": lambda to, side=side: Face(to, _SIDES[side]) for side in ("left", "right")},
+    "move_to": act.Go, "move_to_object": act.Go, "face": act.Face, "move_forward": act.Move, "turn": act.Turn,
+    "wait": act.Wait,
+    "turn_absolute": lambda heading: act.Turn(None, heading), "move_in_between": lambda a, b: act.Between((a, b)),
+    **{f"with_object_on_{side}": lambda to, side=side: act.Face(to, _SIDES[side]) for side in ("left", "right")},
     **{f"move_{side}" if side not in ("left", "right") else f"move_to_{side}":
-       lambda of, metres=None, at=at: Beside(of, at, metres) for side, at in _SIDES.items()},
+       lambda of, metres=None, at=at: act.Beside(of, at, metres) for side, at in _SIDES.items()},
 }  # fmt: skip
 _KINDS = {"obj": TargetKind.OBJECT, "sound": TargetKind.SOUND, "area": TargetKind.AREA}
 
@@ -158,14 +139,14 @@ def _block(body: Sequence[ast.stmt]) -> list[Intent]:
             case ast.Assign(value=ast.Call(args=[])):  # where it starts
                 continue
             case ast.Assign(value=ast.Call(args=[name])):
-                found.append(Circle(_value(name)))
+                found.append(act.Circle(_value(name)))
             case ast.For(iter=ast.Call(func=ast.Name(), args=[ast.Constant(value=int(times))]), body=inside):
                 if not isinstance(inside[0], ast.Expr) or "outline" not in ast.dump(inside[0]):
-                    found.append(Repeat(times, tuple(_block(inside))))
+                    found.append(act.Repeat(times, tuple(_block(inside))))
             case ast.For(iter=ast.Call(args=[target])):
-                found.append(VisitEach(_value(target)))
+                found.append(act.VisitEach(_value(target)))
             case ast.Expr(value=ast.Call(args=[ast.Name()])):
-                found.append(Return())
+                found.append(act.Return())
             case ast.Expr(value=ast.Call(func=ast.Attribute(attr=skill), args=given)):
                 found.append(_STEPS[skill](*map(_value, given)))
             case _:
@@ -198,10 +179,10 @@ def _joined(steps: Sequence[Intent]) -> list[Intent]:
     found: list[Intent] = []
     for step in steps:
         match found[-1:], step:
-            case [Go(to=before)], Face(to=to, side=Side.AHEAD) if before == to:
-                found[-1] = Beside(to, Side.FRONT)
-            case [Beside(of=of, side=Side.FRONT, metres=None)], Move(metres=metres) if metres < 0.0:
-                found[-1] = StopAt(of, -metres)
+            case [act.Go(to=before)], act.Face(to=to, side=Side.AHEAD) if before == to:
+                found[-1] = act.Beside(to, Side.FRONT)
+            case [act.Beside(of=of, side=Side.FRONT, metres=None)], act.Move(metres=metres) if metres < 0.0:
+                found[-1] = act.StopAt(of, -metres)
             case _:
                 found.append(step)
     return found
@@ -448,7 +429,7 @@ def _numbers(intents: Sequence[Intent]) -> list[float]:
     found: list[float] = []
     for one in intents:
         match one:
-            case Repeat(times=times, body=body):
+            case act.Repeat(times=times, body=body):
                 found += [float(times), *_numbers(body)]
             case _:
                 found += [value for name in one.__slots__ if isinstance(value := getattr(one, name), float)]
