@@ -25,7 +25,6 @@ SCRIPTS = {
     "queries.py": "--voxels 20000 --features 5000 --dim 32",
     "report.py": "--check",
     "scale.py": "--folder {OUT} --map {MAP} --photo {PHOTO} --voxels 50000 --only object",
-    "serve.py": "{MAP} --minutes 0.02",
     "sources.py": "",
     "store.py": "--map {MAP} --voxels 50000",
     "tiled.py": "{MAP} {OUT}/tiled.avlmap --voxels 50000",
