@@ -24,17 +24,17 @@ from urllib.request import Request, urlopen
 from avlmaps.core.errors import BackendError, LanguageError
 from avlmaps.core.extras import install_command
 from avlmaps.language import intents as act
-from avlmaps.language.commands import Command, UnclearError, check_order, read_command
+from avlmaps.language.commands import Command, read_command
+from avlmaps.language.gate import no_order
 from avlmaps.language.intents import Intent, Pick, Refuse, Side, Target, TargetKind, on_targets, targets_of
 from avlmaps.language.learned.decision import NameResolver, Weighed, is_same, weighed, which
 from avlmaps.language.learned.linear import amount, amount_end
 from avlmaps.language.learned.reader import Read
+from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.names import is_known
 from avlmaps.language.program.vocabulary import SKILLS, Skill, ValueType
-from avlmaps.language.program.writing import write_program
 from avlmaps.language.sentence import Attachments, Sentence, stand_ins
-from avlmaps.language.translator import Translation
 from avlmaps.language.verbalise import verbalise
 from avlmaps.perception.user_folder import cache_folder
 
@@ -340,58 +340,38 @@ def _served(file: Path) -> Any:
 # The translator.
 
 
-class LocalTranslator:
+class LocalTranslator(LearnedTranslator):
     """Translates with the reader and a language model together.
 
-    Attributes:
+    Args:
+        model: the language model.
         given: files and words that came along.
     """
 
     name = "local"
 
     def __init__(self, model: LocalModel, given: Attachments | None = None) -> None:
-        self.given, self._model = given or Attachments(), model
-        self.tokens = (0, 0)
+        super().__init__(given or Attachments())
+        self._model = model
 
     def read(self, command: str) -> Command:
-        """Return the meaning of a command.
+        """Return the meaning of a command; the model is asked where the reader is not sure of an order.
 
         Raises:
-            UnclearError: it is no order, or a danger.
             LanguageError: the command is empty or too long, or the model does not answer.
         """
-        check_order(command)
         read = read_command(command, self.given)
-        return read if is_settled(read) else both(read, self.proposed(command))
+        return read if is_settled(read) or no_order(command) else both(read, self.proposed(command))
 
     def proposed(self, command: str) -> Weighed | None:
         """Return what the model makes of a command, checked; None where it means nothing."""
         stand = stand_ins(command, self.given.own)
         sentence = Sentence(stand.text, replace(self.given, own=()))
-        written = self._model.write(stand.text, sentence.tokens)
-        self.tokens = written.tokens
-        intents = meaning(written.program)
+        intents = meaning(self._model.write(stand.text, sentence.tokens).program)
         if intents is None:
             return None
         checked = weighed(Read(intents, 1.0, _used(intents, sentence.tokens)), NameResolver(sentence))
         return replace(checked, intents=tuple(on_targets(one, stand.target) for one in checked.intents))
-
-    def program_for(self, command: str) -> Translation:
-        """Return the program for a command.
-
-        Raises:
-            UnclearError: the command is refused, or unclear; the sentence says why or asks back.
-            LanguageError: the command is empty or too long, or the model does not answer.
-        """
-        read = self.read(command)
-        said = verbalise(read.intents)
-        if read.stops is not None:
-            raise UnclearError(said, getattr(read.stops, "choices", ()))
-        return Translation(write_program(read.intents), read.notes, said)
-
-    def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
-        """Return None: a model of this size does better at one sentence than at its faults."""
-        return None
 
 
 def is_settled(read: Command) -> bool:
