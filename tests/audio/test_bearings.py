@@ -118,7 +118,7 @@ def test_outliers_alone_say_nothing() -> None:
     assert np.mean([np.ptp(value) for value in values]) < 0.5 * np.mean([np.ptp(value) for value in told])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_sound_without_directions_and_doubtful_ones_count_less() -> None:
     walk = curved_drive(28.0, 2.0)
     track = said(walk, 0.0, np.random.default_rng(5))

@@ -213,7 +213,7 @@ def test_settings_that_make_no_sense_are_told() -> None:
         SegmentationSettings(onset_db=1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_half_an_hour_is_searched_in_constant_memory(tmp_path: Path) -> None:
     import tracemalloc
 

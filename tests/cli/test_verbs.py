@@ -135,6 +135,7 @@ def test_a_photo_is_located_to_the_contract(built: Path, answer, tmp_path: Path)
     assert np.allclose(given["world_from_camera"], pose, atol=1e-6)
 
 
+@pytest.mark.nightly
 def test_a_photo_of_another_place_is_not_located(built: Path, answer, run, tmp_path: Path) -> None:
     photo = tmp_path / "elsewhere.png"
     noise = np.random.default_rng(3).integers(0, 256, (45, 60, 3), np.uint8)
@@ -157,6 +158,7 @@ def test_info_tells_a_recordings_faults(walk: Path, answer, tmp_path: Path) -> N
     assert depth[3].name in faults and depth[5].name in faults
 
 
+@pytest.mark.nightly
 def test_add_sounds_writes_the_same_recording_for_the_same_seed(walk: Path, answer, tmp_path: Path) -> None:
     clips = tmp_path / "clips"
     for category, pitch in (("high beep", 3000.0), ("low beep", 500.0)):
@@ -190,6 +192,7 @@ def test_profiles_lists_every_backend_with_its_state(answer, run) -> None:
     assert "colours" in run("profiles")[1]
 
 
+@pytest.mark.nightly
 def test_the_words_bench_writes_json_markdown_and_csv(answer, tmp_path: Path) -> None:
     told = answer("bench", "words", "--out", tmp_path)
     assert {"suite", "scenes", "tables"} <= told.keys()

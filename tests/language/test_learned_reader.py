@@ -294,13 +294,14 @@ def alone(row: Any, reader: LearnedReader) -> str:
     return judge_intents([to_json(intent) for intent in intents], row)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_most_rows_that_it_has_not_learnt_are_right() -> None:
     outcomes = [judge(row).outcome for row in held_out()]
     assert outcomes.count("right") >= RIGHT * len(outcomes)
     assert outcomes.count("misread") <= MISREAD * len(outcomes)
 
 
+@pytest.mark.nightly
 def test_the_network_alone_reads_most_of_them_and_random_weights_do_not(monkeypatch: pytest.MonkeyPatch) -> None:
     reader, rows = learned_reader(), held_out()[::2]
     right = [alone(row, reader) for row in rows].count("right")

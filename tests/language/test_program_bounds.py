@@ -63,7 +63,7 @@ def test_what_is_compared_is_charged_before_it_is_gone_through() -> None:
     assert "more than 20000 steps" in trace.error
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_random_programs_that_love_nesting_stay_within_bounds() -> None:
     """A few dozen here; `make bounds` runs 100,000 and measures their time, which no test does."""
     command = [sys.executable, str(TESTS / "helpers" / "program_bounds.py"), "40", "7", "--calls"]

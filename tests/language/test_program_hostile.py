@@ -38,7 +38,7 @@ def watched(where: Path, *arguments: str) -> dict[str, Any]:
     return json.loads(done.stdout)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_thousands_of_hostile_programs_reach_nothing_and_stop(tmp_path: Path) -> None:
     told = watched(tmp_path, "4000", "1")
     assert told["programs"] == 4_000 == told["refused"] + told["stopped"] + told["ended"]

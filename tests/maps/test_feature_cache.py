@@ -176,6 +176,7 @@ def test_what_was_used_longest_ago_goes_first(tmp_path: Path) -> None:
     assert left == {"new", "old2", "old3", "old1"}, "90 % of the limit is left, the least recently used are gone"
 
 
+@pytest.mark.nightly
 def test_a_build_that_is_larger_than_the_store_keeps_its_first_frames(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -397,6 +398,7 @@ def test_the_embedded_profile_is_left_as_it_is() -> None:
     assert cache_note(used, Kind.PIXELS) == ""
 
 
+@pytest.mark.nightly
 def test_a_stopped_build_goes_on_from_the_cache(torch_like: Profile, tmp_path: Path) -> None:
     class Stopping(Walk):
         def frame(self, index: int) -> Frame:

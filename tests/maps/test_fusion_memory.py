@@ -16,7 +16,7 @@ def measured(rounds: int) -> dict[str, float]:
     return json.loads(ran.stdout)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="measures the resident set as Linux counts it")
 def test_peak_memory_follows_the_voxels_and_not_the_frames():
     once, often = measured(1), measured(5)

@@ -107,7 +107,7 @@ def test_a_build_killed_at_random_instants_ends_with_the_same_map(
         rounds += 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_build_killed_before_any_step_on_the_disk_ends_with_the_same_map(
     builder: Builder, undisturbed: Undisturbed
 ) -> None:

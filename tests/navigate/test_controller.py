@@ -136,7 +136,7 @@ def test_velocities_keep_their_bounds_and_arrive_from_anywhere(pose, goal, speed
     assert hypot(poses[-1].x_m - goal[0], poses[-1].y_m - goal[1]) < 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @given(heading=st.floats(-pi, pi), room_m=st.floats(0.0, 1.0))
 def test_velocities_keep_to_a_way_with_corners(heading, room_m):
     points = np.array([(0, 0), (2, 0), (2, 1.5), (0.5, 1.5), (0.5, 3.0)], float)

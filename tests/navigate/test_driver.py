@@ -101,6 +101,7 @@ def test_a_wall_that_the_map_does_not_know_is_found_and_driven_round(drive, on_c
     assert back.contacts <= 1
 
 
+@pytest.mark.nightly
 @MODES
 def test_what_stands_round_it_on_all_sides_makes_it_give_up(drive):
     ring = [(0.05, 1.0, 0, 1.2, 1.1, 1), (1.1, 0.05, 0, 1.2, 1.1, 1)]
@@ -441,6 +442,7 @@ def test_a_body_that_says_it_is_at_the_goal_at_once_is_not_there(drive):
     assert not arrival.reached and "the body moved by" in arrival.note and body.stops
 
 
+@pytest.mark.nightly
 @MODES
 def test_a_body_whose_heading_never_changes_is_stopped_soon(drive):
     body = Odd("looks ahead")

@@ -51,6 +51,7 @@ def test_a_photo_from_a_place_where_no_keyframe_was_taken_is_located(stored: Loc
     assert found.camera == CAMERA
 
 
+@pytest.mark.nightly
 def test_a_keyframe_itself_is_located_where_it_was_taken(stored: LocatableMap) -> None:
     frame = WALK.frame(7)
     found = locate(stored, frame.rgb, None, rng())
@@ -75,6 +76,7 @@ def test_a_located_picture_needs_no_guess(stored: LocatableMap, photo: np.ndarra
     assert_at(asked, PHOTO_FROM)
 
 
+@pytest.mark.nightly
 def test_the_same_question_has_the_same_answer(stored: LocatableMap, photo: np.ndarray) -> None:
     a, b = (locate(stored, photo, None, rng()) for _ in range(2))
     np.testing.assert_array_equal(a.world_from_camera, b.world_from_camera)
@@ -155,6 +157,7 @@ def test_a_lens_of_35_mm_sees_what_it_sees_on_film() -> None:
     assert camera.fx == pytest.approx(3600.0) and (camera.cx, camera.cy) == (1800.0, 1200.0)
 
 
+@pytest.mark.nightly
 def test_the_focal_length_is_kept_where_the_caller_is_sure(stored: LocatableMap, photo: np.ndarray) -> None:
     sure = replace(CAMERA, fx=CAMERA.fx * 1.1, fy=CAMERA.fy * 1.1)
     found = locate(stored, photo, sure, rng(), LocateSettings(refine_focal=False))

@@ -105,7 +105,7 @@ def test_a_robot_that_is_at_its_goal_still_is_not_said_to_stand(serve: Started, 
         assert "may still be driving" in process.communicate()[1]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_robot_that_cannot_be_reached_starts_no_server(room: Path, tmp_path: Path) -> None:
     file = tmp_path / "robot.json"
     file.write_text('{"robot": "nav2", "ros": "ws://127.0.0.1:9"}')

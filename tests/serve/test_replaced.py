@@ -53,6 +53,7 @@ def test_the_new_map_answers_after_it_was_opened(place: Path, coarse: Path) -> N
     assert "was replaced" in notes[0]
 
 
+@pytest.mark.nightly
 def test_an_edit_that_is_made_while_the_new_map_is_opened_counts_at_once(
     place: Path, coarse: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

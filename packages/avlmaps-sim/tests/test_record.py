@@ -37,6 +37,7 @@ def test_a_recording_is_made_and_told_and_can_be_opened(answer, tmp_path: Path) 
     assert {path.suffix for path in (out / "rgb").iterdir()} == {".jpg"}
 
 
+@pytest.mark.nightly
 def test_people_read_a_table_of_what_sounds_where(run, tmp_path: Path) -> None:
     status, out, _ = run("record", "--scene", "house:7", "--out", tmp_path / "rec", *FEW)
     assert status == 0

@@ -10,7 +10,7 @@ from avlmaps_sim.bench.locate import COLUMNS, LocatableMap, errors_of, foreign_e
 from helpers.picture_room import RoomWalk
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_table_has_a_row_for_the_place_and_one_for_others() -> None:
     table = run(RoomWalk(frames=12, turn=0.15), 0, steps=(2,), photos=3)
     assert table["columns"] == list(COLUMNS)
