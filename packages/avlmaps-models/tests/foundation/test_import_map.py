@@ -137,7 +137,7 @@ def test_voxels_lie_where_our_own_build_of_the_recording_has_them(
 
 
 def test_goals_are_those_of_our_own_map(scene: Path, imported: AVLMap, room_words: None, tmp_path: Path) -> None:
-    own = AVLMap(_own(scene, tmp_path / "own.avlmap"))
+    own = _own(scene, tmp_path / "own.avlmap")
     theirs = AVLMap.open(imported.path)
     for word in ("sofa", "fridge", "sideboard"):
         here, there = (asked.object(word, primary=True).goals(top=1)[0] for asked in (own, theirs))
@@ -463,7 +463,7 @@ def test_the_walks_below_are_heard_anew_where_they_were_walked(
 ) -> None:
     settings = ImportSettings(CELL_M, track="output_level_1.wav", hear_with="pitch")
     stored = import_reference_map(with_walks, tmp_path / "m.avlmap", settings, progress=False)
-    sounds = AVLMap.open(stored.path).sounds
+    sounds = AVLMap.open(stored.path).data.sounds
     begin_s = stored.data.info.recording.duration_s
     second_s = begin_s + (14 * 12 - 1) / 25
     assert np.allclose(sounds.onset_s, [begin_s + 1.0, begin_s + 4.0, second_s + 2.0], atol=0.1)

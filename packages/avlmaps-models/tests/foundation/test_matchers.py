@@ -30,6 +30,7 @@ from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.settings import ModelSettings, using_models
 from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import LearnedMatcher, LocalFeatures
+from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.locate import locate
 from avlmaps_models.foundation import aliked, disk
 from avlmaps_models.foundation.lightglue import LightGlue
@@ -393,14 +394,15 @@ def test_a_map_on_the_disk_locates_by_superglue_and_says_so_where_it_has_no_scor
     used = Profile("kept", pixels="colours", local="superpoint", matcher="superglue", place="netvlad")
     path = models.parent / "room.avlmap"
     build_map(walk, path, used, progress=False)
-    stored = read(path)
-    assert stored.keyframes.score.dtype == np.float16 and len(stored.keyframes.score) == len(stored.keyframes.xy) > 0
-    found = locate(stored, walk.frame(0).rgb, None, np.random.default_rng(0))
+    data = read(path)
+    assert data.keyframes.score.dtype == np.float16 and len(data.keyframes.score) == len(data.keyframes.xy) > 0
+    kept = AVLMap.open(path)
+    found = kept.locate(walk.frame(0).rgb)
     assert found.world_from_camera is not None
     assert np.linalg.norm(found.world_from_camera[:3, 3] - walk.frame(0).world_from_camera[:3, 3]) < 0.01
-    keyframes = replace(stored.keyframes, score=np.zeros(0, np.float16))
-    before = replace(stored, data=replace(stored.data, keyframes=keyframes))
+    keyframes = replace(data.keyframes, score=np.zeros(0, np.float16))
+    before = AVLMap(replace(data, keyframes=keyframes), kept.encoders)
     with pytest.raises(
         BackendError, match=r"needs the score of each keypoint; these came without\. Build the map again"
     ):
-        locate(before, walk.frame(0).rgb, None, np.random.default_rng(0))
+        before.locate(walk.frame(0).rgb)
