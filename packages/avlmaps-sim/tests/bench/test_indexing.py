@@ -15,14 +15,12 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
 from avlmaps_sim.bench.harness.evidence import MARGIN_M, NEAR_M, Box, Event, Evidence, Photo, alone_near
 from avlmaps_sim.bench.harness.factors import WeakSounds, near_polygon, true_regions
-from avlmaps_sim.bench.harness.settings import Recorded, TaskError
+from avlmaps_sim.bench.harness.settings import TaskError
 from avlmaps_sim.bench.harness.workplace import TrueVoxels
 from avlmaps_sim.bench.indexing.runs import (
-    CONFIGURATIONS,
     LIMITS_M,
     Answered,
     IndexingSettings,
-    bootstrapped_mean,
     configurations,
     judged,
     run,
@@ -33,12 +31,9 @@ from avlmaps_sim.bench.indexing.suite import tables
 from avlmaps_sim.bench.indexing.tasks import (
     Task,
     TaskKind,
-    TaskSet,
     area_tasks,
-    load_tasks,
     near_sound_tasks,
     photo_tasks,
-    save_tasks,
     sound_tasks,
 )
 from avlmaps_sim.hearing import Synthesised
@@ -138,18 +133,6 @@ def test_the_one_near_is_near_and_all_others_are_farther_by_the_margin(away: lis
     assert ([] if chosen is None else [chosen]) == clear
 
 
-@given(distances, st.randoms(use_true_random=False))
-def test_which_one_is_near_does_not_depend_on_the_order(away: list[float], random):
-    order = list(range(len(away)))
-    random.shuffle(order)
-    chosen, shuffled = alone_near(away), alone_near([away[i] for i in order])
-    assert (None if shuffled is None else order[shuffled]) == chosen
-
-
-def test_nothing_is_near_among_nothing():
-    assert alone_near([]) is None
-
-
 # The rules of tasks.
 
 
@@ -239,13 +222,6 @@ def test_an_area_asks_for_what_stands_in_rooms_of_two_kinds(kitchen_and_bedroom:
         assert all((target.low[0] < 5) == (task.context == "kitchen") for target in task.targets)
 
 
-@pytest.mark.nightly
-def test_the_same_seed_makes_the_same_tasks_and_another_draws_others(kitchen_and_bedroom: _Perfect):
-    drawn = [area_tasks(kitchen_and_bedroom.evidence, np.random.default_rng(seed), 2) for seed in (0, 0, 1, 2, 3)]
-    assert drawn[0] == drawn[1]
-    assert any(other != drawn[0] for other in drawn[2:])
-
-
 # Figures.
 
 
@@ -268,14 +244,6 @@ def test_recall_counts_answers_within_each_distance_and_no_answer_is_as_far_as_t
     assert score.mean_m == pytest.approx((0.0 + 0.4 + 0.9 + 1.2 + 12.0) / 5)
     assert (score.count, score.answered) == (5, 4)
     assert score.recall_interval(LIMITS_M[0])[0] < 0.4 < score.recall_interval(LIMITS_M[0])[1]
-
-
-def test_the_mean_of_equal_values_is_certain_and_that_of_others_as_uncertain_as_theory_says():
-    rng = np.random.default_rng(0)
-    assert bootstrapped_mean(np.full(20, 3.0), rng) == (3.0, 3.0)
-    values = rng.normal(5.0, 2.0, 400)
-    low, high = bootstrapped_mean(values, rng)
-    assert high - low == pytest.approx(2 * 1.96 * values.std() / np.sqrt(400), rel=0.1)
 
 
 # Truth.
@@ -350,54 +318,7 @@ def test_without_context_the_larger_or_equal_thing_wins_whatever_was_heard(kitch
     assert sum(off < 0.5 for off in offs) == len(tasks) / 2
 
 
-def test_every_table_has_a_baseline_ours_and_a_ceiling():
-    assert len({(one.kind, one.name) for one in CONFIGURATIONS}) == len(CONFIGURATIONS)
-    for kind in TaskKind:
-        roles = [one.role for one in configurations(kind)]
-        assert roles.count("ours") == roles.count("ceiling") == 1
-        assert "baseline" in roles
-
-
-def test_the_weak_ear_tells_kinds_apart_that_differ_in_colour():
-    ear = WeakSounds.learnt(np.random.default_rng(0), ("doorbell", "vacuum cleaner", "snoring"))
-    clips = [Synthesised().draw(name, np.random.default_rng(9))[1] for name in ear.names]
-    scores = np.stack([ear.scores(clips, name) for name in ear.names], axis=1)
-    np.testing.assert_array_equal(scores.argmax(axis=1), np.arange(3))
-    np.testing.assert_allclose(scores.sum(axis=1), 1.0, rtol=1e-5)
-    assert (ear.scores(clips, "chainsaw") == 0.0).all()
-
-
 # Files.
-
-RECORDED = Recorded("overlay", 40, 4, 1, "clean", "", 0)
-
-
-@pytest.mark.nightly
-def test_tasks_come_back_from_a_file_as_they_were(kitchen_and_bedroom: _Perfect, tmp_path: Path):
-    tasks = TaskSet(RECORDED, ("home",), tuple(all_tasks(kitchen_and_bedroom)))
-    save_tasks(tasks, tmp_path / "tasks.json")
-    assert load_tasks(tmp_path / "tasks.json") == tasks
-
-
-@pytest.mark.parametrize(
-    ("content", "told"),
-    [
-        (b"{", "damaged"),
-        (b"[]", "damaged"),
-        (b'{"schema_version": 99}', "of schema 99"),
-        (b'{"schema_version": 2, "scenes": []}', "damaged"),
-    ],
-)
-def test_a_file_that_holds_no_tasks_is_refused_in_one_sentence(content: bytes, told: str, tmp_path: Path):
-    path = tmp_path / "tasks.json"
-    path.write_bytes(content)
-    with pytest.raises(TaskError, match=told):
-        load_tasks(path)
-
-
-def test_a_file_that_is_not_there_is_told(tmp_path: Path):
-    with pytest.raises(TaskError, match="cannot be read"):
-        load_tasks(tmp_path / "none.json")
 
 
 @pytest.mark.nightly

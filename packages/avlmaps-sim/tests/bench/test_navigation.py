@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from math import pi
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,12 +13,11 @@ from avlmaps.language.learned_translator import command_to_program
 from avlmaps.language.program import parse_program
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps_sim.bench.harness.evidence import Box, Event, Evidence, Photo
-from avlmaps_sim.bench.harness.settings import Recorded, TaskError
-from avlmaps_sim.bench.indexing.tasks import TaskKind, near_sound_tasks, photo_tasks
-from avlmaps_sim.bench.navigation import Episode, Leg, MissionSet, Outcome, load_missions, save_missions
+from avlmaps_sim.bench.harness.settings import Recorded
+from avlmaps_sim.bench.indexing.tasks import near_sound_tasks, photo_tasks
+from avlmaps_sim.bench.navigation import Episode, Leg, MissionSet, Outcome
 from avlmaps_sim.bench.navigation.commands import COMMANDS, SPATIAL, command_missions
 from avlmaps_sim.bench.navigation.episode_runner import Foreknowledge, WatchedBody
-from avlmaps_sim.bench.navigation.episodes import Journal
 from avlmaps_sim.bench.navigation.evidence import Ground
 from avlmaps_sim.bench.navigation.floor import Floor
 from avlmaps_sim.bench.navigation.map_variants import CEILING, CONFIGURATIONS, OURS, configurations
@@ -27,9 +25,7 @@ from avlmaps_sim.bench.navigation.metrics import (
     grouped_interval,
     in_a_row,
     independent,
-    path_length_m,
     path_weight,
-    spl,
 )
 from avlmaps_sim.bench.navigation.missions import (
     Goal,
@@ -37,24 +33,20 @@ from avlmaps_sim.bench.navigation.missions import (
     Mission,
     NavigationSettings,
     Series,
-    allocated,
     beside,
     between,
     joined,
     left_of,
     room_distance_m,
 )
-from avlmaps_sim.bench.navigation.phrases import an_object, spoken
+from avlmaps_sim.bench.navigation.phrases import an_object
 from avlmaps_sim.bench.navigation.rules import image_missions, pair_missions, range_of, sound_missions
 from avlmaps_sim.bench.navigation.runs import SceneFacts
-from avlmaps_sim.bench.navigation.scores import scored
 from avlmaps_sim.bench.navigation.suite import TITLE, tables
-from avlmaps_sim.synthesis import MAKERS
 from helpers.small_home import HEARD, furnished
 
 BOX = Box((1.0, 1.0, 0.0), (2.0, 3.0, 1.0))
 metres = st.floats(-9.0, 9.0)
-angles = st.floats(-pi, pi)
 
 # Subgoals in a row, by themselves, and their paths.
 
@@ -73,12 +65,6 @@ def test_more_in_a_row_is_never_reached_more_often_and_never_more_often_than_by_
     assert count == 4 * len(own)
 
 
-def test_rows_are_counted_from_the_first_subgoal():
-    own = [[True, True, False, True], [False, True, True, True], [True, True, True, True]]
-    assert in_a_row(own, 4) == [2, 2, 1, 1]
-    assert independent(own) == (10, 12)
-
-
 @given(st.floats(0.2, 50.0), st.floats(0.0, 100.0))
 def test_a_perfect_way_weighs_one_and_twice_the_way_a_half(shortest_m: float, more_m: float):
     assert path_weight(True, shortest_m, shortest_m) == 1.0
@@ -86,16 +72,6 @@ def test_a_perfect_way_weighs_one_and_twice_the_way_a_half(shortest_m: float, mo
     assert path_weight(True, shortest_m, shortest_m + more_m) == pytest.approx(shortest_m / (shortest_m + more_m))
     assert path_weight(True, shortest_m, 0.5 * shortest_m) == 1.0  # it stopped as soon as it counts
     assert path_weight(False, shortest_m, shortest_m) == 0.0
-
-
-def test_spl_is_the_mean_over_subgoals():
-    assert spl([(True, 4.0, 4.0), (True, 4.0, 8.0), (False, 4.0, 1.0), (True, 0.0, 0.0)]) == pytest.approx(2.5 / 4)
-    assert spl([]) == 0.0
-
-
-def test_a_path_is_as_long_as_its_parts():
-    assert path_length_m([(0, 0), (3, 4), (3, 5)]) == pytest.approx(6.0)
-    assert path_length_m([(1, 1)]) == path_length_m([]) == 0.0
 
 
 def test_an_interval_is_wider_where_subgoals_hang_together():
@@ -108,13 +84,6 @@ def test_an_interval_is_wider_where_subgoals_hang_together():
 
 
 # Whether a stop is right.
-
-
-@given(metres, metres)
-def test_the_distance_to_several_things_is_that_to_the_nearest(x: float, y: float):
-    goal = Goal(GoalKind.OBJECT, "the chair", "", (BOX, Box((5, 5, 0), (6, 6, 1))), places=((-3.0, 0.0, 1.0),))
-    boxes = [np.hypot(max(a - x, x - b, 0), max(c - y, y - d, 0)) for a, b, c, d in ((1, 2, 1, 3), (5, 6, 5, 6))]
-    assert goal.off_m(np.array([[x, y]]))[0] == pytest.approx(min(*boxes, np.hypot(x + 3, y)))
 
 
 def test_a_stop_within_a_metre_counts_and_one_farther_does_not():
@@ -143,20 +112,6 @@ def test_looking_is_judged_by_the_angle_to_any_part_of_the_thing():
     turned = Goal(GoalKind.LOOK, "left", "", heading_rad=pi / 2)
     assert turned.reached(GroundPose(0, 0, pi / 2 + 0.2))
     assert not turned.reached(GroundPose(0, 0, -pi / 2))
-
-
-@given(metres, metres, angles, metres, metres)
-def test_looking_does_not_depend_on_how_the_world_is_turned(x: float, y: float, heading: float, cx: float, cy: float):
-    """Half a turn of the world keeps boxes along its axes."""
-    box, turned = Box((cx, cy, 0), (cx + 1, cy + 2, 1)), Box((-cx - 1, -cy - 2, 0), (-cx, -cy, 1))
-    here = Goal(GoalKind.LOOK, "", "", (box,)).off_rad(GroundPose(x, y, heading))
-    there = Goal(GoalKind.LOOK, "", "", (turned,)).off_rad(GroundPose(-x, -y, heading + pi))
-    assert here == pytest.approx(there, abs=1e-6)
-
-
-def test_a_goal_without_a_right_place_is_none():
-    with pytest.raises(ValueError, match="no right place"):
-        Goal(GoalKind.OBJECT, "the chair", "")
 
 
 # Spots that relations mean.
@@ -225,13 +180,6 @@ def test_sounds_come_by_range_four_different_ones_in_a_row(ground: Ground):
     assert len(twice.places) == 2
 
 
-def test_ranges_widen_from_the_house_to_people_to_animals():
-    assert [range_of(name) for name in ("doorbell", "snoring", "dog bark", "thunder")] == [1, 2, 3, 3]
-    counts = [sum(range_of(name) == k for name in MAKERS) for k in (1, 2, 3)]
-    assert min(counts) >= 10
-    assert sum(counts) == len(MAKERS)
-
-
 def test_every_mission_starts_where_a_robot_can_stand_away_from_its_first_goal(ground: Ground):
     rng = np.random.default_rng(2)
     made = [*sound_missions(ground, Series.SOUNDS_3, rng, 20), *image_missions(ground, rng, 20)]
@@ -262,11 +210,6 @@ def test_pairs_are_ambiguous_in_both_and_none_comes_twice(ground: Ground):
         assert sound.context in ("object", "image")
         assert thing.context == "sound"
         assert len(one.photos) == (sound.context == "image")
-
-
-def test_a_sound_in_one_place_is_never_ambiguous(ground: Ground):
-    alone = tuple(event for event in ground.evidence.events if event.category != "doorbell")
-    assert Ground(replace(ground.evidence, events=alone), ground.floor, ground.photos).ambiguous_sounds() == []
 
 
 def test_the_same_seed_makes_the_same_missions_and_another_draws_others(ground: Ground):
@@ -328,41 +271,7 @@ def test_a_command_names_all_goals_in_order_or_one_alone():
     assert one.program(only=1) == 'robot.move_to_object("table")'
 
 
-def test_a_sound_is_called_by_the_first_of_its_names():
-    assert spoken("fan or air conditioner") == "fan"
-    assert len({spoken(name) for name in MAKERS}) == len(MAKERS)
-
-
 # Files.
-
-
-def some_missions(ground: Ground) -> MissionSet:
-    made = tuple(replace(m, name=f"m{i}") for i, m in enumerate(pair_missions(ground, np.random.default_rng(0), 3)))
-    return MissionSet(Recorded("overlay", 40, 4, 1, "clean", "", 0), ("made",), 0.2, made)
-
-
-def test_missions_come_back_from_a_file_as_they_were(ground: Ground, tmp_path: Path):
-    missions = some_missions(ground)
-    save_missions(missions, tmp_path / "missions.json")
-    again = load_missions(tmp_path / "missions.json")
-    assert again == missions
-    assert [one.fingerprint for one in again.missions] == [one.fingerprint for one in missions.missions]
-
-
-def test_a_damaged_file_of_missions_is_refused_in_one_sentence(tmp_path: Path):
-    (tmp_path / "missions.json").write_bytes(b'{"schema_version": 1, "scenes": []}')
-    with pytest.raises(TaskError, match="damaged"):
-        load_missions(tmp_path / "missions.json")
-
-
-def test_scenes_share_missions_in_turns_and_those_with_fewer_are_made_up_for():
-    def of(scene: str, count: int) -> list[Mission]:
-        goal = an_object("chair", [BOX])
-        return [Mission(f"{scene}{i}", Series.IMAGES, scene, (0, 0, 0), (goal,)) for i in range(count)]
-
-    kept = allocated([of("a", 5), of("b", 1), of("c", 5)], 7)
-    assert [one.name for one in kept] == ["a0", "a1", "a2", "b0", "c0", "c1", "c2"]
-    assert len(allocated([of("a", 2)], 7)) == 2
 
 
 def leg(reached: bool, kind: GoalKind = GoalKind.SOUND, path_m: float = 4.0, reachable: bool = True) -> Leg:
@@ -371,18 +280,6 @@ def leg(reached: bool, kind: GoalKind = GoalKind.SOUND, path_m: float = 4.0, rea
 
 def episode(name: str, series: Series, configuration: str, legs: list[Leg], foretold: int = 0) -> Episode:
     return Episode(name, series, "made", configuration, 0, ("go",), ("p",), tuple(legs), 2, foretold, True, name)
-
-
-def test_a_line_that_was_cut_short_is_dropped_and_the_next_one_kept(tmp_path: Path):
-    journal = Journal(tmp_path / "own" / "scene.jsonl")
-    assert journal.read() == {}
-    one, other = (episode(name, Series.PAIRS, OURS, [leg(True)]) for name in "ab")
-    journal.add(one)
-    whole = journal.path.read_bytes()
-    journal.path.write_bytes(whole + whole[: len(whole) // 2])
-    assert journal.read() == {"a": one}
-    journal.add(other)
-    assert journal.read() == {"a": one, "b": other}
 
 
 # Tables.
@@ -423,15 +320,6 @@ def test_a_table_of_hand_made_runs_holds_their_figures():
     assert figures["contacts that the map could have foretold"][1] == 1
 
 
-def test_the_clips_that_were_heard_are_named_where_sounds_are_recordings():
-    made = outcome([], (Series.PAIRS,))
-    recorded = replace(made.missions.recorded, sounds="esc")
-    facts = replace(made.scenes[0], clips=(("rain", "esc/a.ogg"),))
-    named = tables(replace(made, missions=replace(made.missions, recorded=recorded), scenes=(facts,)))
-    assert named["Clips that were heard"]["rows"] == [["rain", 1, "a.ogg"]]
-    assert "Clips that were heard" not in tables(made)
-
-
 def test_the_pairs_table_holds_every_row_of_the_papers():
     made = tables(outcome([], (Series.PAIRS,)))[TITLE[Series.PAIRS]]
     rows = {row[0]: dict(zip(made["columns"], row, strict=True)) for row in made["rows"]}
@@ -443,21 +331,6 @@ def test_the_pairs_table_holds_every_row_of_the_papers():
     assert {"objects only", "sounds only", "weaker sound encoder", OURS, CEILING} <= rows.keys()
 
 
-def test_kinds_of_goals_are_told_apart_in_pairs():
-    legs = [leg(True), leg(False, GoalKind.OBJECT)]
-    made = tables(outcome([episode("a", Series.PAIRS, OURS, legs)], (Series.PAIRS,)))[TITLE[Series.PAIRS]]
-    row = next(dict(zip(made["columns"], row, strict=True)) for row in made["rows"] if row[0] == OURS)
-    assert (row["1 in a row %"], row["2 in a row %"], row["sound %"], row["object %"]) == (100.0, 0.0, 100.0, 0.0)
-
-
-@given(reached)
-def test_a_row_of_the_table_never_says_more_in_a_row_than_by_itself(own: list[list[bool]]):
-    episodes = [episode(str(i), Series.SOUNDS_1, OURS, [leg(v) for v in one]) for i, one in enumerate(own)]
-    score = scored(episodes, 4)
-    assert score.whole.hits == score.rows[3].hits <= score.subgoals.hits / 4 + 1e-9
-    assert score.spl <= score.subgoals.hits / score.subgoals.count + 1e-9
-
-
 def test_every_series_has_ours_and_a_ceiling_and_the_experiments_of_the_paper_a_baseline():
     for series in Series:
         names = [one.name for one in configurations(series)]
@@ -465,13 +338,6 @@ def test_every_series_has_ours_and_a_ceiling_and_the_experiments_of_the_paper_a_
         assert len(names) == len(set(names))
     weaker = {series for one in CONFIGURATIONS if one.name == "weaker sound encoder" for series in one.series}
     assert weaker >= {Series.PAIRS}
-
-
-def test_settings_that_run_nothing_are_refused():
-    with pytest.raises(TaskError, match="0 sequences"):
-        NavigationSettings(sequences=0)
-    assert NavigationSettings(sequences=200).total(Series.PAIRS) == 119
-    assert NavigationSettings().total(Series.COMMANDS) is None
 
 
 # What was touched, and whether the map had told.
@@ -507,14 +373,6 @@ def test_a_touch_is_foretold_where_the_map_shows_something_within_the_radius(wal
     assert (body.contacts, body.foretold) == (1, told)
     body.act(Action.LEFT)
     assert body.contacts == 1
-
-
-def test_ambiguous_things_are_those_of_the_indexing_benchmark(ground: Ground):
-    things = ground.ambiguous_things(TaskKind.NEAR_SOUND)
-    assert things
-    for goal, task in things:
-        assert goal.boxes == task.targets
-        assert task.context in {name for name, _, _ in HEARD}
 
 
 @given(st.floats(-0.5, 2.5), st.floats(-0.5, 2.5), st.integers(0, 1_000))
