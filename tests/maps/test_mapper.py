@@ -68,7 +68,7 @@ def test_it_ends_as_a_build_does_whatever_is_asked_on_the_way(
     tmp_path: Path, pixels: object, first_frames: int
 ) -> None:
     walk, used = Walk(10), encoders(pixels)
-    built = build_map(walk, tmp_path / "built", used, SETTINGS, progress=False).data
+    built = build_map(walk, tmp_path / "built", used, SETTINGS, progress=False)
     require_same(mapped(walk, used, first_frames=first_frames).finish(), built)
     made = mapped(walk, used, frozenset({1, 6}), first_frames).finish()
     require_same(made, built)
@@ -81,7 +81,7 @@ def test_it_ends_as_a_build_does_whatever_is_asked_on_the_way(
 def test_sounds_end_as_in_a_build_and_are_there_before(tmp_path: Path) -> None:
     walk = Walk(22, audio=write_beeps(tmp_path / "track.flac"))
     used = Encoders("fake", pixels=Words(), local=Corners(), place=Places(), sounds=Hears())
-    built = build_map(walk, tmp_path / "built", used, SETTINGS, progress=False).data
+    built = build_map(walk, tmp_path / "built", used, SETTINGS, progress=False)
     mapper, listed = Mapper(SETTINGS, used, walk.up_in_world), []
     assert walk.audio is not None
     for frame in walk.frames():

@@ -428,35 +428,58 @@ def count_frames(
 def fall_into_cells(
     lies: Float64[np.ndarray, "n 10"],
     turn: Float64[np.ndarray, "n 3 3"],
-    off: Float64[np.ndarray, "n 3"],
-    count: Int32[np.ndarray, "n 64"],
+    middle: Float64[np.ndarray, "n 3"],
+    hits: Int32[np.ndarray, " n"],
+    cell: Int32[np.ndarray, "pairs 3"],
+    source: Int32[np.ndarray, " pairs"],
+    share: Float32[np.ndarray, " pairs"],
 ):
-    """Count how many samples of voxels that move fall into each of the cells around where their middles fall.
+    """Write into which voxels samples of voxels that move fall, in pairs; return how many pairs there are.
 
     Args:
         lies: mean and factor of the covariance of the points within each voxel, see `submaps`.
         turn: rotation of each.
-        off: where its middle falls, from the lowest corner of that voxel.
-        count: filled in; of cell (x, y, z) from -1 on it is number 16 (x + 1) + 4 (y + 1) + z + 1.
+        middle: where its middle falls, voxels.
+        hits: pixels in each; what gets less than half of one gets nothing, unless all do.
+        cell: of each pair the voxel, filled in; at most 27 of each source.
+        source: the voxel that moves.
+        share: of it.
     """
     even, within = 12.0**0.5, 0.4999  # an even spread over a length has a standard deviation of the length over this
+    count, pairs = np.zeros(64, np.int64), np.int64(0)
     for n in range(lies.shape[0]):
         xx, yx, yy, zx, zy, zz = lies[n, 3], lies[n, 4], lies[n, 5], lies[n, 6], lies[n, 7], lies[n, 8]
         sigmas = np.sqrt(xx * xx + yx * yx + zx * zx), np.sqrt(yy * yy + zy * zy), zz
         first = np.int64(min(max(np.ceil(sigmas[0] * even * 4 - 0.2), 1.0), 4.0))
         second = np.int64(min(max(np.ceil(sigmas[1] * even * 4 - 0.2), 1.0), 4.0))
         third = np.int64(min(max(np.ceil(sigmas[2] * even * 4 - 0.2), 1.0), 4.0))
-        for sample in range(first * second * third):
+        base = np.floor(middle[n, 0]), np.floor(middle[n, 1]), np.floor(middle[n, 2])
+        u, v, w = middle[n, 0] - base[0], middle[n, 1] - base[1], middle[n, 2] - base[2]
+        samples = first * second * third
+        count[:] = 0
+        for sample in range(samples):
             a = even * ((sample // (second * third) + 0.5) / first - 0.5)
             b = even * ((sample // third % second + 0.5) / second - 0.5)
             c = even * ((sample % third + 0.5) / third - 0.5)
             x = min(max(lies[n, 0] + xx * a, -within), within)
             y = min(max(lies[n, 1] + yx * a + yy * b, -within), within)
             z = min(max(lies[n, 2] + zx * a + zy * b + zz * c, -within), within)
-            i = np.int64(np.floor(off[n, 0] + turn[n, 0, 0] * x + turn[n, 0, 1] * y + turn[n, 0, 2] * z)) + 1
-            j = np.int64(np.floor(off[n, 1] + turn[n, 1, 0] * x + turn[n, 1, 1] * y + turn[n, 1, 2] * z)) + 1
-            k = np.int64(np.floor(off[n, 2] + turn[n, 2, 0] * x + turn[n, 2, 1] * y + turn[n, 2, 2] * z)) + 1
-            count[n, (i << 4 | j << 2 | k) & 63] += 1
+            i = np.int64(np.floor(u + turn[n, 0, 0] * x + turn[n, 0, 1] * y + turn[n, 0, 2] * z)) + 1
+            j = np.int64(np.floor(v + turn[n, 1, 0] * x + turn[n, 1, 1] * y + turn[n, 1, 2] * z)) + 1
+            k = np.int64(np.floor(w + turn[n, 2, 0] * x + turn[n, 2, 1] * y + turn[n, 2, 2] * z)) + 1
+            count[(i << 4 | j << 2 | k) & 63] += 1
+        kept = np.int64(0)
+        for number in range(64):
+            kept += count[number] if 2 * count[number] * hits[n] >= samples else 0
+        for number in range(64):
+            if count[number] == 0 or (kept > 0 and 2 * count[number] * hits[n] < samples):
+                continue
+            cell[pairs, 0] = np.int32(base[0]) + (number >> 4) - 1
+            cell[pairs, 1] = np.int32(base[1]) + (number >> 2 & 3) - 1
+            cell[pairs, 2] = np.int32(base[2]) + (number & 3) - 1
+            source[pairs], share[pairs] = n, count[number] / (kept if kept > 0 else samples)
+            pairs += 1
+    return pairs
 
 
 @njit(**OPTIONS)

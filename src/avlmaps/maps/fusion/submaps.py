@@ -7,10 +7,12 @@ voxel where it falls. Samples stay within their voxel, so that a shift by whole 
 changes nothing. What is merged are sums, so that a map follows any number of corrections, and no error adds up.
 """
 
+from functools import cached_property
+from typing import Any
+
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Float64, Int, Int8, Int32, UInt16
-from avlmaps.core.columns import offsets_of
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse
 from avlmaps.maps.fusion.kernels import fall_into_cells, sum_moved
@@ -20,9 +22,7 @@ from avlmaps.maps.types import Submaps, Voxels
 
 FARTHEST = float((1 << 31) - (1 << 22))  # voxels; indices are int32
 _MOST = (1 << 31) - 1
-_LEAST_HITS = 0.5  # a voxel gets less than this part of a hit from one that moves: it has none
-_CELLS = 64  # a voxel that moves meets at most three along each axis; four are counted, as a power of two
-_CHUNK = 1 << 15  # voxels whose samples are in memory
+_CELLS = 27  # a voxel that moves meets at most three along each axis
 
 
 def submap_of(
@@ -102,23 +102,21 @@ class MovedSubmaps:
         self._submaps, self._table = submaps, VoxelTable(0)
         moved = (pose @ inverse(np.asarray(submaps.fused_pose)))[:, :3]
         moved[:, :, 3] /= grid.voxel_size_m
-        pairs: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-        for number in range(len(submaps)):
-            frames = slice(*(int(at) for at in submaps.frame_offsets[number : number + 2]))
-            rows = range(*(int(at) for at in submaps.row_offsets[number : number + 2]))
-            views = np.zeros(0, np.int32)  # of this submap in each voxel
-            for start in rows[::_CHUNK]:
-                chunk = slice(start, min(start + _CHUNK, rows.stop))
-                pairs.append(self._move(chunk, moved[frames]))
-                to, row, share = pairs[-1]
-                hit = np.maximum((share * submaps.hits[row] + 0.5).astype(np.int64), 1)
-                seen = np.minimum(submaps.views[row], hit).astype(np.int32)  # no more frames than hits
-                views = np.concatenate([views, np.zeros(self._table.count - len(views), np.int32)])
-                np.maximum.at(views, to, seen)  # the frames of a submap count once in a voxel
-                np.add.at(self._table.hits, to, hit)
-            self._table.views[: len(views)] += views
-        self._pairs = tuple(np.concatenate(column) for column in zip(*pairs, strict=True))
-        self._order = self._table.sort_rows()
+        pairs = [self._move(number, moved) for number in range(len(submaps))]
+        self._pairs = to, row, share = tuple(np.concatenate(column) for column in zip(*pairs, strict=True))
+        table, count = self._table, self._table.count
+
+        def summed(values: np.ndarray) -> np.ndarray:
+            return np.bincount(to, values, minlength=count)
+
+        table.hits[:count] = summed(_hits(submaps, row, share))
+        table.sharp[:count] = summed(np.floor(share * np.asarray(submaps.sharp)[row] + 0.5))
+        table.weight[:count] = summed(share * np.asarray(submaps.weight)[row])
+        table.rgb_weight[:count] = summed(share * np.asarray(submaps.rgb_weight)[row])
+        for colour in range(3):
+            table.rgb_sum[:count, colour] = summed(share * np.asarray(submaps.rgb_sum)[row, colour])
+        np.maximum.at(table.last_seen_s, to, np.asarray(submaps.last_seen_s)[row])
+        self._order = table.sort_rows()
 
     def evidence(self) -> VoxelViews:
         """Return the evidence of each voxel's surface, sorted by index, for `free_space.clean`."""
@@ -143,12 +141,14 @@ class MovedSubmaps:
         made.add(VoxelSums(**{**_fields(sums), "feature_sum": self._features(self._order)}))
         return made
 
-    def _move(self, chunk: slice, moved: Float64[np.ndarray, "f 3 4"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Add some voxels of a submap, and return their pairs."""
+    def _move(self, number: int, moved: Float64[np.ndarray, "f 3 4"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Note how many frames of a submap saw each voxel, and return its pairs."""
         submaps, table = self._submaps, self._table
-        index, hits = np.asarray(submaps.index[chunk], np.float64), np.asarray(submaps.hits[chunk])
-        lies = np.asarray(submaps.spread[chunk], np.float64)
-        motion = moved[np.clip(np.rint(lies[:, 9]).astype(np.int64), 0, len(moved) - 1)]
+        frames = slice(*(int(at) for at in submaps.frame_offsets[number : number + 2]))
+        rows = slice(*(int(at) for at in submaps.row_offsets[number : number + 2]))
+        index, hits = np.asarray(submaps.index[rows], np.float64), np.array(submaps.hits[rows])
+        lies, motions = np.asarray(submaps.spread[rows], np.float64), moved[frames]
+        motion = motions[np.clip(np.rint(lies[:, 9]).astype(np.int64), 0, len(motions) - 1)]
         middle = np.einsum("nij,nj->ni", motion[:, :, :3], index + 0.5) + motion[:, :, 3]
         farthest = np.abs(middle).max(initial=0.0)
         if not farthest < FARTHEST:
@@ -156,58 +156,36 @@ class MovedSubmaps:
                 f"The poses move a part of the map by {farthest:.3g} voxels from the world's origin, more than "
                 f"{FARTHEST:.3g}; move the world's origin nearer to the map."
             )
-        base = np.floor(middle).astype(np.int64)
-        count = np.zeros((len(lies), _CELLS), np.int32)
-        fall_into_cells(lies, np.ascontiguousarray(motion[:, :, :3]), middle - base, count)
-        sliver = count * hits[:, None] < _LEAST_HITS * count.sum(axis=1)[:, None]
-        some = np.any(~sliver & (count > 0), axis=1)
-        count[sliver & some[:, None]] = 0
-        source, cell = np.nonzero(count)
-        share = count[source, cell] / count.sum(axis=1)[source]
-        target = base[source] + np.stack([cell >> 4, (cell >> 2) & 3, cell & 3], axis=1) - 1
-        distinct, of = _unique_rows(target)
-        rows, row = table.enter(distinct, -np.inf), source + chunk.start
+        most = _CELLS * len(lies)
+        cell, source, share = np.empty((most, 3), np.int32), np.empty(most, np.int32), np.empty(most, np.float32)
+        turn = np.ascontiguousarray(motion[:, :, :3])
+        count = int(fall_into_cells(lies, turn, middle, hits, cell, source, share))
+        to, row, share = table.rows_of(cell[:count]), source[:count] + np.int32(rows.start), share[:count].copy()
+        seen = np.minimum(np.asarray(submaps.views)[row], _hits(submaps, row, share))  # no more frames than hits
+        views = np.zeros(table.count, np.int32)
+        np.maximum.at(views, to, seen.astype(np.int32))  # the frames of a submap count once in a voxel
+        table.views[: table.count] += views
+        return to, row, share
 
-        def summed(values: np.ndarray) -> np.ndarray:
-            return np.bincount(of, share * np.asarray(values)[source], minlength=len(distinct))
+    @cached_property
+    def _shares(self) -> Any:
+        """A sparse array: of each voxel the rows that move there, by what their features weigh."""
+        from scipy.sparse import coo_array
 
-        last_seen_s = np.full(len(distinct), -np.inf)
-        np.maximum.at(last_seen_s, of, np.asarray(submaps.last_seen_s)[row])
-        table.last_seen_s[rows] = np.maximum(table.last_seen_s[rows], last_seen_s)
-        table.weight[rows] += summed(submaps.weight[chunk])
-        table.rgb_weight[rows] += summed(submaps.rgb_weight[chunk])
-        for colour in range(3):
-            table.rgb_sum[rows, colour] += summed(submaps.rgb_sum[chunk, colour])
-        sharp = np.floor(share * np.asarray(submaps.sharp[chunk])[source] + 0.5)
-        table.sharp[rows] += np.bincount(of, sharp, minlength=len(distinct)).astype(np.int64)
-        to = rows[of]
-        return to, row.astype(np.int32), share.astype(np.float32)
+        submaps, (to, row, share) = self._submaps, self._pairs
+        weight = share * np.asarray(submaps.weight)[row] * np.asarray(submaps.feature_scale)[row]
+        return coo_array((weight.astype(np.float32), (to, row)), (self._table.count, len(submaps.weight))).tocsr()
 
     def _features(self, rows: Int[np.ndarray, " k"]) -> Float32[np.ndarray, "k d"]:
-        to, source, share = self._pairs
-        place = np.full(self._table.count, -1)
-        place[rows] = np.arange(len(rows))
-        some = np.flatnonzero(place[to] >= 0) if len(rows) < self._table.count else np.arange(len(to))
-        some = some[np.argsort(place[to[some]], kind="stable")]
-        starts = offsets_of(np.bincount(place[to[some]], minlength=len(rows)))
-        own = source[some]
-        weight = share[some] * np.asarray(self._submaps.weight)[own] * np.asarray(self._submaps.feature_scale)[own]
-        feature = np.asarray(self._submaps.feature).view(np.ndarray)
+        feature, some = np.asarray(self._submaps.feature).view(np.ndarray), self._shares[rows]
         feature.flags.writeable = False  # as memory-mapped ones are, so that the loop is compiled once
         summed = np.empty((len(rows), feature.shape[1]), np.float32)
-        sum_moved(starts, np.ascontiguousarray(own), weight.astype(np.float32), feature, summed)
+        sum_moved(some.indptr.astype(np.int64), some.indices.astype(np.int32), some.data, feature, summed)
         return summed
 
 
-def _unique_rows(index: Int[np.ndarray, "n 3"]) -> tuple[Int32[np.ndarray, "m 3"], Int[np.ndarray, " n"]]:
-    low = index.min(axis=0, initial=0)
-    span = [int(size) for size in index.max(axis=0, initial=0) - low + 1]
-    if span[0] * span[1] * span[2] >= 1 << 62:
-        distinct, of = np.unique(index, axis=0, return_inverse=True)
-        return distinct.astype(np.int32), of.ravel()
-    i, j, k = (index - low).T
-    _, first, of = np.unique((i * span[1] + j) * span[2] + k, return_index=True, return_inverse=True)
-    return index[first].astype(np.int32), of
+def _hits(submaps: Submaps, row: Int32[np.ndarray, " p"], share: Float32[np.ndarray, " p"]) -> Int[np.ndarray, " p"]:
+    return np.maximum((share * np.asarray(submaps.hits)[row] + 0.5).astype(np.int64), 1)
 
 
 def _fields(sums: VoxelSums) -> dict[str, np.ndarray]:

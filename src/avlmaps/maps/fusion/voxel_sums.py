@@ -104,14 +104,19 @@ class VoxelTable:
         find_rows(np.ascontiguousarray(index, np.int32), self.slots, self.index, self.count, False, found)
         return found
 
-    def enter(self, index: Int32[np.ndarray, "n 3"], last_seen_s: float | np.ndarray) -> Int32[np.ndarray, " n"]:
-        """Return the row of each voxel, which all differ; those that are new become the last. Note when it was seen."""
+    def rows_of(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
+        """Return the row of each voxel; those that are new become the last, and were never seen."""
         self._reserve(len(index))
         found, known = np.empty(len(index), np.int32), self.count
         wanted = np.array(index, np.int32, order="C")  # never read-only, which would compile the loop again
         self.count = int(find_rows(wanted, self.slots, self.index, self.count, True, found))
-        before = np.where(found < known, self.last_seen_s[found], -np.inf)
-        self.last_seen_s[found] = np.maximum(before, last_seen_s)
+        self.last_seen_s[known : self.count] = -np.inf
+        return found
+
+    def enter(self, index: Int32[np.ndarray, "n 3"], last_seen_s: float | np.ndarray) -> Int32[np.ndarray, " n"]:
+        """Return the row of each voxel, which all differ, as ``rows_of``, and note when it was seen."""
+        found = self.rows_of(index)
+        self.last_seen_s[found] = np.maximum(self.last_seen_s[found], last_seen_s)
         return found
 
     def _reserve(self, extra: int) -> None:
