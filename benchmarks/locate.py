@@ -1,12 +1,18 @@
-"""How long locating a photo takes, stage by stage, beside plain methods in the same run.
+"""How well photos are located, and at what cost: keypoints and places beside each other, in one run.
 
-python benchmarks/locate.py [--keyframes 100] [--photos 10] [--json]
+python benchmarks/locate.py RECORDING [--elsewhere FOLDER] [--photos 60] [--pairs 25] [--json]
 
-The pictures are painted at random (640x480, about 1,000 keypoints); a photo is a keyframe shifted, with noise.
+Every other frame of the recording makes the map, frames in between are the photos, and their own poses are the truth:
+right is within 25 cm and 10 degrees. Photos are taken as they are, darkened, noisy, blurred and through another focal
+length. Pairs are single keyframes as a map and photos turned from them by an angle. In the last rows nothing is there
+to be found: other places, and a map that holds the place twice, 100 m apart, where the answer must say so.
 """
 
-from collections.abc import Callable
-from typing import TypeVar
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import timing
 
@@ -16,123 +22,165 @@ import cv2  # noqa: E402
 import numpy as np  # noqa: E402
 
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
-from avlmaps.maps.keyframes.album import DescribedKeyframe, stack_keyframes  # noqa: E402
-from avlmaps.perception.embedded.keypoints import RATIO, match_mutual  # noqa: E402
+from avlmaps.core.columns import concat  # noqa: E402
+from avlmaps.core.poses import inverse, rotation_angle_rad  # noqa: E402
+from avlmaps.maps.types import Keyframes  # noqa: E402
 from avlmaps.perception.encoders import Encoders  # noqa: E402
-from avlmaps.perception.pose import estimate_pose  # noqa: E402
-from avlmaps.query.locate import alike, locate  # noqa: E402
-from avlmaps_sim.bench.locate import LocatableMap  # noqa: E402
+from avlmaps.query.locate import LocateSettings, locate  # noqa: E402
+from avlmaps.recordings.open import open_recording  # noqa: E402
+from avlmaps.recordings.types import Recording, Subset  # noqa: E402
+from avlmaps_sim.bench.harness.intervals import in_percent, wilson  # noqa: E402
+from avlmaps_sim.bench.locate import MapOfPictures, map_of  # noqa: E402
 
-T = TypeVar("T")
-CAMERA = Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480)
-DEPTH_M = 2.0
-
-
-def painted(rng: np.random.Generator) -> np.ndarray:
-    """Return a wall of random shapes, larger than a picture."""
-    wall = np.full((560, 720, 3), 128, np.uint8)
-    for _ in range(1500):
-        colour = tuple(int(value) for value in rng.integers(0, 256, 3))
-        centre = rng.uniform(0, (720, 560)).astype(int).tolist()
-        half = np.maximum(2, rng.exponential(12, 2)).astype(int).tolist()
-        cv2.ellipse(wall, centre, half, rng.uniform(0, 180), 0, 360, colour, -1, cv2.LINE_AA)
-    return cv2.GaussianBlur(wall, (0, 0), 0.8)
+NEAR_M, NEAR_RAD = 0.25, np.deg2rad(10.0)
+TURNED_DEG = ((10, 25), (25, 45), (45, 70))
+SEED = 0
+# Learned and handmade keypoints and places, by the names of the registry.
+METHODS: dict[str, dict[str, str]] = {"xfeat": {"local": "xfeat", "place": "xfeat", "matcher": "xfeat"}}
+Picture = np.ndarray
 
 
-def picture(wall: np.ndarray, shift_px: int, rng: np.random.Generator) -> np.ndarray:
-    """Return the view of a wall from a little to the side."""
-    seen = wall[20:500, 20 + shift_px : 660 + shift_px].astype(np.int16)
-    return (seen + rng.normal(scale=3.0, size=seen.shape)).clip(0, 255).astype(np.uint8)
+def _gamma(rgb: Picture, gain: float, noise: float, rng: np.random.Generator) -> Picture:
+    """Return a picture in less light: linear light is scaled, and the sensor's noise stays as it is."""
+    linear = gain * (rgb / 255.0) ** 2.2 + rng.normal(scale=noise, size=rgb.shape)
+    return (255.0 * linear.clip(0.0, 1.0) ** (1 / 2.2)).astype(np.uint8)
 
 
-def made_map(walls: list[np.ndarray], rng: np.random.Generator) -> LocatableMap:
-    """Return a map with one keyframe in front of each wall."""
-    used = Encoders.named("embedded")
-    pictures = [picture(wall, 0, rng) for wall in walls]
-    local = [used.local.encode(rgb) for rgb in pictures]
-    state = used.place.fit(local[:64], rng)
-    seen = []
-    for number, (rgb, one) in enumerate(zip(pictures, local, strict=True)):
-        pose = np.eye(4)
-        pose[0, 3] = 10.0 * number
-        ray = np.column_stack([(one.xy - (CAMERA.cx, CAMERA.cy)) / CAMERA.fx, np.ones(len(one.xy))])
-        points = (DEPTH_M * ray + pose[:3, 3]).astype(np.float32)
-        place = used.place.encode(rgb, one, state)
-        none = np.zeros(0, np.float32)
-        seen.append(DescribedKeyframe(float(number), pose, points.mean(axis=0), none, place, one, points, b""))
-    return LocatableMap(stack_keyframes(seen), state, used, Rig(CAMERA, CAMERA))
+def _zoomed(rgb: Picture, zoom: float) -> Picture:
+    """Return a picture as through a lens of another focal length; what a wider one would see besides is black."""
+    height, width = rgb.shape[:2]
+    across = np.array([[zoom, 0.0, 0.5 * width * (1.0 - zoom)], [0.0, zoom, 0.5 * height * (1.0 - zoom)]])
+    return np.asarray(cv2.warpAffine(rgb, across, (width, height), flags=cv2.INTER_AREA), np.uint8)
 
 
-def by_opencv(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Match by cv2's brute force in both directions."""
-    there = cv2.BFMatcher(cv2.NORM_L2).knnMatch(a, b, k=2)
-    back = {match.queryIdx: match.trainIdx for match in cv2.BFMatcher(cv2.NORM_L2).match(b, a)}
-    pairs = [(m.queryIdx, m.trainIdx) for m, n in there if m.distance < RATIO * n.distance]
-    return np.array([(i, j) for i, j in pairs if back[j] == i])
+CONDITIONS: dict[str, Callable[[Picture, np.random.Generator], Picture]] = {
+    "as it is": lambda rgb, _: rgb,
+    "dim (a tenth)": lambda rgb, rng: _gamma(rgb, 0.1, 0.002, rng),
+    "dim and noisy": lambda rgb, rng: _gamma(rgb, 0.1, 0.01, rng),
+    "noisy": lambda rgb, rng: (rgb + rng.normal(scale=20.0, size=rgb.shape)).clip(0, 255).astype(np.uint8),
+    "blurred": lambda rgb, _: np.asarray(cv2.blur(rgb, (11, 1)), np.uint8),
+    "zoom 0.7": lambda rgb, _: _zoomed(rgb, 0.7),
+    "zoom 1.5": lambda rgb, _: _zoomed(rgb, 1.5),
+}
 
 
-def by_flann(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Match by cv2's approximate search, one direction."""
-    there = cv2.FlannBasedMatcher({"algorithm": 1, "trees": 4}, {"checks": 64}).knnMatch(a, b, k=2)
-    return np.array([(m.queryIdx, m.trainIdx) for m, n in there if m.distance < RATIO * n.distance])
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """A photo and where it was taken; None where it is of another place."""
+
+    rgb: Picture
+    world_from_camera: np.ndarray | None
 
 
-def by_opencv_pnp(xy: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Estimate the pose by cv2's RANSAC."""
-    _, _, shift, _ = cv2.solvePnPRansac(
-        points.astype(np.float64),
-        xy.astype(np.float64),
-        CAMERA.matrix,
-        None,
-        iterationsCount=2000,
-        reprojectionError=6.3,
-    )
-    return shift
+def photos_of(recording: Recording, rows: Sequence[int]) -> list[Truth]:
+    """Return frames of a recording as photos."""
+    colour_from_depth = inverse(recording.rig.rgb_from_depth)
+    frames = (recording.frame(int(row)) for row in rows)
+    return [Truth(frame.rgb, frame.world_from_camera @ colour_from_depth) for frame in frames]
 
 
-def measure(stored: LocatableMap, photos: list[np.ndarray]) -> dict[str, float]:
-    """Return milliseconds of processor time a photo, the median, for each stage and each other way."""
-    taken: dict[str, list[float]] = {}
+def located(stored: MapOfPictures, truth: Truth, camera: Pinhole | None = None) -> tuple[str, float]:
+    """Return ``right``, ``wrong``, ``none`` or ``twice`` for a photo, and the seconds that it took."""
+    begin_s = time.thread_time()
+    settings = LocateSettings()
+    found = locate(stored, truth.rgb, camera, np.random.default_rng(SEED), settings)
+    took_s = time.thread_time() - begin_s
+    if found.elsewhere is not None:
+        return "twice", took_s
+    if found.world_from_camera is None:
+        return "none", took_s
+    if truth.world_from_camera is None:
+        return "wrong", took_s
+    off_m = np.linalg.norm((found.world_from_camera - truth.world_from_camera)[:3, 3])
+    near = off_m <= NEAR_M and rotation_angle_rad(found.world_from_camera, truth.world_from_camera) <= NEAR_RAD
+    return ("right" if near else "wrong"), took_s
 
-    def timed(name: str, work: Callable[..., T], *arguments: object) -> T:
-        spent, result = timing.seconds(work, *arguments)
-        taken.setdefault(name, []).append(1e3 * spent)
-        return result
 
-    keyframes, used = stored.keyframes, stored.encoders
-    for rgb in photos:
-        local = timed("RootSIFT", used.local.encode, rgb)
-        place = timed("VLAD", used.place.encode, rgb, local, stored.place_state)
-        best = int(timed("retrieval", alike, keyframes, place, 5)[0])
-        rows = slice(keyframes.offsets[best], keyframes.offsets[best + 1])
-        other = keyframes.descriptors[rows].astype(np.float32)
-        pairs = timed("matching, ours", match_mutual, local.descriptors, other)
-        timed("matching, cv2 brute force", by_opencv, local.descriptors, other)
-        timed("matching, cv2 FLANN", by_flann, local.descriptors, other)
-        xy, points = local.xy[pairs[:, 0]], keyframes.points_world[rows][pairs[:, 1]]
-        timed("pose, PoseLib", estimate_pose, xy, points, CAMERA, np.random.default_rng(0))
-        timed("pose, cv2", by_opencv_pnp, xy, points)
-        found = timed("all of it", locate, stored, rgb, CAMERA, np.random.default_rng(0))
-        if found.world_from_camera is None:
-            raise SystemExit("a photo of the map was not located; the figures would mean nothing")
-    return {name: float(np.median(values)) for name, values in taken.items()}
+def row_of(method: str, what: str, answers: Sequence[tuple[str, float]], wanted: str = "right") -> dict[str, object]:
+    """Return one line of the table."""
+    said = [answer for answer, _ in answers]
+    hits = said.count(wanted)
+    return {
+        "keypoints": method, "photos": what, "of": len(said), f"as they should": hits,
+        "95 %": in_percent(wilson(hits, len(said))), "wrong": said.count("wrong"),
+        "s a photo": float(np.median([took_s for _, took_s in answers])) if answers else 0.0,
+    }  # fmt: skip
+
+
+def doubled(stored: MapOfPictures) -> MapOfPictures:
+    """Return a map that holds its place twice, 100 m apart."""
+    own = stored.keyframes
+    moved = np.array(own.world_from_camera)
+    moved[:, 0, 3] += 100.0
+    away = np.array([100.0, 0.0, 0.0], np.float32)
+    copy = replace(own, world_from_camera=moved, centre=own.centre + away, points_world=own.points_world + away)
+    return replace(stored, keyframes=concat([own, copy]))
+
+
+def pairs_of(stored: MapOfPictures, recording: Recording, between_deg: tuple[int, int], count: int) -> Iterator[Any]:
+    """Yield maps of one keyframe, each with a photo that looks at its middle and is turned by so many degrees."""
+    poses = np.asarray(recording.world_from_camera)
+    keyframes, rng, made = stored.keyframes, np.random.default_rng(SEED), 0
+    for row in rng.permutation(len(keyframes)).tolist():
+        pose, middle = np.asarray(keyframes.world_from_camera[row]), np.asarray(keyframes.centre[row], np.float64)
+        turned = np.rad2deg(rotation_angle_rad(poses, np.broadcast_to(pose, poses.shape)))
+        there = (inverse(poses) @ np.append(middle, 1.0))[:, :3]
+        rig: Rig = stored.rig
+        u = rig.rgb.fx * there[:, 0] / np.maximum(there[:, 2], 1e-6) + rig.rgb.cx
+        v = rig.rgb.fy * there[:, 1] / np.maximum(there[:, 2], 1e-6) + rig.rgb.cy
+        inside = (there[:, 2] > 0.5) & (abs(u / rig.rgb.width - 0.5) < 0.3) & (abs(v / rig.rgb.height - 0.5) < 0.3)
+        fits = np.flatnonzero(inside & (turned >= between_deg[0]) & (turned < between_deg[1]))
+        if len(fits) and made < count:
+            made += 1
+            (truth,) = photos_of(recording, [int(rng.choice(fits))])
+            yield replace(stored, keyframes=keyframes.take(np.array([row]))), truth
+
+
+def measure(method: str, recording: Recording, elsewhere: Sequence[Picture], photos: int, pairs: int) -> list[Any]:
+    """Return the lines of one way to locate photos."""
+    rng = np.random.default_rng(SEED)
+    used = Encoders.named("embedded", **METHODS[method], pixels=None, sounds=None)
+    begin_s = time.thread_time()
+    stored = map_of(Subset(recording, np.arange(0, len(recording), 2)), used, rng)
+    keyframes: Keyframes = stored.keyframes
+    made_s = (time.thread_time() - begin_s) / len(keyframes)
+    held = sum(np.asarray(getattr(keyframes, name)).nbytes for name in ("place", "xy", "descriptors", "points_world"))
+    rows = np.arange(1, len(recording), 2)
+    truths = photos_of(recording, rows[np.linspace(0, len(rows) - 1, min(photos, len(rows))).astype(int)].tolist())
+    lines: list[dict[str, object]] = []
+    for name, changed in CONDITIONS.items():
+        seen = [replace(truth, rgb=changed(truth.rgb, rng)) for truth in truths]
+        lines.append(row_of(method, name, [located(stored, truth) for truth in seen]))
+    for between in TURNED_DEG:
+        chosen = list(pairs_of(stored, recording, between, pairs))
+        for name in ("as it is", "dim and noisy"):
+            seen = [(one, replace(truth, rgb=CONDITIONS[name](truth.rgb, rng))) for one, truth in chosen]
+            answers = [located(one, truth, recording.rig.rgb) for one, truth in seen]
+            lines.append(row_of(method, f"turned by {between[0]}-{between[1]}°, {name}", answers))
+    twice = doubled(stored)
+    lines.append(row_of(method, "the place is there twice", [located(twice, truth) for truth in truths[::3]], "twice"))
+    answers = [located(stored, Truth(rgb, None)) for rgb in elsewhere]
+    answers += [located(stored, Truth(np.ascontiguousarray(one.rgb[:, ::-1]), None)) for one in truths]
+    lines.append(row_of(method, "elsewhere and mirrored", answers, "none"))
+    print(f"{method}: {len(keyframes)} keyframes, {made_s:.3f} s and {held / len(keyframes) / 1e3:.0f} kB each")
+    return lines
 
 
 def main() -> None:
-    """Make the map and the photos, measure, print."""
+    """Measure each method, print."""
     arguments = timing.parser(__doc__ or "")
-    arguments.add_argument("--keyframes", type=int, default=100)
-    arguments.add_argument("--photos", type=int, default=10)
+    arguments.add_argument("recording", type=Path)
+    arguments.add_argument("--elsewhere", type=Path, help="folder of photos of other places")
+    arguments.add_argument("--photos", type=int, default=60)
+    arguments.add_argument("--pairs", type=int, default=25)
+    arguments.add_argument("--methods", nargs="*", default=list(METHODS))
     given = arguments.parse_args()
     cv2.setNumThreads(1)
-    rng = np.random.default_rng(0)
-    walls = [painted(rng) for _ in range(given.keyframes)]
-    stored = made_map(walls, rng)
-    asked = np.linspace(0, given.keyframes - 1, given.photos).round().astype(int)
-    figures = measure(stored, [picture(walls[k], int(rng.integers(5, 40)), rng) for k in asked])
-    rows = [{"stage": name, "ms a photo, one thread": value} for name, value in figures.items()]
-    facts = {"keyframes": given.keyframes, "keypoints a picture": int(np.diff(stored.keyframes.offsets).mean())}
-    timing.show("Locating a photo", rows, facts, given.json)
+    recording = open_recording(given.recording)
+    paths = sorted(given.elsewhere.glob("*.jpg"))[: given.photos] if given.elsewhere else []
+    elsewhere = [np.ascontiguousarray(np.asarray(cv2.imread(str(path)))[..., ::-1]) for path in paths]
+    lines = [line for one in given.methods for line in measure(one, recording, elsewhere, given.photos, given.pairs)]
+    timing.show("Photos located", lines, {"recording": given.recording.name, "frames": len(recording)}, given.json)
 
 
 if __name__ == "__main__":
