@@ -98,8 +98,6 @@ def test_sound_without_stamps_is_placed_by_the_pictures_clock() -> None:
     assert clock(apart_s=-90.0).of_received(np.array([103.0])) == pytest.approx([3.0])
     assert "are -90 s from when the bag received them" in clock(apart_s=-90.0).notices("/audio")[0]
     assert clock().notices("/audio") == ()
-    half = PictureClock(np.arange(10.0), 0.5 * np.arange(10.0), 0.0)
-    assert "runs 0.5 times as fast" in half.notices("/audio")[-1]
 
 
 def test_stamps_of_sound_are_used_where_they_lie_among_the_pictures(tmp_path: Path) -> None:

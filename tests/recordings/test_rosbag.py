@@ -5,6 +5,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -183,11 +184,6 @@ def test_a_bag_names_the_topics_that_were_chosen(tmp_path: Path) -> None:
     assert by_odometry.topics == {**images, "pose": "/odom"}
 
 
-def test_a_single_mcap_file_opens_like_its_folder(tmp_path: Path) -> None:
-    folder = write_bag(tmp_path, "mcap")
-    assert len(open_rosbag(next(folder.glob("*.mcap")))) == 5
-
-
 def test_the_sound_of_a_bag_is_on_the_clock_of_its_frames(tmp_path: Path) -> None:
     recording = open_rosbag(write_bag(tmp_path, "ros2", sound=True))
     assert recording.audio is not None
@@ -217,38 +213,6 @@ def test_a_second_thread_reads_the_same_frames(tmp_path: Path) -> None:
     here = [recording.frame(i).depth_m[0, 0] for i in range(5)]
     with ThreadPoolExecutor(1) as pool:
         assert list(pool.map(lambda i: recording.frame(i).depth_m[0, 0], range(5))) == here
-
-
-def test_a_bag_without_depth_says_what_it_has(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"has no topic of depth images \(image topics: /camera/color/image_raw\)"):
-        open_rosbag(write_bag(tmp_path, "ros2", depth=False))
-
-
-def test_a_bag_without_colour_says_by_which_word_to_name_it(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"has no topic of colour images .*; name it \(rgb=TOPIC\)"):
-        open_rosbag(write_bag(tmp_path, "ros2", colour_topic="/camera/depth/second"))
-
-
-def test_a_bag_without_poses_says_what_to_record(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="has no poses: no /tf that moves 'camera_optical', no odometry"):
-        open_rosbag(write_bag(tmp_path, "ros2", poses="none"))
-
-
-def test_odometry_of_a_body_without_a_mounted_camera_asks_for_tf_static(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="no static transform from there to the camera 'camera_optical'"):
-        open_rosbag(write_bag(tmp_path, "ros1", poses="odometry without mount"))
-
-
-def test_a_topic_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="has no image topic '/left/image'"):
-        open_rosbag(write_bag(tmp_path, "ros2"), {"rgb": "/left/image"})
-
-
-def test_a_truncated_bag_says_how_to_mend_it(tmp_path: Path) -> None:
-    path = write_bag(tmp_path, "ros1")
-    path.write_bytes(path.read_bytes()[:3000])
-    with pytest.raises(RecordingError, match="cannot be read as a ROS bag"):
-        open_rosbag(path)
 
 
 def test_a_topic_that_yaml_reads_as_a_number_is_a_sentence(tmp_path: Path) -> None:
@@ -288,20 +252,6 @@ def test_topics_can_be_named_when_any_recording_is_opened(tmp_path: Path) -> Non
     path = write_bag(tmp_path, "ros2", poses="odometry")
     recording = open_recording(path, topics={"pose": "/odom", "depth": "/camera/depth/image_raw"})
     assert len(recording) == 5
-    with pytest.raises(
-        RecordingError, match="There is no 'lidar' among the topics that can be named: rgb, depth, pose"
-    ):
-        open_recording(path, topics={"lidar": "/scan"})
-
-
-def test_a_named_topic_of_the_wrong_kind_is_refused(tmp_path: Path) -> None:
-    path = write_bag(tmp_path, "ros2")
-    with pytest.raises(
-        RecordingError, match="is of the type sensor_msgs/msg/Image, which holds no poses; name a topic"
-    ):
-        open_rosbag(path, {"pose": "/camera/color/image_raw"})
-    with pytest.raises(RecordingError, match=r"has no sound topic '/ear' \(it has: none\); name one of them\.$"):
-        open_rosbag(path, {"audio": "/ear"})
 
 
 def test_a_calibration_of_no_camera_is_refused() -> None:
@@ -336,7 +286,7 @@ def bag_with(folder: Path, kind: str, monkeypatch: pytest.MonkeyPatch, more, **s
     return write_bag(folder, kind, **settings)
 
 
-@pytest.mark.parametrize("kind", ["ros1", "ros2"])
+@pytest.mark.parametrize("kind", ["ros1", pytest.param("ros2", marks=pytest.mark.nightly)])
 def test_plain_samples_without_audio_info_say_how_to_name_them(
     tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -356,22 +306,6 @@ def test_plain_samples_without_audio_info_say_how_to_name_them(
     for words in ("fast", "16000,x", "0", "16000,0"):
         with pytest.raises(RecordingError, match="audio_pcm"):
             open_rosbag(path, {"audio_pcm": words})
-
-
-@pytest.mark.parametrize(("rate_hz", "channels"), [(0, 1), (16_000, 0), (4_000_000_000, 1)])
-def test_audio_info_with_impossible_numbers_is_a_sentence(
-    tmp_path: Path, rate_hz: int, channels: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def more(maker: BagMaker) -> None:
-        info = maker.t("audio_common_msgs/msg/AudioInfo", channels, rate_hz, "S16LE", 0, "wave")
-        maker.write("/audio/audio_info", info, START_S)
-        _sound(maker)
-
-    path = bag_with(tmp_path, "ros2", monkeypatch, more)
-    with pytest.raises(
-        RecordingError, match=rf"AudioInfo of /audio/audio says {rate_hz} samples a second and {channels} ch"
-    ):
-        open_rosbag(path)
 
 
 def test_the_samples_of_ros_2_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -445,3 +379,22 @@ def test_poses_on_another_clock_name_both(tmp_path: Path, monkeypatch: pytest.Mo
         RecordingError, match=r"from 1000\.050 to .* s\); its poses go from 1500\.000 to 1501\.000 s, so check"
     ):
         open_rosbag(write_bag(tmp_path, "ros2"))
+
+
+# What a bag lacks or what is named of it, and what is said.
+REFUSED: list[tuple[dict[str, Any], dict[str, str], str]] = [
+    ({"depth": False}, {}, r"no topic of depth images \(image topics: /camera/color/image_raw\)"),
+    ({"colour_topic": "/camera/depth/second"}, {}, r"no topic of colour images .*; name it \(rgb=TOPIC\)"),
+    ({"poses": "none"}, {}, "has no poses: no /tf that moves 'camera_optical', no odometry"),
+    ({"poses": "odometry without mount"}, {}, "no static transform from there to the camera 'camera_optical'"),
+    ({}, {"rgb": "/left/image"}, "has no image topic '/left/image'"),
+    ({}, {"pose": "/camera/color/image_raw"}, "is of the type sensor_msgs/msg/Image, which holds no poses; name a"),
+    ({}, {"audio": "/ear"}, r"has no sound topic '/ear' \(it has: none\); name one of them\.$"),
+    ({}, {"lidar": "/scan"}, "no 'lidar' among the topics that can be named: rgb, depth, pose"),
+]
+
+
+@pytest.mark.parametrize(("settings", "topics", "said"), REFUSED)
+def test_what_a_bag_lacks_is_said(tmp_path: Path, settings: dict[str, Any], topics: dict[str, str], said: str) -> None:
+    with pytest.raises(RecordingError, match=said):
+        open_rosbag(write_bag(tmp_path, "ros2", **settings), topics)

@@ -223,6 +223,11 @@ class Recording(ABC):
         return float(self.stamps_s[-1] - self.stamps_s[0]) if len(self) > 1 else 0.0
 
 
+_AS_WHOLE = (
+    "path", "format", "rig", "up_in_world", "audio", "notices", "base_height", "trajectory", "begins_s", "posed",
+)  # fmt: skip
+
+
 class Subset(Recording):
     """Chosen frames of another recording, in place; stamps, poses, names and the sound track stay what they are."""
 
@@ -241,18 +246,10 @@ class Subset(Recording):
             raise ValueError(f"indices must rise strictly within 0 ... {len(whole) - 1}")
         self.whole = whole
         self.indices = chosen
-        self.path: Path = whole.path
-        self.format: str = whole.format
-        self.rig = whole.rig
+        for name in _AS_WHOLE:
+            setattr(self, name, getattr(whole, name))
         self.stamps_s = whole.stamps_s[chosen]
         self.world_from_camera = whole.world_from_camera[chosen]
-        self.up_in_world = whole.up_in_world
-        self.audio = whole.audio
-        self.notices = whole.notices
-        self.base_height = whole.base_height
-        self.trajectory = whole.trajectory
-        self.begins_s = whole.begins_s
-        self.posed = whole.posed
 
     def frame(self, index: int) -> Frame:
         """Read one frame; its ``index`` is the one in the subset."""

@@ -144,7 +144,6 @@ def settle(
         report(Fault(f"{path} names {twins[0]} as colour and as depth; each frame needs a picture of both.", path))
     if fault := date_fault(shots.stamps_s, "frames") or repeat_fault(shots.stamps_s, "frames"):
         report(Fault(f"{path}: {fault}", path))
-    disagreement = order_notices(shots.names, shots.stamps_s)
     order = timeline.in_order(shots.stamps_s, "frames")
     shots = shots.take(order.index)
     walk = plausible_walk(shots.stamps_s, shots.world_from_camera[:, :3, 3], shots.names)
@@ -158,7 +157,6 @@ def settle(
     return shots, (
         *notices,
         *images.turn_notices(path, shots.colour),
-        *disagreement,
         *order.notices,
         *walk.notices,
         *timeline.gap_notices(shots.stamps_s, "frames"),
@@ -455,28 +453,6 @@ def natural_key(name: str) -> tuple[tuple[str | int | Decimal, ...], str]:
 
 def _counted(digits: str) -> int | Decimal:
     return Decimal(digits) if "." in digits else int(digits)
-
-
-def order_notices(names: Sequence[str], stamps_s: Float[np.ndarray, " n"]) -> tuple[str, ...]:
-    """Return a notice where names that count frames and the frames' stamps have different orders, or nothing.
-
-    Args:
-        names: of the frames in the order of their list, of one pattern but for the numbers in them; other names have
-            no order. What runs backwards in the list itself is another matter (``timeline.in_order``).
-        stamps_s: of the frames.
-    """
-    keys = [natural_key(f"{name}.")[0] for name in names]
-    if len({key[::2] for key in keys}) != 1 or len(names) < 2:
-        return ()
-    rows: list[int] = sorted(range(len(names)), key=keys.__getitem__)
-    back = np.flatnonzero(np.diff(stamps_s[rows]) < 0.0)
-    if len(back) == 0 or rows == list(range(len(names))):
-        return ()
-    before, after = names[rows[int(back[0])]], names[rows[int(back[0]) + 1]]
-    return (
-        f"The names of the frames and their stamps have different orders ({len(back)} time(s); frame {after} is "
-        f"earlier than {before}); the stamps are used, so check that each belongs to its picture.",
-    )
 
 
 def open_audio(folder: Path, start_s: float = 0.0) -> tuple[AudioTrack | None, tuple[str, ...]]:

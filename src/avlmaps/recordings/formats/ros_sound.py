@@ -81,12 +81,6 @@ class PictureClock:
         """By how much the pictures' stamps are ahead of the times at which they were received, their median."""
         return float(np.median(self.stamps_s - self.received_s))
 
-    @property
-    def rate(self) -> float:
-        """How fast the pictures' clock runs against that of the bag: 1 but in simulations."""
-        length_s = float(self.received_s[-1] - self.received_s[0])
-        return float(self.stamps_s[-1] - self.stamps_s[0]) / length_s if length_s > 0.0 else 1.0
-
     def of_received(self, received_s: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
         """Return the recording's time of messages without a stamp, by when they were received."""
         return received_s + self.apart_s - self.start_s
@@ -102,18 +96,12 @@ class PictureClock:
 
     def notices(self, topic: str) -> tuple[str, ...]:
         """Return a notice where the sound was received on another clock than that of the pictures' stamps."""
-        said: list[str] = []
-        if abs(self.apart_s) > _APART_S:
-            said.append(
-                f"The stamps of the pictures are {self.apart_s:+.6g} s from when the bag received them; {topic} has no "
-                "stamps on their clock and is placed as they are."
-            )
-        if not 0.9 < self.rate < 1.1:
-            said.append(
-                f"The pictures' clock runs {self.rate:.3g} times as fast as the bag's, so that {topic} fits them only "
-                "near the middle; record in real time."
-            )
-        return tuple(said)
+        if abs(self.apart_s) <= _APART_S:
+            return ()
+        return (
+            f"The stamps of the pictures are {self.apart_s:+.6g} s from when the bag received them; {topic} has no "
+            "stamps on their clock and is placed as they are.",
+        )
 
 
 @dataclass(frozen=True, slots=True)
