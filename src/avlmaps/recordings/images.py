@@ -17,11 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float32, UInt8
+from avlmaps.core.arrays import Float, Float32, UInt8, UInt16
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import PICTURE_BYTES, checked_size, open_regular, read_regular
 from avlmaps.core.poses import apply
+from avlmaps.core.rvl import decode_rvl
 from avlmaps.recordings.containers import checked_media
 from avlmaps.recordings.faults import readable
 
@@ -313,6 +314,17 @@ def metres(raw: np.ndarray, units_per_m: float) -> Float32[np.ndarray, "h w"]:
     else:
         depth_m[~(np.isfinite(depth_m) & (depth_m > 0.0))] = 0.0
     return depth_m
+
+
+def decode_rvl_depth(path: Path, content: bytes, head: int) -> UInt16[np.ndarray, "h w"]:
+    """Decode depth that RVL packed, behind its width and height at the end of a head of so many bytes."""
+    width, height = struct.unpack_from("<II", content, head - 8) if len(content) >= head else (0, 0)
+    if not 0 < width * height <= MOST_PIXELS:
+        raise RecordingError(f"{path} is cut off, or says that it is {width}x{height}, which no depth picture is.")
+    try:
+        return decode_rvl(content[head:], width, height)
+    except ValueError as error:
+        raise RecordingError(f"{path} is cut off or damaged: {error}.") from None
 
 
 def decode_depth(path: Path, content: bytes) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""Flat surfaces within single frames: floors, walls, tables; what they show of a lens, squeezed pictures and a mount.
+"""Flat surfaces within single frames: floors, walls, tables; what they show of a lens and of a mount.
 
 Where x and y are a pixel's place in focal lengths, a plane has 1/z = a·x + b·y + c, and (a, b, c) is its normal. Behind
 a lens that draws things nearer to the middle, x and y are 1 + s·r² times what a pinhole's numbers say, r² = x² + y²: of
-1/z is left s·r²·(a·x + b·y). Most floors, walls and tables meet at right angles.
+1/z is left s·r²·(a·x + b·y).
 
 Seen by a camera that is said to look level and looks down, the floor rises ahead of it, whichever way it looks. In the
 world such a floor is a cone, though neighbouring frames agree; one small rotation of the camera makes it level in all.
@@ -23,26 +23,19 @@ _FROM_M, _TO_M = 0.3, 6.0
 _NEAR = 0.02  # of its depth, by which a pixel is off the surface that it belongs to
 _LEAST_SHARE, _MOST = 0.04, 5  # of a picture, surfaces of a frame
 _ROUNDS = 4
-# Surfaces whose normals, cameras' places and directions round to the same steps are one view: they may be curved, or
-# need not be at right angles.
+# Surfaces whose normals, cameras' places and directions round to the same steps are one view: they may be curved.
 _VIEW, _FEWEST_VIEWS = 0.3, 2.5
 # Bends, in the middle and in the nearer quartile, and of how many surfaces that would count equally. In right
 # recordings (20 rendered homes, 18 drawn walks, 19 stretches of a Kinect's walk, 33 times 24 real frames) -0.06 to 0.12
 # in the middle; with k1 = -0.2 from 0.20 on in all walks.
 _LEAST_BEND, _LEAST_QUARTER, _FEWEST_BENT, _MOST_SURE = 0.17, 0.06, 8.0, 0.75
-# Pairs of surfaces of a frame: nearly at right angles, large, and turned by a change of the focal lengths; logarithms
-# of that, and of how many pairs that would count equally. In the same recordings up to 0.04, and 0.15 in depth in steps
-# of 4 cm; 0.27 and more where one focal length is wrong by 4/3.
-_CROSS, _LARGE, _TURNED, _FEWEST_PAIRS = 0.5, 0.08, 0.15, 6.0
-_LEAST_FACTOR, _LEAST_FACTOR_QUARTER, _ANGLE_MOST_LEFT = 0.2, 0.12, 0.35
-_AXES = {"fx": (1.0, 0.0, 0.0), "fy": (0.0, 1.0, 0.0), "fx and fy": (1.0, 1.0, 0.0)}
 # Level surface: within this angle of up, in 8 frames. Turns that change how floors lie by less, as a share of those
 # that change it most, are not separated from a slope.
 _LEVEL, _FEWEST_LEVEL, _WEAKEST = np.cos(np.radians(25.0)), 8, 0.1
 # Least tilt, and least angle by which floors are off, that is a doubt; the share of it that the tilt leaves at most.
 # In right recordings (9 of rendered homes, 12 of a Kinect, 38 drawn walks) floors are off by up to 1.8 degrees. Where a
 # mount is off by 4 degrees, on a walk that turns right round, they are off by 4.6, and by 0.2 without it.
-_LEAST_TILT_DEG, _LEAST_OFF_DEG, _MOST_LEFT, _SHOWN_DEG = 4.0, 2.5, 0.5, 6.0
+_LEAST_TILT_DEG, _LEAST_OFF_DEG, _MOST_LEFT = 4.0, 2.5, 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,44 +99,6 @@ class Flats:
         camera = self.sample.world_from_camera[self.frame]
         seen = np.hstack([self.normal, camera[:, :3, 2], camera[:, :3, 3]])
         return _Spread.of(self.bend, np.minimum(self.sure, most), seen)
-
-    def squeeze(self) -> tuple[str, float, float, float] | None:
-        """Return which focal lengths are wrong, by what factor, and how far angles are off without and with it."""
-        sure = [
-            (left_deg, axes, float(np.exp(found.middle)), off_deg)
-            for axes, (found, off_deg, left_deg) in self._factors().items()
-            if found.is_enough(_FEWEST_PAIRS) and left_deg <= _ANGLE_MOST_LEFT * off_deg
-            if found.beyond(_LEAST_FACTOR, _LEAST_FACTOR_QUARTER)
-        ]
-        if not sure:
-            return None
-        left_deg, axes, factor, off_deg = min(sure)
-        return axes, factor, off_deg, left_deg
-
-    @property
-    def squeeze_would_show(self) -> bool:
-        """Whether there are enough surfaces at right angles to distinguish fx from fy."""
-        return self._factors()["fy"][0].is_enough(_FEWEST_PAIRS)
-
-    def _factors(self) -> dict[str, tuple["_Spread", float, float]]:
-        """Return the logarithms of a factor of focal lengths, and by how many degrees pairs are off without and with.
-
-        An angle is that of normals whose x and y grow with the focal lengths.
-        """
-        large = self.share > _LARGE
-        pairs = (self.frame[:, None] == self.frame) & (large[:, None] & large) & np.tri(len(large), k=-1, dtype=bool)
-        first, second = np.nonzero(pairs & (np.abs(self.normal @ self.normal.T) < _CROSS))
-        one, other, share = self.normal[first], self.normal[second], np.minimum(self.share[first], self.share[second])
-        cross, both = (one * other).sum(axis=1), np.hstack([one, other])
-        slopes = {name: 2.0 * (one * other) @ of - cross * ((one**2 + other**2) @ of) for name, of in _AXES.items()}
-        by_any = np.stack([np.abs(slope) > _TURNED for slope in slopes.values()]).any(axis=0)
-        found: dict[str, tuple[_Spread, float, float]] = {}
-        for name, slope in slopes.items():
-            turned = np.abs(slope) > _TURNED
-            values, weight = -cross[turned] / slope[turned], slope[turned] ** 2 * share[turned]
-            spread = _Spread.of(values, weight, both[turned])
-            found[name] = spread, _mean_deg(cross[by_any]), _mean_deg((cross + slope * spread.middle)[by_any])
-        return found
 
     def levels(self) -> "Levels":
         """Return the largest level surface of each frame."""
@@ -244,10 +199,6 @@ class _Spread:
         return (self.middle >= least and self.low >= quarter) or (-self.middle >= least and -self.high >= quarter)
 
 
-def _mean_deg(cross: Float[np.ndarray, " p"]) -> float:
-    return float(np.degrees(np.abs(cross).mean())) if len(cross) else 0.0
-
-
 @dataclass(frozen=True, slots=True)
 class Tilt:
     """How a camera sits in its mount, by the floors that it sees.
@@ -289,14 +240,6 @@ class Levels:
         down_deg, right_deg = np.degrees([-tilt[0], tilt[2]]).tolist()
         is_sure = np.hypot(down_deg, right_deg) >= _LEAST_TILT_DEG and off_deg >= _LEAST_OFF_DEG
         return Tilt(off_deg, left_deg, down_deg, right_deg) if is_sure and left_deg <= _MOST_LEFT * off_deg else None
-
-    @property
-    def would_show(self) -> bool:
-        """Whether a camera that is tilted by 6 degrees to any side would be noticed."""
-        turns = np.radians(_SHOWN_DEG) * np.array(
-            [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]
-        )
-        return all(Levels(self.world_from_camera, _leaning(self.up, turn)).tilt is not None for turn in turns)
 
     def _further(self, seen: Float[np.ndarray, "f 3"]) -> Float[np.ndarray, "3"]:
         world = np.einsum("fij,fj->fi", self.world_from_camera, seen)

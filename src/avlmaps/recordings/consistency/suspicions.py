@@ -9,7 +9,6 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.poses import rotation_angle_rad
-from avlmaps.core.wording import option
 from avlmaps.recordings.consistency import agreement as limits
 from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, compare
 from avlmaps.recordings.consistency.check import Evidence, door_verdict
@@ -189,22 +188,6 @@ def lens_words(evidence: Evidence) -> str:
     return next(map(str, findings_of(_GEOMETRY[:1], closer)), "")
 
 
-def _squeezed(evidence: _Closer) -> Iterator[Said]:
-    if (found := evidence.flats.squeeze()) is None:
-        return
-    axes, factor, off_deg, left_deg = found
-    camera = evidence.recording.rig.depth
-    fx, fy = (old * factor if name in axes else old for name, old in (("fx", camera.fx), ("fy", camera.fy)))
-    given = "as the camera" if evidence.of_program else f"with {option('intrinsics', 'fx,fy,cx,cy')}"
-    both, squeezed = "The intrinsics are those of other pictures", "The pictures look squeezed along one axis"
-    yield Said(
-        f"Floors, walls and tables do not meet at right angles in single frames: pairs of flat surfaces are off by "
-        f"{off_deg:.0f} degrees (their mean), and by {left_deg:.0f} if {axes} were {factor:.2f} times as large.",
-        f"{both if ' ' in axes else squeezed}: give those of the {camera.width}x{camera.height} pictures as they are "
-        f"(about fx {fx:.4g}, fy {fy:.4g}) {given}.",
-    )
-
-
 def _tilted(evidence: _Closer) -> Iterator[Said]:
     tilt, camera = evidence.levels.tilt, evidence.recording.rig.depth
     if not evidence.judged or tilt is None:
@@ -283,7 +266,6 @@ _GEOMETRY = (
         "Take the distortion of the lens out of the colour and the depth pictures, and give the intrinsics of the new "
         "pictures; else walls are bent in the map.",
     ),
-    Suspicion(Reason.INTRINSICS, _squeezed),
     Suspicion(Reason.GEOMETRY, _tilted),
     Suspicion(
         Reason.GEOMETRY,
@@ -508,11 +490,6 @@ _SEEN: tuple[tuple[Callable[[_Closer], bool], str], ...] = (
         lambda evidence: evidence.flats.lens_would_show,
         "Whether the distortion of the lens was taken out cannot be checked here, because too few flat surfaces are "
         "seen: a wide lens that bends walls would not show.",
-    ),
-    (
-        lambda evidence: evidence.flats.squeeze_would_show,
-        "The ratio of fx to fy cannot be checked here, because too few flat surfaces that meet at right angles are "
-        "seen, or all of them by a level camera: pictures that were squeezed along one axis would not show.",
     ),
 )
 

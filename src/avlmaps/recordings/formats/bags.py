@@ -20,7 +20,7 @@ from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Protocol, cast, runtime_checkable
+from typing import Any, cast
 
 import numpy as np
 
@@ -164,32 +164,6 @@ _ZSTD = b"\x28\xb5\x2f\xfd"  # how a compressed message begins; CDR begins with 
 _LARGEST_RECORD = 1 << 31
 
 
-@runtime_checkable
-class Container(Protocol):
-    """Files of messages."""
-
-    @property
-    def connections(self) -> Sequence[Any]:
-        """The topics of every file."""
-        ...
-
-    def messages(self, connections: Sequence[Any]) -> Iterator[tuple[Any, int, bytes]]:
-        """Yield (connection, receive time in ns, content) in the order of time."""
-        ...
-
-    def messages_at(self, connections: Sequence[Any], received_ns: int) -> Iterator[tuple[Any, bytes]]:
-        """Yield (connection, content) of the messages that were received at one time."""
-        ...
-
-    def message(self, connection: Any, raw: bytes) -> Any:
-        """Return a message as that of ROS."""
-        ...
-
-    def stamp_s(self, connection: Any, raw: bytes) -> float:
-        """Return the stamp of a message that has a header, seconds."""
-        ...
-
-
 class Bag:
     """An open bag, of one file or several."""
 
@@ -210,7 +184,7 @@ class Bag:
         if len(suffixes) > 1:
             raise RecordingError(f"{path} and {self.files[-1]} are bags of two kinds; convert one of them first.")
         kind = McapContainer if suffixes == {".mcap"} else RosbagsContainer
-        self._container: Container = kind(self.files)
+        self._container: RosbagsContainer | McapContainer = kind(self.files)
 
     @property
     def topics(self) -> dict[str, str]:
@@ -305,24 +279,24 @@ class RosbagsContainer:
 
     @property
     def connections(self) -> Sequence[Any]:
-        """See ``Container``."""
+        """The topics of every file; each has a ``topic`` and a ``msgtype``."""
         return self._reader.connections
 
     def messages(self, connections: Sequence[Any]) -> Iterator[tuple[Any, int, bytes]]:
-        """See ``Container``."""
+        """Yield (connection, receive time in ns, content) in the order of time."""
         return self._reader.messages(connections=connections)
 
     def messages_at(self, connections: Sequence[Any], received_ns: int) -> Iterator[tuple[Any, bytes]]:
-        """See ``Container``."""
+        """Yield (connection, content) of the messages that were received at one time."""
         found = self._reader.messages(connections=connections, start=received_ns, stop=received_ns + 1)
         return ((connection, raw) for connection, _, raw in found)
 
     def message(self, connection: Any, raw: bytes) -> Any:
-        """See ``Container``."""
+        """Return a message as that of ROS."""
         return self._reader.deserialize(self._plain(raw), connection.msgtype)
 
     def stamp_s(self, connection: Any, raw: bytes) -> float:
-        """See ``Container``."""
+        """Return the stamp of a message that has a header, seconds."""
         return header_stamp_s(self._plain(raw), self._reader.is2)
 
     def _plain(self, raw: bytes) -> bytes:
@@ -392,7 +366,7 @@ class McapContainer:
 
     @property
     def connections(self) -> Sequence[McapConnection]:
-        """See ``Container``."""
+        """The topics of every file; each has a ``topic`` and a ``msgtype``."""
         return self._connections
 
     @cached_property
@@ -418,7 +392,7 @@ class McapContainer:
         return found
 
     def messages(self, connections: Sequence[McapConnection]) -> Iterator[tuple[McapConnection, int, bytes]]:
-        """See ``Container``."""
+        """Yield (connection, receive time in ns, content) in the order of time."""
 
         def of(connection: McapConnection) -> Iterator[tuple[McapConnection, int, bytes]]:
             return ((connection, ns, raw) for ns, raw in self._of_channel(connection))
@@ -428,17 +402,17 @@ class McapContainer:
     def messages_at(
         self, connections: Sequence[McapConnection], received_ns: int
     ) -> Iterator[tuple[McapConnection, bytes]]:
-        """See ``Container``."""
+        """Yield (connection, content) of the messages that were received at one time."""
         times = {"starting_at": received_ns, "ending_at": received_ns}
         return ((connection, raw) for connection in connections for _, raw in self._of_channel(connection, **times))
 
     def message(self, connection: McapConnection, raw: bytes) -> Any:
-        """See ``Container``."""
+        """Return a message as that of ROS."""
         decoded = self._decoded(connection, raw)
         return to_ros(connection.schema.name, decoded) if connection.is_foxglove else decoded
 
     def stamp_s(self, connection: McapConnection, raw: bytes) -> float:
-        """See ``Container``."""
+        """Return the stamp of a message that has a header, seconds."""
         encoding = connection.channel.message_encoding
         if encoding in ("ros1", "cdr") and not connection.is_foxglove:
             return header_stamp_s(raw, encoding == "cdr")

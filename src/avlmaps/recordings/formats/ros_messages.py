@@ -9,6 +9,7 @@ import sys
 from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import takewhile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from jaxtyping import Float, Float32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion
-from avlmaps.recordings.images import MOST_PIXELS, decode_picture, encoded_size, nearest_depth
+from avlmaps.recordings.images import MOST_PIXELS, decode_picture, decode_rvl_depth, encoded_size, nearest_depth
 
 # Encodings of colour: bits and channels of a pixel, then the order of red, green and blue, or the conversion of OpenCV.
 _COLOUR_ENCODINGS: dict[str, tuple[int, int, tuple[int, int, int] | str]] = {
@@ -157,7 +158,10 @@ def _decompressed_depth(message: Any, name: str, camera: Pinhole | None) -> Floa
     raw = np.asarray(message.data, np.uint8)
     inside = raw[12:] if "compressedDepth" in message.format else raw
     if "rvl" in message.format.lower():
-        picture = _rvl(inside.tobytes(), name, camera)
+        picture = decode_rvl_depth(Path(name), inside.tobytes(), 8)
+        if camera is not None and picture.shape != (camera.height, camera.width):
+            size = f"{picture.shape[1]}x{picture.shape[0]}"
+            raise RecordingError(f"The depth {name} says that it is {size}; its calibration says otherwise.")
     else:
         picture = _decoded(inside, name, camera, colour=False)
     if picture.ndim != 2 or picture.dtype != np.uint16:
@@ -168,19 +172,6 @@ def _decompressed_depth(message: Any, name: str, camera: Pinhole | None) -> Floa
     inverse = picture.astype(np.float32)
     valid = inverse > 0
     return np.where(valid, a / np.where(valid, inverse - b, 1.0), 0.0).astype(np.float32)
-
-
-def _rvl(content: bytes, name: str, camera: Pinhole | None) -> np.ndarray:
-    from avlmaps.core.rvl import decode_rvl
-
-    width, height = struct.unpack_from("<ii", content) if len(content) >= 8 else (0, 0)
-    expected = (width, height) if camera is None else (camera.width, camera.height)
-    if (width, height) != expected or not 0 < width * height <= MOST_PIXELS:
-        raise RecordingError(f"The depth {name} says that it is {width}x{height}; its calibration says otherwise.")
-    try:
-        return decode_rvl(content[8:], width, height)
-    except ValueError as error:
-        raise RecordingError(f"The depth {name} cannot be decoded ({error}); it is cut short or damaged.") from None
 
 
 def is_rectified(topic: str) -> bool:

@@ -111,24 +111,6 @@ class TransformTree:
         )
         return (*broken, *several)
 
-    def seldom(self, frame: str, stamps_s: Float[np.ndarray, " k"]) -> tuple[str, ...]:
-        """Return a sentence for each transform above a frame that was bridged or held at some of the stamps."""
-        carrier = self._carrier(frame)
-        told: list[str] = []
-        for name in self._chain(frame):
-            edge = self._edge(name)
-            if name == carrier or edge.constant:
-                continue
-            trajectory = edge.trajectory()
-            lenient = trajectory.covers(stamps_s, HOLD_S, 2.0 * HOLD_S) & ~trajectory.covers(stamps_s)
-            if lenient.any():
-                told.append(
-                    f"The transform from {name!r} to {edge.parent!r} came {len(trajectory.stamps_s)} times; between "
-                    f"them it is interpolated, and before the first and after the last held for up to {HOLD_S:g} s "
-                    f"(for {lenient.sum()} frames)."
-                )
-        return tuple(told)
-
     def cycle(self, frame: str) -> str:
         """Return the frames that go round in a circle above a frame, in words, or nothing."""
         chain = self._chain(frame)

@@ -133,7 +133,7 @@ class RosbagRecording(Recording):
         if walk.fault:
             raise RecordingError(f"{path}: {walk.fault}")
         rows = rows[walk.index]
-        notices += [*motion.notices, *tree.notices, *tree.seldom(camera_frame, stamps_s), *walk.notices]
+        notices += [*motion.notices, *tree.notices, *walk.notices]
         if self._of_points:
             self._camera_from_cloud = self._camera_from_cloud[rows]
         self.begins_s = float(stamps_s[rows[0]])

@@ -24,7 +24,6 @@ from jaxtyping import Float, Float32, UInt8
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import SAMPLED_BYTES, checked_size
-from avlmaps.core.rvl import decode_rvl
 from avlmaps.recordings import images
 from avlmaps.recordings.faults import Report, readable, stop_at_first
 from avlmaps.recordings.formats.file_recording import Shots, StoredRecording, left_out, settle
@@ -108,7 +107,7 @@ class _Pictures:
 
 def _unpacked_depth(place: Path, content: bytes) -> Float32[np.ndarray, "h w"]:
     if content.startswith(_RVL):
-        return _rvl(place, content).astype(np.float32) / np.float32(1000.0)
+        return images.metres(images.decode_rvl_depth(place, content, 16), 1000.0)
     import cv2
 
     images.check_whole(place, content)
@@ -119,18 +118,6 @@ def _unpacked_depth(place: Path, content: bytes) -> Float32[np.ndarray, "h w"]:
     if raw is not None and raw.dtype == np.uint8 and raw.ndim == 3 and raw.shape[2] == 4:
         return images.metres(np.ascontiguousarray(raw).view("<f4")[..., 0], 1.0)
     raise RecordingError(f"{place} is no depth picture (it may be the right picture of a stereo camera).")
-
-
-def _rvl(place: Path, content: bytes) -> np.ndarray:
-    if len(content) < 16:
-        raise RecordingError(f"{place} is cut off ({len(content)} bytes).")
-    width, height = struct.unpack_from("<II", content, 8)
-    if not 0 < width * height <= images.MOST_PIXELS:
-        raise RecordingError(f"{place} says that it is {width}x{height}, which no depth picture is.")
-    try:
-        return decode_rvl(content[16:], width, height)
-    except ValueError as error:
-        raise RecordingError(f"{place} is cut off or damaged: {error}.") from None
 
 
 @dataclass(frozen=True, slots=True)
