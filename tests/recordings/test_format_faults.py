@@ -16,7 +16,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.conformance import Truth, check, example_truth
 from avlmaps.recordings.open import open_recording
 from helpers.bag_writers import BAGS, split_ros1
-from helpers.format_writers import HALF_TURN, WRITTEN, numbers, write_icl_nuim, write_nerfstudio
+from helpers.format_writers import HALF_TURN, WRITTEN, write_nerfstudio
 
 
 def _edit(name: str, change: Callable[[dict[str, Any]], Any]) -> Callable[[Path], Any]:
@@ -30,6 +30,18 @@ def _edit(name: str, change: Callable[[dict[str, Any]], Any]) -> Callable[[Path]
 
 def _replace(name: str, old: str, new: str) -> Callable[[Path], Any]:
     return lambda path: (path / name).write_text((path / name).read_text().replace(old, new)) and None
+
+
+def _text(pattern: str, content: str | None) -> Callable[[Path], Any]:
+    """Return what writes the first file of a pattern anew, or removes it."""
+
+    def run(path: Path) -> None:
+        file = sorted(path.glob(pattern))[0]
+        file.unlink()
+        if content is not None:
+            file.write_text(content)
+
+    return run
 
 
 def _sql(*words: Any) -> Callable[[Path], Any]:
@@ -71,6 +83,13 @@ def _calibration(change: Callable[[bytes], bytes]) -> Callable[[Path], Any]:
         ("icl-nuim", lambda path: (path / "livingRoom0.gt.freiburg").unlink(), "has no poses"),
         ("scannet", lambda path: np.savetxt(path / "intrinsic/intrinsic_color.txt", np.diag([900.0, 900, 1, 1])),
          "were they resized or cropped? Give the intrinsics of these pictures"),
+        ("7scenes", _text("*.pose.txt", "1 0 0"), "holds 3 numbers where 4x4 belong; fix the file."),
+        ("7scenes", _text("camera-intrinsics.txt", "0 0 0\n" * 3), "camera-intrinsics.txt holds no camera"),
+        ("tum", _text("rgb.txt", "1.0 a.png\nnonsense\n"), "line 2: 'nonsense' is not a stamp and a file"),
+        ("tum", _text("groundtruth.txt", "1 2 3\n"), "line 1: there are 3 numbers where 8 belong; fix the line."),
+        ("tum", _text("groundtruth.txt", None), "groundtruth.txt is missing; the recording needs it."),
+        ("replica", _text("traj.txt", ""), "colour pictures, 6 depth pictures and 0 poses"),
+        ("scannet", _text("intrinsic/intrinsic_depth.txt", None), "intrinsic_depth.txt is missing"),
         ("rtabmap", _calibration(lambda blob: blob[:12] + struct.pack("<i", 1) + blob[16:]), "with a stereo camera"),
         ("rtabmap", _calibration(lambda blob: blob * 2), "has several cameras a node, side by side"),
         ("rtabmap", _sql("DROP TABLE Node"), "without RTAB-Map's table Node"),
@@ -103,19 +122,6 @@ def test_scaled_positions_metres_and_intrinsics_of_each_frame_are_read(tmp_path:
     _edit("transforms.json", change)(path)
     recording = check(lambda: open_recording(path), truth, stamps=False)
     assert any("scaled by 0.5; they are scaled back to metres" in notice for notice in recording.notices)
-
-
-def test_icl_nuims_matrices_are_read_as_well(tmp_path: Path) -> None:
-    truth = WRITTEN["icl-nuim"].truth()
-    path = write_icl_nuim(tmp_path / "walk", truth)
-    mirror, y_down = np.diag([1.0, -1, 1, 1]), np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-    (path / "livingRoom0.gt.freiburg").unlink()
-    lines = [numbers(row) for pose in truth.world_from_camera for row in (mirror @ y_down @ pose @ mirror)[:3]]
-    (path / "livingRoom0n.gt.sim").write_text("\n".join(lines) + "\n")
-    check(lambda: open_recording(path), truth)
-    (path / "livingRoom0n.gt.sim").write_text("\n".join(lines[:-3]) + "\n")
-    with pytest.raises(RecordingError, match=r"has 15 lines, but 6 frames of associations.txt need three each"):
-        open_recording(path)
 
 
 def test_info_takes_the_files_of_a_split_bag_and_bags_of_two_kinds_are_refused(tmp_path: Path) -> None:

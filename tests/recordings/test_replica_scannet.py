@@ -1,7 +1,6 @@
 """Replica as NICE-SLAM lays it, and ScanNet as its tools extract it, in place."""
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from recording_scenes import CAMERA, save_depth, save_rgb, shot, shots
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.open import open_recording
 from avlmaps_sim.mixing.copying import write_recording
 
@@ -48,42 +46,6 @@ def test_without_parameters_replicas_own_camera_is_assumed_and_told(tmp_path: Pa
     recording = open_recording(_write_replica(tmp_path / "room0", None))
     assert recording.rig.rgb.resized(1200, 680) == Pinhole(600.0, 600.0, 600.0, 340.0, 1200, 680)
     assert "There is no cam_params.json; the camera of the published scenes is assumed." in recording.notices
-
-
-def test_replica_frames_beyond_the_trajectory_are_left_out_and_told(tmp_path: Path):
-    path = _write_replica(tmp_path / "room0", None)
-    (path / "traj.txt").write_text("\n".join((path / "traj.txt").read_text().splitlines()[:3]))
-    recording = open_recording(path)
-    assert len(recording) == 3
-    assert recording.notices[1] == "2 frame(s) lack one of colour, depth and pose and are left out."
-
-
-@pytest.mark.parametrize(
-    ("content", "sentence"),
-    [
-        ("{", "cam_params.json is not as it should be (Input data was truncated); fix the file."),
-        (
-            '{"camera": {"fx": 0, "fy": 1, "cx": 1, "cy": 1}}',
-            "cam_params.json holds no camera: a camera needs finite numbers and positive focal",
-        ),
-        (
-            '{"camera": {"fx": 9, "fy": 9, "cx": 9, "cy": 9, "scale": 0}}',
-            "cam_params.json holds no camera: scale is 0.0; it must be positive; fix the file.",
-        ),
-    ],
-)
-def test_damaged_replica_parameters_are_named(tmp_path: Path, content: str, sentence: str):
-    path = _write_replica(tmp_path / "room0", None)
-    (path / "cam_params.json").write_text(content)
-    with pytest.raises(RecordingError, match=re.escape(sentence)):
-        open_recording(path)
-
-
-def test_a_replica_scene_without_poses_is_told(tmp_path: Path):
-    path = _write_replica(tmp_path / "room0", None)
-    (path / "traj.txt").write_text("")
-    with pytest.raises(RecordingError, match=r"room0 has 5 colour pictures, 5 depth pictures and 0 poses"):
-        open_recording(path)
 
 
 def _write_scannet(path: Path) -> Path:
@@ -126,18 +88,3 @@ def test_scannet_cameras_that_sit_apart_are_known_to(tmp_path: Path):
     offset[0, 3] = 0.04
     np.savetxt(path / "intrinsic/extrinsic_color.txt", offset)
     assert open_recording(path).rig.rgb_from_depth[0, 3] == pytest.approx(-0.04)
-
-
-def test_a_scannet_scene_without_intrinsics_is_told(tmp_path: Path):
-    path = _write_scannet(tmp_path / "scene")
-    (path / "intrinsic/intrinsic_depth.txt").unlink()
-    with pytest.raises(RecordingError, match=r"intrinsic_depth.txt is missing; the recording needs it."):
-        open_recording(path)
-
-
-def test_a_scannet_scene_without_a_whole_frame_is_told(tmp_path: Path):
-    path = _write_scannet(tmp_path / "scene")
-    for file in (path / "pose").iterdir():
-        file.unlink()
-    with pytest.raises(RecordingError, match=r"no frame with all of color/N.jpg, depth/N.png and pose/N.txt."):
-        open_recording(path)
