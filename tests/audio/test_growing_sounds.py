@@ -18,8 +18,7 @@ from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.types import HeardSounds
 from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.channels import ChannelSound, read_channels
-from avlmaps.recordings.growing_track import GAP_S, GrowingTrack
+from avlmaps.recordings.channels import GAP_S, ChannelSound, GrowingTrack, read_channels
 
 PLAIN = HearingSettings()
 

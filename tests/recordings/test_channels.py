@@ -15,12 +15,12 @@ from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import (
     ChannelSound,
+    GrowingTrack,
     channel_faults,
     read_channels,
     useless_channels,
     with_microphones,
 )
-from avlmaps.recordings.growing_track import GrowingTrack
 from avlmaps.recordings.microphones import Microphones, microphones_named
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame

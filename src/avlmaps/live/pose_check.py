@@ -11,6 +11,7 @@ from math import inf
 import numpy as np
 
 from avlmaps.core.poses import rotation_angle_rad
+from avlmaps.recordings.channels import LONGEST_GAP_S
 from avlmaps.recordings.consistency.agreement import (
     LEAST_AGREEING,
     can_be_judged,
@@ -19,7 +20,6 @@ from avlmaps.recordings.consistency.agreement import (
     without_occluded,
 )
 from avlmaps.recordings.consistency.sample import Surfaces, draw_pairs
-from avlmaps.recordings.growing_track import LONGEST_GAP_S
 from avlmaps.recordings.memory import MemoryRecording
 from avlmaps.recordings.plausible import pace_fault
 from avlmaps.recordings.types import Frame

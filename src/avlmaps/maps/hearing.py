@@ -26,9 +26,8 @@ from avlmaps.maps.store.folder import read
 from avlmaps.maps.types import HeardSounds, SourceEvidence, Voxels
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.channels import ChannelSound, level_faults
+from avlmaps.recordings.channels import LONGEST_GAP_S, ChannelSound, GrowingTrack, level_faults
 from avlmaps.recordings.directions import DirectionTrack
-from avlmaps.recordings.growing_track import LONGEST_GAP_S, GrowingTrack
 from avlmaps.recordings.microphones import Microphones
 from avlmaps.recordings.plausible import date_fault
 from avlmaps.recordings.types import Recording

@@ -28,7 +28,7 @@ from avlmaps.maps.audio.settings import HearingSettings, SoundChangeSettings
 from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.protocols import FrameSoundEncoder, SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
-from avlmaps.recordings.growing_track import GrowingTrack, RawTrack
+from avlmaps.recordings.channels import GrowingTrack, RawTrack
 
 _NEAR_M = 1e-4  # places nearer than this are one
 _EDGE_S = 0.05  # quiet is only what is this far from a sound
