@@ -146,7 +146,7 @@ class Robot:
 
     def get_pos(self, target: Target) -> Place:
         """Return the place of the thing that a phrase or a heatmap means; where several fit equally it asks which."""
-        return self.seeker.place_of_thing(self.seeker.best(target))
+        return self.seeker.place_of_thing(self.seeker.referent(target, self._here))
 
     def get_nearest_pos(self, target: Target) -> Place:
         """Return the place of the nearest thing that a phrase or a heatmap may mean; it means the same later."""

@@ -78,14 +78,13 @@ def known() -> KnownScene:
     voxels_seen = SimpleNamespace(index=index, hits=np.full(len(index), 9))
     keyframes = SimpleNamespace(world_from_camera=np.eye(4)[None])
     data = SimpleNamespace(grid=GRID, voxels=voxels_seen, keyframes=keyframes, up_in_world=up)
-    stored = SimpleNamespace(**vars(data), data=data, encoders=Encoders(), path=Path("home.avlmap"))
     events = tuple(
         HeardEvent(float(i), i + 1.0, name, "", (x, y, 1.3), (x, y, 1.3), -1) for i, (name, x, y) in enumerate(HEARD)
     )
     truth = Truth({}, events, scene.objects, scene.areas)
     pose = np.eye(4)
     pose[:3, 3] = (6.0, 4.0, 1.3)
-    asked = AVLMap(stored)  # pyright: ignore[reportArgumentType]
+    asked = AVLMap(data, Encoders(), path=Path("home.avlmap"))  # pyright: ignore[reportArgumentType]
     return KnownScene(asked, truth, voxels.label(index), "overlay", {"one.png": pose}, _nobody)
 
 
