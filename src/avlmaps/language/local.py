@@ -316,15 +316,14 @@ def _served(file: Path) -> Any:
     try:
         with file.open("rb") as opened:
             is_gguf = opened.read(4) == b"GGUF"
-        library: Any = import_module("xllamacpp")
     except OSError as fault:
         raise BackendError(f"The language model {file} cannot be read ({fault.strerror}); {_TAKES}") from fault
-    except ImportError as fault:
-        raise BackendError(
-            f"--llm FILE needs llama.cpp: {install_command('llm')}; a server's address does not."
-        ) from fault
     if not is_gguf:
         raise BackendError(f"{file} is no GGUF file; {_TAKES}")
+    try:
+        library: Any = import_module("xllamacpp")
+    except ImportError as fault:
+        raise BackendError(f"A GGUF file needs llama.cpp: {install_command('llm')}; or {_TAKES}") from fault
     states = cache_folder() / "llm"
     states.mkdir(parents=True, exist_ok=True)
     parameters = library.CommonParams()
@@ -376,9 +375,9 @@ class LocalTranslator(LearnedTranslator):
 
 def is_settled(read: Command) -> bool:
     """Return whether a reader needs no second opinion: it refuses, single words decide, or it is sure."""
-    if read.stops is None:
-        return sum(one.probability for one in read.readings if is_same(one.intents, read.intents)) >= _SURE
-    return read.why in ("danger", "gate", "words") or isinstance(read.stops, Refuse)
+    if read.why in ("danger", "gate", "words") or isinstance(read.stops, Refuse):
+        return True
+    return sum(one.probability for one in read.readings if is_same(one.intents, read.intents)) >= _SURE
 
 
 def both(read: Command, proposed: Weighed | None) -> Command:
