@@ -8,6 +8,7 @@ likeness of 0.87 at least; docs/recordings.md has the figures. `suspicions.py` l
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -55,8 +56,8 @@ class Evidence:
     after: Agreement
     apart: Agreement
 
-    @staticmethod
-    def of(recording: Recording) -> "Evidence":
+    @classmethod
+    def of(cls, recording: Recording) -> Self:
         """Draw a sample and compare its pairs.
 
         Raises:
@@ -70,7 +71,7 @@ class Evidence:
         after = compare(following, surfaces, sample.world_from_camera)
         apart = compare(distant, surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
         after, apart = without_occluded(after, following, surfaces), without_occluded(apart, distant, surfaces)
-        return Evidence(recording, sample, surfaces, after, apart)
+        return cls(recording, sample, surfaces, after, apart)
 
     @cached_property
     def median_m(self) -> float:

@@ -50,6 +50,8 @@ _MOST_THROUGH_PARTS, _SAME_PARTS = 0.06, 0.7
 
 @dataclass(eq=False)
 class _Closer(Evidence):
+    """Evidence with what the rows of this file alone measure, when it is asked for."""
+
     @cached_property
     def flats(self) -> Flats:
         return Flats.of(self.sample)
@@ -74,8 +76,7 @@ def examine_recording(recording: Recording) -> Verdict:
     Raises:
         RecordingError: there is no frame, or none of the sample can be read.
     """
-    found = Evidence.of(recording)
-    evidence = _Closer(found.recording, found.sample, found.surfaces, found.after, found.apart)
+    evidence = _Closer.of(recording)
     verdict = door_verdict(evidence)
     findings = [*verdict.findings, *findings_of(_SINGLE, evidence)]
     disagrees = evidence.contradicts or evidence.drifts or evidence.unlike is not None

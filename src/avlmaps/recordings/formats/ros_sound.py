@@ -291,9 +291,12 @@ def require_pace(topic: str, said: Pcm, lengths_s: Float[np.ndarray, " n"], time
     raise RecordingError(
         f"The sound of {topic} does not agree with itself: at {said.rate_hz} samples a second in {said.channels} "
         f"channel(s) its {len(times_s)} messages last {lasts_s:.1f} s, but they came within {came_s:.1f} s. "
-        f"{_fits(total)} Give a file instead ({option('audio', 'FILE')}), or leave it out "
-        f"({option('topics', 'audio=none')})."
+        f"{_fits(total)} {_otherwise()}"
     )
+
+
+def _otherwise() -> str:
+    return f"Give a file instead ({option('audio', 'FILE')}), or leave it out ({option('topics', 'audio=none')})."
 
 
 def _fits(total: float) -> str:
@@ -349,16 +352,14 @@ def _compressed(
         if len(times_s) >= _FEWEST_MESSAGES and came_s >= _SHORTEST_S and track.duration_s > _AGREES * came_s:
             raise RecordingError(
                 f"The sound of {sound.name} does not agree with itself: its {len(times_s)} messages came within "
-                f"{came_s:.1f} s, and as {suffix} they last {track.duration_s:.1f} s; give a file instead "
-                f"({option('audio', 'FILE')}), or leave it out ({option('topics', 'audio=none')})."
+                f"{came_s:.1f} s, and as {suffix} they last {track.duration_s:.1f} s. {_otherwise()}"
             )
         return track, notices
     if suffix != "mp3":  # other codings have a head that the later parts lack
         whole_s = float(interval_s[cuts - 1].sum())
         raise RecordingError(
             f"{len(cuts)} gap(s) in the sound of {sound.name} leave out {whole_s:.3g} s, and {suffix} cannot be cut "
-            f"there, so that the rest would sound too early; give one file instead ({option('audio', 'FILE')}), or "
-            f"leave it out ({option('topics', 'audio=none')})."
+            f"there, so that the rest would sound too early. {_otherwise()}"
         )
     tracks = [AudioTrack.open(part, start_s=float(times_s[at])) for part, at in zip(parts, begins, strict=True)]
     return _joined(tracks, sound.name, folder, notices)
@@ -388,8 +389,8 @@ def _coding_of(sound: SoundTopic, beginning: bytes, said: str, times_s: Float[np
     if said:
         if not (said.isalnum() and len(said) < 10):
             raise RecordingError(
-                f"The AudioInfo of {sound.name} says that the sound is coded as {said[:20]!r}, which is no coding; "
-                f"give a file ({option('audio', 'FILE')}) or leave it out ({option('topics', 'audio=none')})."
+                f"The AudioInfo of {sound.name} says that the sound is coded as {said[:20]!r}, which is no coding. "
+                f"{_otherwise()}"
             )
         return said
     for start, coding in _BEGINNINGS.items():
@@ -402,8 +403,8 @@ def _coding_of(sound: SoundTopic, beginning: bytes, said: str, times_s: Float[np
     total = size / 2 / (float(np.ptp(times_s)) + usual_s) if usual_s > 0.0 else 0.0
     raise RecordingError(
         f"The sound on {sound.name} has no AudioInfo and is not an MP3, FLAC, OGG or WAV stream; if it is plain 16-bit "
-        f"samples, say how many a second and in how many channels (audio_pcm=RATE,CHANNELS). {_fits(total)} Else give "
-        f"a file ({option('audio', 'FILE')}) or leave it out ({option('topics', 'audio=none')})."
+        f"samples, say how many a second and in how many channels (audio_pcm=RATE,CHANNELS). {_fits(total)} "
+        f"{_otherwise()}"
     )
 
 
