@@ -224,7 +224,7 @@ def test_two_likely_readings_are_a_question_with_choices(first: Any, second: Any
     limits = ReadingLimits(command=0.9, doubtful=0.9)
     answer = decided([Weighed(first, 0.4), Weighed(second, likely)], limits)
     assert isinstance(answer.intents[0], Clarify)
-    assert len(answer.intents[0].choices) in (1, 2)
+    assert 1 <= len(answer.intents[0].choices) <= 3
 
 
 @given(first=st.lists(names.map(Go), min_size=1, max_size=3).map(tuple), likely=st.floats(0.3, 0.5))

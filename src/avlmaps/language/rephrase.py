@@ -14,6 +14,7 @@ from importlib.resources import files
 
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
+from avlmaps.language.names import sounding_forms, third_forms
 from avlmaps.language.word_classes import listed, load_word_classes
 
 _TURNS = frozenset({
@@ -40,7 +41,29 @@ def rewritten(text: str, *, only_robot: bool = False) -> tuple[str, list[str]]:
         if found is not None:
             notes += [found.expand(note)] if note else []
             text = says.sub(to, text)
-    return text, notes
+    return text if only_robot else _sounding().sub(_whatever, text), notes
+
+
+@cache
+def _sounding() -> re.Pattern[str]:
+    """Return what finds a thing that has no name but its sound: "the thing that rings", "the beeping device"."""
+    nameless, generic = "|".join(listed("nameless")), "|".join(listed("nameless") | listed("generic"))
+    silent = listed("silent")
+    rings = "|".join(sorted(third_forms() - silent))
+    ringing = "|".join(sorted({ing for ing in sounding_forms().values() if ing not in silent}))
+    return re.compile(
+        rf"(?:(?:\b(?:the|an?|some|any) )?\b(?:{generic}) (?:that|which|who)|\bwhat(?:ever)?|\bwhoever) "
+        rf"(?P<rings>{rings})\b"
+        rf"|\b(?:the|an?|some|any) (?P<ringing>{ringing}) (?:{nameless})\b"
+        rf"|\b(?:the|an?|some|any) (?:{nameless}) (?:that|which) is (?P<rung>{ringing})\b",
+        re.IGNORECASE,
+    )
+
+
+def _whatever(found: re.Match[str]) -> str:
+    rings = found["rings"]
+    sound = sounding_forms()[rings.lower()] if rings else found["ringing"] or found["rung"]
+    return f"whatever is {sound}"
 
 
 @cache

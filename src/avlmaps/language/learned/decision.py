@@ -215,15 +215,16 @@ def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Decision:
     if alike >= (limits.doubtful if best.doubtful else limits.command):
         return Decision(best.intents, "read", best.notes)
     likely = (verbalise(one.intents) for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
-    return Decision((which(tuple(dict.fromkeys(likely))[:2]),), "unsure")
+    return Decision((which(tuple(dict.fromkeys(likely))[:3]),), "unsure")
 
 
 def which(choices: tuple[str, ...]) -> Clarify:
-    """Return the question which of up to two meanings is the right one."""
-    if len(choices) == 2:
-        return Clarify(f"This can mean two things. 1: {choices[0]} 2: {choices[1]} Which one?", choices)
+    """Return the question which of a few meanings is the right one, or none of them."""
+    if len(choices) > 1:
+        each = " ".join(f"{number}: {choice}" for number, choice in enumerate(choices, 1))
+        return Clarify(f"This can mean several things. {each} Which one, or none of these?", choices)
     if choices:
-        return Clarify(f"Is this what you mean? {choices[0]}", choices)
+        return Clarify(f"Is this what you mean? {choices[0]} If not, say it in other words.", choices)
     return Clarify("This is not clear. Can you say it in other words?")
 
 
