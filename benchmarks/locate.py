@@ -20,6 +20,7 @@ timing.use_one_thread()
 
 import cv2  # noqa: E402
 import numpy as np  # noqa: E402
+from avlmaps_sim.bench.harness.intervals import in_percent, wilson  # noqa: E402
 
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
 from avlmaps.core.columns import concat  # noqa: E402
@@ -29,7 +30,6 @@ from avlmaps.perception.encoders import Encoders  # noqa: E402
 from avlmaps.query.locate import LocateSettings, locate  # noqa: E402
 from avlmaps.recordings.open import open_recording  # noqa: E402
 from avlmaps.recordings.types import Recording, Subset  # noqa: E402
-from avlmaps_sim.bench.harness.intervals import in_percent, wilson  # noqa: E402
 from avlmaps_sim.bench.locate import MapOfPictures, map_of  # noqa: E402
 
 NEAR_M, NEAR_RAD = 0.25, np.deg2rad(10.0)
@@ -101,7 +101,7 @@ def row_of(method: str, what: str, answers: Sequence[tuple[str, float]], wanted:
     said = [answer for answer, _ in answers]
     hits = said.count(wanted)
     return {
-        "keypoints": method, "photos": what, "of": len(said), f"as they should": hits,
+        "keypoints": method, "photos": what, "of": len(said), "as they should": hits,
         "95 %": in_percent(wilson(hits, len(said))), "wrong": said.count("wrong"),
         "s a photo": float(np.median([took_s for _, took_s in answers])) if answers else 0.0,
     }  # fmt: skip

@@ -40,8 +40,7 @@ if TYPE_CHECKING:
     from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
     from avlmaps.navigate.bodies import BodyShape
     from avlmaps.navigate.skills import Robot
-    from avlmaps.perception.encoders import Encoders
-    from avlmaps.perception.profiles import Profile, profile
+    from avlmaps.perception.encoders import Encoders, profile
     from avlmaps.query.answer import Answer
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Room, SoundEvent, Thing
@@ -71,8 +70,7 @@ _HOMES = {
         "maps.settings": "BuildSettings FrameSettings FusionSettings",
         "navigate.bodies": "BodyShape",
         "navigate.skills": "Robot",
-        "perception.encoders": "Encoders",
-        "perception.profiles": "Profile profile",
+        "perception.encoders": "Encoders profile",
         "query.answer": "Answer",
         "query.avlmap": "AVLMap",
         "query.contents": "Room SoundEvent Thing",
@@ -119,7 +117,6 @@ __all__ = [
     "ObjectSettings",
     "Part",
     "Pinhole",
-    "Profile",
     "QueryError",
     "QuerySettings",
     "Question",

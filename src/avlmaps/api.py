@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from avlmaps.maps.settings import BuildSettings
     from avlmaps.maps.store.map_data import MapData
     from avlmaps.perception.encoders import Encoders
-    from avlmaps.perception.profiles import Profile
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.recordings.types import Recording
 
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 def build_map(
     recording: "Recording | str | Path",
     path: str | Path,
-    profile: "str | Profile" = "embedded",
+    profile: "str | Encoders" = "embedded",
     settings: "BuildSettings | None" = None,
     *,
     encoders: "Encoders | None" = None,

@@ -12,8 +12,16 @@ from avlmaps.cli.main import _models_in_force as models_in_force
 from avlmaps.cli.query import Query
 from avlmaps.core.extras import install_command
 from avlmaps.core.registry import Backend, Kind, find, forget_loaded
-from avlmaps.perception.models.published_models import availability, how_to_get, is_here, published_models
-from avlmaps.perception.models.settings import ModelSettings, from_environment, model_settings, using_models
+from avlmaps.perception.models import (
+    ModelSettings,
+    availability,
+    from_environment,
+    how_to_get,
+    is_here,
+    model_settings,
+    published_models,
+    using_models,
+)
 from helpers.light_files import write_light
 
 KNOWN = published_models()
@@ -58,7 +66,7 @@ def test_the_words_hold_while_the_verb_runs_and_for_processes_that_it_starts(
     monkeypatch.delenv("HF_HUB_OFFLINE", raising=False)
     with models_in_force(Query(map=Path("m"), models=empty, device="cpu", precision="float32")):
         assert model_settings() == ModelSettings(empty, "cpu", "float32", 7, False)
-        code = "from avlmaps.perception.models.settings import model_settings as s; print(s().folder, s().batch)"
+        code = "from avlmaps.perception.models import model_settings as s; print(s().folder, s().batch)"
         there = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
         assert there.split() == [str(empty), "7"]
     assert "AVLMAPS_MODELS" not in os.environ

@@ -14,7 +14,7 @@ from avlmaps.core.extras import MODELS, OTHERS, SIMULATOR, Distribution, how_to_
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.navigate import scenes
-from avlmaps.perception import profiles
+from avlmaps.perception import encoders as profiles
 from avlmaps_models import entries
 
 ROOT = Path(__file__).parents[2]

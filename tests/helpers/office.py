@@ -14,7 +14,7 @@ from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.reader import encoders_of_map
 from avlmaps.maps.types import Keyframes, Voxels
-from avlmaps.perception.embedded.closed_set import features_of
+from avlmaps.perception.embedded.pixels import features_of
 from avlmaps.recordings.open import open_recording
 from helpers.made_once import made_once
 from helpers.walked_room import write_walk

@@ -15,7 +15,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.keyframes.choose import KeyframeSettings
 from avlmaps.maps.settings import BuildSettings, FrameSettings
-from avlmaps.perception.profiles import Profile, register_profile
+from avlmaps.perception.encoders import Encoders, register_profile
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.types import Frame, Recording
@@ -155,5 +155,5 @@ def register_fakes() -> str:
     """Make the profile ``fake`` known; return its name."""
     for kind, maker in ((Kind.PIXELS, Pixels), (Kind.LOCAL, Corners), (Kind.PLACE, Places), (Kind.SOUNDS, Ears)):
         register(Backend(kind, "fake", f"{__name__}:{maker.__name__}"))
-    register_profile(Profile("fake", pixels="fake", local="fake", place="fake", sounds="fake"))
+    register_profile(Encoders("fake", pixels="fake", local="fake", place="fake", sounds="fake"))
     return "fake"

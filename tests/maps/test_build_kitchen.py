@@ -9,7 +9,7 @@ from avlmaps.maps.build import build_map
 from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.reader import describe
-from avlmaps.perception.profiles import Profile, register_profile
+from avlmaps.perception.encoders import Encoders, register_profile
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Subset
 
@@ -19,7 +19,7 @@ UP_IN_WORLD = np.array([0.0, -0.892, -0.452])
 
 @pytest.fixture(scope="module")
 def kitchen(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> MapData:
-    register_profile(Profile("seeing", pixels="colours", local="rootsift", place="vlad", matcher="mutual-ratio"))
+    register_profile(Encoders("seeing", pixels="colours", local="rootsift", place="vlad", matcher="mutual-ratio"))
     walk = Subset(open_recording(shared_data / "data" / "redkitchen"), range(0, 500, 50))
     path = tmp_path_factory.mktemp("maps") / "kitchen.avlmap"
     return build_map(walk, path, "seeing", BuildSettings(frames=FrameSettings(per_part=4)), progress=False)

@@ -18,16 +18,17 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.perception.cache.cached_encoders import (
+from avlmaps.perception.cache import (
+    CacheSettings,
+    FeatureStore,
     cache_note,
     cached,
+    key_of,
     with_cache,
 )
-from avlmaps.perception.cache.feature_store import CacheSettings, FeatureStore, key_of
 from avlmaps.perception.conformance import check
 from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.models.settings import ModelSettings, using_models
-from avlmaps.perception.profiles import Profile
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps.perception.protocols import (
     BatchPixelEncoder,
     FrameSoundEncoder,
@@ -100,15 +101,15 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "home"
 
 
-def counted(name: str, *needs: str) -> Profile:
+def counted(name: str, *needs: str) -> Encoders:
     """Return a profile of fakes that count; ``torch`` among the needs passes them off as large models."""
     for kind, maker in MAKERS.items():
         register(Backend(kind, name, f"{__name__}:{maker.__name__}", needs=needs))
-    return Profile(name, **{kind.value: name for kind in MAKERS})
+    return Encoders(name, **{kind.value: name for kind in MAKERS})
 
 
 @pytest.fixture
-def torch_like(monkeypatch: pytest.MonkeyPatch) -> Profile:
+def torch_like(monkeypatch: pytest.MonkeyPatch) -> Encoders:
     monkeypatch.setattr(Backend, "missing", property(lambda self: ()))
     return counted("counted-torch", "torch")
 
@@ -165,7 +166,7 @@ def test_what_was_used_longest_ago_goes_first(tmp_path: Path) -> None:
     later = FeatureStore(tmp_path, 5.5 * size)
     later._opened_s -= 10.0
     assert later.get(Kind.PIXELS, CARD, "old2") is not None  # the oldest, but used now
-    import avlmaps.perception.cache.feature_store as module
+    import avlmaps.perception.cache as module
 
     share, module._LARGEST_SHARE = module._LARGEST_SHARE, 1.0
     try:
@@ -300,7 +301,7 @@ def test_keypoints_come_back_as_they_were(tmp_path: Path, size: tuple[int, int],
     assert COUNTS["local"] == 1
     for told in (first, second):
         assert told.size == size
-        for name in ("xy", "descriptors", "scale", "score"):
+        for name in ("xy", "descriptors", "score"):
             assert np.array_equal(getattr(told, name), getattr(local, name)), name
             assert getattr(told, name).shape == getattr(local, name).shape
 
@@ -340,7 +341,7 @@ def test_an_encoder_of_steps_stays_one(tmp_path: Path) -> None:
 
 
 def test_a_second_build_with_another_voxel_size_encodes_nothing(
-    torch_like: Profile, tmp_path: Path, home: Path
+    torch_like: Encoders, tmp_path: Path, home: Path
 ) -> None:
     walk = Walk(audio=write_beeps(tmp_path / "beeps.flac"))
     build_map(walk, tmp_path / "a", torch_like, SETTINGS)
@@ -353,7 +354,7 @@ def test_a_second_build_with_another_voxel_size_encodes_nothing(
 
 
 @pytest.mark.slow
-def test_a_map_is_the_same_with_the_cache_and_without(torch_like: Profile, tmp_path: Path) -> None:
+def test_a_map_is_the_same_with_the_cache_and_without(torch_like: Encoders, tmp_path: Path) -> None:
     for name, cache in (
         ("none", CacheSettings("off")),
         ("filling", CacheSettings(tmp_path / "store")),
@@ -375,7 +376,7 @@ def test_the_same_holds_for_small_models_whose_features_are_not_rounded(tmp_path
     assert array_files(tmp_path / "none") == array_files(tmp_path / "filling") == array_files(tmp_path / "filled")
 
 
-def test_the_keys_of_builds_do_not_know_of_the_cache(torch_like: Profile, tmp_path: Path) -> None:
+def test_the_keys_of_builds_do_not_know_of_the_cache(torch_like: Encoders, tmp_path: Path) -> None:
     infos = [
         build_map(Walk(), tmp_path / str(i), torch_like, SETTINGS, cache=cache).info
         for i, cache in enumerate((CacheSettings("off"), CacheSettings()))
@@ -384,7 +385,7 @@ def test_the_keys_of_builds_do_not_know_of_the_cache(torch_like: Profile, tmp_pa
 
 
 def test_the_bar_says_how_many_came_from_the_cache(
-    torch_like: Profile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    torch_like: Encoders, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     build_map(Walk(), tmp_path / "a", torch_like, SETTINGS)
     capsys.readouterr()
@@ -399,7 +400,7 @@ def test_the_embedded_profile_is_left_as_it_is() -> None:
 
 
 @pytest.mark.nightly
-def test_a_stopped_build_goes_on_from_the_cache(torch_like: Profile, tmp_path: Path) -> None:
+def test_a_stopped_build_goes_on_from_the_cache(torch_like: Encoders, tmp_path: Path) -> None:
     class Stopping(Walk):
         def frame(self, index: int) -> Frame:
             if index == 15 and COUNTS.get("pixels", 0) >= 12:

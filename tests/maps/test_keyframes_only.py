@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map, encode_frames
 from avlmaps.maps.keyframes.choose import select_keyframes
-from avlmaps.perception.cache.feature_store import CacheSettings
+from avlmaps.perception.cache import CacheSettings
 from avlmaps.perception.encoders import Encoders
 
 register_fakes()

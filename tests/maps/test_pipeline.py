@@ -16,7 +16,7 @@ from avlmaps.core.machine import run_ahead
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map, encode_frames
 from avlmaps.maps.store.manifest import BadFrame
-from avlmaps.perception.profiles import Profile, profile
+from avlmaps.perception.encoders import Encoders, profile
 from avlmaps.recordings.types import Frame
 
 PROFILE = register_fakes()
@@ -74,7 +74,7 @@ def test_without_an_encoder_frames_come_alone() -> None:
 
 def test_batches_and_single_frames_make_the_same_map(tmp_path: Path) -> None:
     register(Backend(Kind.PIXELS, "fake-batches", f"{__name__}:InBatches"))
-    used = Profile("fake-batches", pixels="fake-batches", local="fake", place="fake", sounds="fake")
+    used = Encoders("fake-batches", pixels="fake-batches", local="fake", place="fake", sounds="fake")
     one = build_map(Walk(bad=(5,)), tmp_path / "one", PROFILE, SETTINGS)
     other = build_map(Walk(bad=(5,)), tmp_path / "other", used, SETTINGS)
     for name in ("index", "feature", "colour", "hits", "weight"):
@@ -168,7 +168,7 @@ def test_what_an_encoder_raises_ends_the_build_with_its_sentence(tmp_path: Path)
 
 
 def test_a_profile_of_ones_own_is_itself_and_nobody_elses() -> None:
-    own = Profile("of-my-own", pixels="fake")
+    own = Encoders("of-my-own", pixels="fake")
     assert profile(own) is own
     with pytest.raises(BackendError, match="no profile called 'of-my-own'"):
         profile("of-my-own")

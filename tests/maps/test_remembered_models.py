@@ -15,9 +15,8 @@ from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.registry import Backend, Kind, forget_loaded, register
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store.manifest import ModelInfo
-from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.models.published_models import public_choice, public_name
-from avlmaps.perception.profiles import Profile, profile, register_profile
+from avlmaps.perception.encoders import Encoders, profile, register_profile
+from avlmaps.perception.models import public_choice, public_name
 from avlmaps.query.avlmap import AVLMap
 
 PROFILE = register_fakes()
@@ -49,7 +48,7 @@ def _chosen() -> None:
     forget_loaded()
 
 
-def used_with(choice: str) -> Profile:
+def used_with(choice: str) -> Encoders:
     return profile(PROFILE).choosing({Kind.PIXELS: choice})
 
 
@@ -71,10 +70,15 @@ def test_the_default_model_is_remembered_by_name_so_that_it_may_change(tmp_path:
     stored.require_model(Kind.PIXELS)
 
 
+def changing(pixels: str, views: str = "") -> Encoders:
+    others = {kind.value: profile(PROFILE).name_of(kind) for kind in profile(PROFILE)}
+    return Encoders("changing", **others | {"pixels": pixels, "views": views})
+
+
 def test_a_profile_may_come_to_hold_other_backends(tmp_path: Path) -> None:
-    register_profile(replace(profile(PROFILE), name="changing", pixels="chosen@org/a"))
+    register_profile(changing("chosen@org/a"))
     build_map(Walk(), tmp_path / "map", "changing", SETTINGS)
-    register_profile(replace(profile("changing"), pixels="chosen@org/b", views="none-such"))
+    register_profile(changing("chosen@org/b", "none-such"))
     stored = AVLMap.open(tmp_path / "map")
     assert stored.encoders.name_of(Kind.PIXELS) == "chosen@org/a"
     assert Kind.VIEWS not in stored.encoders, "a module that the map has no features of is not asked"
@@ -142,11 +146,11 @@ def test_a_path_is_called_by_its_last_name() -> None:
 
 def test_other_keypoints_bring_the_matcher_that_was_made_for_them() -> None:
     foundation, paper = profile("foundation"), profile("paper")
-    assert foundation.choosing({Kind.LOCAL: "aliked@aliked-n32"}).matcher == "lightglue-aliked"
-    assert foundation.choosing({Kind.LOCAL: "rootsift"}).matcher == "mutual-ratio"
-    assert paper.choosing({Kind.LOCAL: "disk"}).matcher == "lightglue-disk"
-    assert paper.choosing({Kind.LOCAL: "disk", Kind.MATCHER: "mutual-ratio"}).matcher == "mutual-ratio"
-    assert paper.choosing({Kind.PIXELS: "tipsv2"}).matcher == "superglue"
+    assert foundation.choosing({Kind.LOCAL: "aliked@aliked-n32"}).name_of(Kind.MATCHER) == "lightglue-aliked"
+    assert foundation.choosing({Kind.LOCAL: "rootsift"}).name_of(Kind.MATCHER) == "mutual-ratio"
+    assert paper.choosing({Kind.LOCAL: "disk"}).name_of(Kind.MATCHER) == "lightglue-disk"
+    assert paper.choosing({Kind.LOCAL: "disk", Kind.MATCHER: "mutual-ratio"}).name_of(Kind.MATCHER) == "mutual-ratio"
+    assert paper.choosing({Kind.PIXELS: "tipsv2"}).name_of(Kind.MATCHER) == "superglue"
 
 
 def test_an_unknown_choice_is_told_before_anything_is_built() -> None:

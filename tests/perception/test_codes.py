@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.perception.embedded.closed_set import features_of, orthonormal_codes
+from avlmaps.perception.embedded.pixels import features_of, orthonormal_codes
 from avlmaps.perception.embedded.words import EmbeddedWords, Meanings
 
 NAMES = ("sofa", "dining table", "coffee table", "toilet")

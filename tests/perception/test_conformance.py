@@ -7,7 +7,7 @@ import pytest
 
 from avlmaps.core.registry import Backend, Kind, backends, load
 from avlmaps.perception.conformance import NonConformanceError, check
-from avlmaps.perception.models.published_models import availability
+from avlmaps.perception.models import availability
 
 OURS = [backend for backend in backends() if backend.target.startswith("avlmaps.")]
 

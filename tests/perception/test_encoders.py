@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 import avlmaps
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
-from avlmaps.perception.encoders import Encoders, encoders_of
-from avlmaps.perception.profiles import MODULES, Profile, profile, profiles
+from avlmaps.perception.encoders import MODULES, Encoders, encoders_of, profile, profiles
 from avlmaps.perception.protocols import PixelEncoder
 from helpers.walked_room import write_walk
 
@@ -39,7 +38,7 @@ class Words:
 def test_a_profile_by_name_has_its_encoders_and_loads_none(name: str) -> None:
     used = Encoders.named(name)
     assert used.name == name and used == encoders_of(profile(name))
-    assert {kind: used.name_of(kind) for kind in MODULES} == {k: profile(name).backend_name(k) for k in MODULES}
+    assert {kind: used.name_of(kind) for kind in MODULES} == {k: profile(name).name_of(k) for k in MODULES}
     assert used.weight_variance_m2 == profile(name).weight_variance_m2
 
 
@@ -62,8 +61,8 @@ def test_an_object_needs_no_registry_and_brings_a_vocabulary_and_a_card() -> Non
 
 
 def test_a_profile_takes_an_object_too() -> None:
-    assert Encoders.named(Profile("mine", pixels=Words())).pixels.card.id == "Words"
-    assert Profile("mine", pixels=Words()).backend_name(Kind.PIXELS) == "given:Words"
+    assert Encoders.named(Encoders("mine", pixels=Words())).pixels.card.id == "Words"
+    assert Encoders("mine", pixels=Words()).name_of(Kind.PIXELS) == "given:Words"
 
 
 @given(st.floats(0.1, 9.0), st.floats(0.1, 9.0))

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.perception.embedded.geometry import channels, level_axes
+from avlmaps.perception.embedded.scene_network import channels, level_axes
 
 CAMERA = Pinhole(100.0, 100.0, 80.0, 60.0, 160, 120)
 LEVEL = np.array([0.0, -1.0, 0.0])

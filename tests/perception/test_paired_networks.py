@@ -10,17 +10,19 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.perception.embedded.closed_set import features_of
-from avlmaps.perception.embedded.paired_networks import (
+from avlmaps.perception.embedded.pixels import EmbeddedPixels, EmbeddedViews, features_of, synthetic_pixels
+from avlmaps.perception.embedded.scene_network import (
     NO_SAY,
     SAME_SAY,
+    SYNTHETIC_WEIGHTS,
     PairedNetworks,
+    SceneNetwork,
+    Seen,
+    load_network,
     load_pair,
     mixed,
     share_of_second,
 )
-from avlmaps.perception.embedded.pixels import EmbeddedPixels, EmbeddedViews, synthetic_pixels
-from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, Seen, load_network
 from avlmaps.recordings.types import Frame, Ground
 
 ALL = np.ones((2, 3), bool)

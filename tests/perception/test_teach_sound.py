@@ -9,7 +9,7 @@ import soundfile
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.perception.embedded.sounds import EmbeddedSounds
 from avlmaps.perception.enrolment import enrolled_sounds, forget_sound, sounds_folder, teach_sound
-from avlmaps.perception.user_folder import user_folder
+from avlmaps.perception.models import user_folder
 from avlmaps.recordings.audio import AudioTrack, Sound
 
 RATE_HZ = 22_050

@@ -13,7 +13,6 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check
-from avlmaps.perception.embedded.paired_networks import load_pair
 from avlmaps.perception.embedded.pixels import open_trained, synthetic_pixels, trained_pixels, trained_views
 from avlmaps.perception.embedded.scene_network import (
     DEFAULT_WEIGHTS,
@@ -22,9 +21,10 @@ from avlmaps.perception.embedded.scene_network import (
     SceneNetwork,
     checksum_of,
     load_network,
+    load_pair,
 )
 from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps.recordings.types import Frame
 
 SHIPPED = Path(str(files("avlmaps.perception.embedded") / "weights"))

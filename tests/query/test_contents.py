@@ -17,8 +17,7 @@ from query_fakes import (
 )
 
 from avlmaps.core.errors import QueryError
-from avlmaps.perception.embedded.closed_set import features_of
-from avlmaps.perception.embedded.pixels import EmbeddedPixels
+from avlmaps.perception.embedded.pixels import EmbeddedPixels, features_of
 from avlmaps.query.avlmap import AVLMap
 
 

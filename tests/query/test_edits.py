@@ -43,7 +43,7 @@ from avlmaps.maps.store.edits import (
     read_edits,
     write_edits,
 )
-from avlmaps.perception.embedded.closed_set import features_of
+from avlmaps.perception.embedded.pixels import features_of
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.edits import means, said
 from avlmaps.query.factors import NearAnchors

@@ -503,12 +503,9 @@ def test_an_encoder_that_is_interrupted_costs_no_frame_that_waits() -> None:
                 raise KeyboardInterrupt
             return super().encode(frame)
 
-    class OfTheFloor(Interrupted):
-        reads_ground = True  # so that frames wait for the floor
-
     truth = example_truth(frames=10)
     few = avlmaps.BuildSettings(voxel_size_m=0.1, gravity=GravitySettings(frames=8))
-    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders(pixels=OfTheFloor()), settings=few)
+    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders(pixels=Interrupted()), settings=few)
     for index in range(7):
         live.add(truth.rgb[index], truth.depth_m[index], truth.rig.rgb, truth.world_from_camera[index])
     with pytest.raises(KeyboardInterrupt):

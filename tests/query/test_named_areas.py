@@ -9,7 +9,7 @@ from query_fakes import keyframes_at
 
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
-from avlmaps.perception.embedded.closed_set import features_of, orthonormal_codes
+from avlmaps.perception.embedded.pixels import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedViewEncoder
 from avlmaps.query.modalities.area import area_factor, area_scores, pool_posteriors
 from avlmaps.query.settings import AreaSettings, HeatSettings

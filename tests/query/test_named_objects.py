@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
-from avlmaps.perception.embedded.closed_set import features_of, orthonormal_codes
+from avlmaps.perception.embedded.pixels import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
 from avlmaps.query import words
 from avlmaps.query.factors import NearAnchors

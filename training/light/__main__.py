@@ -11,7 +11,7 @@ import tyro
 from training.light.export import export_pictures, export_sounds, write_manifest, write_words
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps_models.light.bundle import MODEL
 
 

@@ -17,7 +17,7 @@ from training.light.towers import PictureTower, PictureWords, SoundTower, SoundW
 
 from avlmaps.core.files import sha256_of_file
 from avlmaps.core.lexicon import EntryKind, lexicon
-from avlmaps.perception.models.published_models import public_name
+from avlmaps.perception.models import public_name
 from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.pretrained import load_helper, load_pretrained, pretrained_folder
 from avlmaps_models.common.prompts import AREA_PROMPTS, TIPS_PROMPTS, clean, mean_direction

@@ -28,8 +28,8 @@ from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.perception.embedded.pixels import LARGEST_LOG_AREA, SMALLEST_LOG_AREA, EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, InstanceNotes, Notes
-from avlmaps.perception.models.settings import model_settings, using_models
-from avlmaps.perception.profiles import profile
+from avlmaps.perception.encoders import profile
+from avlmaps.perception.models import model_settings, using_models
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.instances import FeatureVoxels, confident_instances
 from avlmaps.query.settings import ObjectSettings

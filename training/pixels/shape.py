@@ -1,10 +1,10 @@
-"""The channels of ``perception/embedded/geometry.py`` for a whole batch, computed where the network is."""
+"""The channels of ``perception/embedded/scene_network.py`` for a whole batch, computed where the network is."""
 
 import torch
 from torch import Tensor
 from torch.nn import functional
 
-from avlmaps.perception.embedded.geometry import CHANNELS
+from avlmaps.perception.embedded.scene_network import CHANNELS
 
 _LARGEST_STEP, _REACH_PX = 0.06, 3  # as in the running system's loop
 

@@ -6,7 +6,7 @@ from training.pixels.batches import Frames
 from training.pixels.network import MULTIPLE
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.perception.embedded.geometry import channels
+from avlmaps.perception.embedded.scene_network import channels
 
 # Larger than things are in most windows of the training: of several sizes the one that held-out frames like best.
 WIDTH, HEIGHT = 160, 120

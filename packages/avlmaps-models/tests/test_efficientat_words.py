@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps_models.light.efficientat import (
     BANDS,
     FFT_SAMPLES,

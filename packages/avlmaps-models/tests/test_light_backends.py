@@ -14,8 +14,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, find, forget_loaded, load
 from avlmaps.perception.conformance import check, example_frame, example_sound
 from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.models.published_models import availability
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, availability, using_models
 from avlmaps_models.light import bundle as files
 from avlmaps_models.light.pixels import LightPixels
 from avlmaps_models.light.sounds import LightSounds, log_mel

@@ -12,8 +12,7 @@ import pytest
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, find, forget_loaded, load
 from avlmaps.perception.conformance import example_frame
-from avlmaps.perception.models.published_models import availability
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, availability, using_models
 from avlmaps_models.light import bundle as files
 from avlmaps_models.light import fetch
 from avlmaps_models.light.fetch import fetch_light

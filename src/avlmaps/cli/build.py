@@ -114,7 +114,7 @@ def build(verb: "Build") -> dict[str, Any]:
     from avlmaps.maps.build import build_map
     from avlmaps.maps.cluster import ClusterWorkers
     from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
-    from avlmaps.perception.cache.feature_store import CacheSettings
+    from avlmaps.perception.cache import CacheSettings
     from avlmaps.query.avlmap import AVLMap, with_findings
     from avlmaps.query.settings import build_settings
 

@@ -245,7 +245,7 @@ def _models_in_force(verb: object) -> Iterator[None]:
     if not given:
         yield
         return
-    from avlmaps.perception.models.settings import environment_of, model_settings, using_models
+    from avlmaps.perception.models import environment_of, model_settings, using_models
 
     if "folder" in given:
         given["folder"] = given["folder"].absolute()

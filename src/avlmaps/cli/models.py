@@ -86,8 +86,8 @@ class Profiles(ModelVerb):
 def list_profiles() -> dict[str, Any]:
     """Return every profile's backends, and every other backend that is known."""
     from avlmaps.core.registry import Kind, backends
-    from avlmaps.perception.models.published_models import availability
-    from avlmaps.perception.profiles import profiles
+    from avlmaps.perception.encoders import profiles
+    from avlmaps.perception.models import availability
 
     known = {(backend.kind, backend.name): backend for backend in backends()}
 
@@ -105,7 +105,7 @@ def list_profiles() -> dict[str, Any]:
         {
             "name": profile.name,
             "about": profile.about,
-            "backends": [state_of(kind, profile.backend_name(kind)) for kind in Kind if kind is not Kind.WORDS],
+            "backends": [state_of(kind, profile.name_of(kind)) for kind in Kind if kind is not Kind.WORDS],
         }
         for profile in profiles()
     ]
@@ -126,7 +126,7 @@ def check_backends(names: Sequence[str]) -> list[dict[str, str]]:
     from avlmaps.core.errors import NonConformanceError
     from avlmaps.core.registry import backends, load
     from avlmaps.perception.conformance import check
-    from avlmaps.perception.models.published_models import availability
+    from avlmaps.perception.models import availability
 
     known = backends()
     chosen = [one for one in known if {one.name, f"{one.kind}:{one.name}"} & set(names)]

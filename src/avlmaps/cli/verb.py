@@ -213,8 +213,7 @@ class Building(ModelVerb):
         Raises:
             UsageError: the words of --model do not say any.
         """
-        from avlmaps.perception.encoders import encoders_of
-        from avlmaps.perception.profiles import profile, read_choices
+        from avlmaps.perception.encoders import encoders_of, profile, read_choices
 
         try:
             choices = read_choices([word for words in self.model for word in words])

@@ -26,7 +26,7 @@ from avlmaps.maps.cluster import (
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.folder import MANIFEST
 from avlmaps.maps.store.tables import explain_write_errors
-from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
+from avlmaps.perception.cache import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query.avlmap import AVLMap, with_findings
 

@@ -19,7 +19,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.language.lexer import tokenise
 from avlmaps.language.rephrase import rewritten
 from avlmaps.perception.embedded.words import WordPieces
-from avlmaps.perception.models.networks import open_network
+from avlmaps.perception.networks import open_network
 
 _ORDER = "order"
 _UNSURE = "Is this an order, to me, now?"

@@ -36,7 +36,7 @@ from avlmaps.language.names import is_known
 from avlmaps.language.program.vocabulary import SKILLS, Skill, ValueType
 from avlmaps.language.sentence import Attachments, Sentence, stand_ins
 from avlmaps.language.verbalise import verbalise
-from avlmaps.perception.user_folder import cache_folder
+from avlmaps.perception.models import cache_folder
 
 _ALWAYS, _NEAREST = 6, 4  # examples: the first ones, whose state is kept, and the nearest ones
 _SURE = 0.9  # the probability from which on the reader needs no second opinion

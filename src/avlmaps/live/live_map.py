@@ -35,7 +35,6 @@ from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.tables import lock_folder
 from avlmaps.perception.encoders import Encoders, encoders_of
-from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, with_findings
 from avlmaps.query.settings import QuerySettings
 from avlmaps.query.voxel_map import IN_MEMORY, direction, require_kinds
@@ -75,7 +74,7 @@ class LiveMap:
     def __init__(
         self,
         path: str | Path,
-        encoders: "Encoders | Profile | str | None" = None,
+        encoders: "Encoders | str | None" = None,
         *,
         up_in_world: Any = None,
         settings: BuildSettings | None = None,

@@ -28,10 +28,8 @@ from avlmaps.maps.store.folder import MANIFEST, is_map_or_free, read, write
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.maps.store.map_data import Finds, MapData, find_nothing
 from avlmaps.maps.store.tables import lock_folder
-from avlmaps.perception.cache.cached_encoders import cache_note, with_cache
-from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
+from avlmaps.perception.cache import DEFAULT_CACHE, CacheSettings, cache_note, with_cache
 from avlmaps.perception.encoders import Encoders, encoders_of
-from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import BatchPixelEncoder, PixelEncoder
 from avlmaps.recordings.types import Frame, Recording
 
@@ -50,7 +48,7 @@ class Workers(Protocol):
 def build_map(
     recording: Recording,
     path: Path | str,
-    profile: str | Profile | Encoders = "embedded",
+    profile: str | Encoders = "embedded",
     settings: BuildSettings = DEFAULTS,
     *,
     cache: CacheSettings = DEFAULT_CACHE,

@@ -32,11 +32,9 @@ from avlmaps.maps.build import map_span, spans_of_frames
 from avlmaps.maps.estimate import Start
 from avlmaps.maps.plan import BuildPlan, Span, make_plan
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.perception.cache.cached_encoders import with_cache
-from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
-from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.models.settings import ModelSettings, model_settings, use_models
-from avlmaps.perception.profiles import GIVEN
+from avlmaps.perception.cache import DEFAULT_CACHE, CacheSettings, with_cache
+from avlmaps.perception.encoders import GIVEN, Encoders
+from avlmaps.perception.models import ModelSettings, model_settings, use_models
 from avlmaps.recordings.types import Recording
 
 J = TypeVar("J")

@@ -9,7 +9,7 @@ import numpy as np
 from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.numbers import unmasked
-from avlmaps.perception.cache.cached_encoders import encode_batch
+from avlmaps.perception.cache import encode_batch
 from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.types import Frame
 

@@ -148,7 +148,7 @@ def _example_local(encoder_dim: int, seed: int = 0, count: int = 40) -> protocol
     descriptors /= np.linalg.norm(descriptors, axis=1, keepdims=True)
     xy = rng.uniform(0, 64, (count, 2)).astype(np.float32)
     score = rng.uniform(0.1, 0.9, count).astype(np.float32)
-    return protocols.LocalFeatures(xy, descriptors, np.ones(count, np.float32), score, (64, 64))
+    return protocols.LocalFeatures(xy, descriptors, score, (64, 64))
 
 
 def _check_local_encoder(encoder: protocols.LocalEncoder) -> None:
@@ -174,9 +174,7 @@ def _check_place_encoder(encoder: protocols.PlaceEncoder) -> None:
     hold(all(_equal(state[key], again[key]) for key in state), "the same seed must learn the same")
     rows = np.stack([encoder.encode(rgb, features, state) for features in local])
     _check_rows(rows, 4, rows.shape[1], "place descriptors")
-    none = protocols.LocalFeatures(
-        np.zeros((0, 2), np.float32), np.zeros((0, dim), np.float32), np.zeros(0, np.float32)
-    )
+    none = protocols.LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, dim), np.float32))
     blank = encoder.encode(rgb, none, state)
     _check_rows(blank[None], 1, rows.shape[1], "the descriptor of a picture without keypoints", zero_allowed=True)
     hold(not (state and blank.any()), "what learns from keypoints must have descriptor zero where there are none")
@@ -202,9 +200,7 @@ def _check_matcher(matcher: protocols.Matcher) -> None:
 
 
 def _taken(local: protocols.LocalFeatures, rows: np.ndarray) -> protocols.LocalFeatures:
-    return replace(
-        local, xy=local.xy[rows], descriptors=local.descriptors[rows], scale=local.scale[rows], score=local.score[rows]
-    )
+    return replace(local, xy=local.xy[rows], descriptors=local.descriptors[rows], score=local.score[rows])
 
 
 def _check_pairs(pairs: np.ndarray, first: int, second: int) -> None:

@@ -1,15 +1,18 @@
-"""The models that perceive, one for each module: objects, or names of the registry.
+"""The models that perceive, one for each module, and the profiles that name a set of them.
 
-A name is resolved where encoders are made, and its model is loaded when it is first used: a map opens without it.
+An encoder is an object or a name of the registry. A name is resolved where the encoder is used: a map opens without its
+models. A map remembers the name of its profile and every model's card.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from avlmaps.core.errors import BackendError
-from avlmaps.core.registry import Backend, Kind, find, load
-from avlmaps.perception.profiles import GIVEN, MODULES, Profile, no_backend, profile
+from avlmaps.core.extras import how_to_get
+from avlmaps.core.registry import Backend, Kind, brought, entry_points, find, load
+from avlmaps.core.words import nearest
+from avlmaps.perception.own_encoder import completed, whole
 from avlmaps.perception.protocols import (
     PROTOCOLS,
     LocalEncoder,
@@ -21,9 +24,9 @@ from avlmaps.perception.protocols import (
     ViewEncoder,
 )
 
-if TYPE_CHECKING:
-    from avlmaps.perception.cache.feature_store import FeatureStore
-
+ENTRY_POINT_GROUP = "avlmaps.profiles"
+GIVEN = "given:"
+MODULES = tuple(kind for kind in Kind if kind is not Kind.WORDS)
 _OWN = "own"
 
 
@@ -34,83 +37,77 @@ class Source:
     Attributes:
         kind: the module.
         name: what a map remembers it by: ``backend`` or ``backend@model``, or ``given:Class`` for an object.
-        given: the object, if it is one.
+        given: the object, if it is one, or what stands before the named one.
         has_card: whether that brought a card of its own; one that was made knows its code and numbers, not all that
             it may read, so that its features are not stored.
-        remembering: puts a store before the encoder, which rounds features of pixels by slow models to float16; None
-            gives it as it is.
-        store: that store; None stores none.
     """
 
     kind: Kind
     name: str
     given: Any = None
     has_card: bool = True
-    remembering: "Callable[..., Any] | None" = None
-    store: "FeatureStore | None" = None
+
+    @classmethod
+    def of(cls, kind: Kind, one: object) -> "Source":
+        """Return the source of an object or a name; raises ``BackendError`` where an object lacks a method."""
+        if isinstance(one, str):
+            return cls(kind, one)
+        return cls(kind, GIVEN + type(one).__qualname__.rpartition(".")[2], completed(kind, one), hasattr(one, "card"))
 
     def load(self) -> Any:
-        """Return the encoder, the same object each time where nothing is remembered.
+        """Return the encoder, the same object each time.
 
         Raises:
             BackendError: it is unknown, a package or file that it needs is missing, or it lacks a method.
         """
-        encoder = self.given
-        if encoder is None:
-            if self.name.startswith(GIVEN):
-                raise BackendError(
-                    f"The {self.kind} of this map were made by an object of the class "
-                    f"{self.name.removeprefix(GIVEN)}, which it does not hold; open it in Python with "
-                    f"encoders=avlmaps.Encoders({self.kind}=...)."
-                )
-            encoder = load(self.kind, self.name)
-            if not isinstance(encoder, PROTOCOLS[self.kind]):
-                from avlmaps.perception.own_encoder import whole
-
-                encoder = whole(self.kind, encoder)
-        if self.remembering is None:
-            return encoder
-        return self.remembering(self.kind, encoder, self.store, half=self.is_slow)
+        if self.given is not None:
+            return self.given
+        if self.name.startswith(GIVEN):
+            raise BackendError(
+                f"The {self.kind} of this map were made by an object of the class {self.name.removeprefix(GIVEN)}, "
+                f"which it does not hold; open it in Python with encoders=avlmaps.Encoders({self.kind}=...)."
+            )
+        encoder = load(self.kind, self.name)
+        return encoder if isinstance(encoder, PROTOCOLS[self.kind]) else whole(self.kind, encoder)
 
     @property
-    def _entry(self) -> Backend | None:
-        return None if self.given is not None else find(self.kind, self.name.partition("@")[0])
+    def backend(self) -> Backend | None:
+        """The registry's entry of a named encoder; raises ``BackendError`` where there is none of that name."""
+        return None if self.name.startswith(GIVEN) else find(self.kind, self.name.partition("@")[0])
 
     @property
     def chosen(self) -> str:
         """Its name with its model: ``name@model``, the default one if no other is chosen."""
-        entry = self._entry
+        entry = self.backend
         return f"{self.name}@{entry.model}" if entry and entry.model and "@" not in self.name else self.name
-
-    @property
-    def on_torch(self) -> bool:
-        """Whether it is known as a large model on torch."""
-        return self._entry is not None and "torch" in self._entry.needs
 
     @property
     def is_slow(self) -> bool:
         """Whether its features are known to take longer to make than to store and read."""
-        return self._entry is not None and self._entry.is_slow
+        return self.backend is not None and self.backend.is_slow
 
     @property
     def keyframes_only(self) -> bool:
         """Whether only keyframes are given to it: the other frames add surfaces and colours."""
-        entry = self._entry
+        entry = self.backend
         return bool(getattr(self.given, "keyframes_only", False)) if entry is None else entry.keyframes_only
 
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
 class Encoders:
-    """The models that perceive, by module; ``encoders.pixels`` is the pixel encoder.
+    """The models that perceive, by module; ``encoders.pixels`` is the pixel encoder. One with a name is a profile.
 
     Attributes:
-        name: of the profile that they come from; ``own`` where there is none.
+        name: the word on the command line; ``own`` where there is none.
         sources: where each comes from; a module that is not among them is not perceived.
-        weight_variance_m2: see ``Profile``.
+        about: one sentence for ``avlmaps profiles``.
+        weight_variance_m2: v of the weight exp(−d² / (2·v)) by which a pixel counts in fusion, d its distance from the
+            camera in metres; the paper's 0.6 makes the nearest looks count alone.
     """
 
     name: str
     sources: Mapping[Kind, Source]
+    about: str
     weight_variance_m2: float
 
     def __init__(
@@ -123,6 +120,7 @@ class Encoders:
         local: LocalEncoder | object | None = None,
         place: PlaceEncoder | object | None = None,
         matcher: Matcher | object | None = None,
+        about: str = "",
         weight_variance_m2: float = 0.6,
     ) -> None:
         """Take objects, or names of the registry (``name``, ``name@model``); None and ``""`` perceive nothing.
@@ -131,23 +129,24 @@ class Encoders:
             BackendError: an object lacks a method of its protocol.
         """
         given = dict(zip(MODULES, (pixels, views, sounds, local, place, matcher), strict=True))
-        self._set(
-            name, {kind: _source(kind, one) for kind, one in given.items() if one not in (None, "")}, weight_variance_m2
-        )
+        self._set(name, _sources(given), about, weight_variance_m2)
 
-    def _set(self, name: str, sources: Mapping[Kind, Source], weight_variance_m2: float) -> None:
-        for field, value in (("name", name), ("sources", sources), ("weight_variance_m2", weight_variance_m2)):
+    def _set(self, name: str, sources: Mapping[Kind, Source], about: str, weight_variance_m2: float) -> None:
+        values = {"name": name, "sources": sources, "about": about, "weight_variance_m2": weight_variance_m2}
+        for field, value in values.items():
             object.__setattr__(self, field, value)
 
     @classmethod
-    def of(cls, name: str, sources: Mapping[Kind, Source], weight_variance_m2: float = 0.6) -> "Encoders":
+    def of(
+        cls, name: str, sources: Mapping[Kind, Source], weight_variance_m2: float = 0.6, about: str = ""
+    ) -> "Encoders":
         """Return the encoders of these sources."""
         made = cls.__new__(cls)
-        made._set(name, dict(sources), weight_variance_m2)
+        made._set(name, dict(sources), about, weight_variance_m2)
         return made
 
     @classmethod
-    def named(cls, profile: str | Profile, /, **instead: object) -> "Encoders":
+    def named(cls, profile: "str | Encoders", /, **instead: object) -> "Encoders":
         """Return the encoders of a profile, with others for some modules.
 
         Args:
@@ -162,22 +161,33 @@ class Encoders:
     @classmethod
     def remembered(cls, name: str, backends: Mapping[str, str]) -> "Encoders":
         """Return encoders by the names that a map has for them; none of them need be known before it is used."""
-        kinds = [kind for kind in MODULES if backends.get(kind.value)]
-        return cls.of(name, {kind: Source(kind, backends[kind.value]) for kind in kinds})
+        return cls.of(name, _sources({kind: backends.get(kind.value) for kind in MODULES}))
 
     def having(self, **instead: object) -> "Encoders":
         """Return these encoders with others for some modules; see ``named``."""
-        unknown = set(instead) - {kind.value for kind in MODULES}
-        if unknown:
-            raise BackendError(
-                f"There is no module called {sorted(unknown)[0]!r}; an encoder is one of "
-                f"{', '.join(kind.value for kind in MODULES)}."
-            )
-        sources = {kind: source for kind, source in self.sources.items() if kind.value not in instead}
-        for word, one in instead.items():
-            if one is not None and one != "":
-                sources[Kind(word)] = _source(Kind(word), one)
-        return Encoders.of(self.name, sources, self.weight_variance_m2)
+        modules = {kind.value: kind for kind in MODULES}
+        if unknown := sorted(set(instead) - set(modules)):
+            raise BackendError(f"There is no module called {unknown[0]!r}; an encoder is one of {', '.join(modules)}.")
+        others = _sources({modules[word]: one for word, one in instead.items()})
+        kept = {kind: source for kind, source in self.sources.items() if kind.value not in instead}
+        return Encoders.of(self.name, _known({**kept, **others}), self.weight_variance_m2, self.about)
+
+    def choosing(self, choices: Mapping[Kind, str]) -> "Encoders":
+        """Return these encoders with other backends or models (``name``, ``name@model``) for some modules.
+
+        Other keypoints bring the matcher that was made for them, unless a matcher is chosen, too.
+
+        Raises:
+            BackendError: there is no such backend, or none of these modules is perceived by a profile.
+        """
+        if Kind.WORDS in choices:
+            raise BackendError("Words are read by each model's own text encoder; there is none to choose.")
+        chosen = {kind.value: name for kind, name in choices.items()}
+        if Kind.LOCAL in choices:
+            # A matcher's training holds for the keypoints that it was trained on.
+            keypoints = find(Kind.LOCAL, choices[Kind.LOCAL].partition("@")[0])
+            chosen.setdefault(Kind.MATCHER.value, keypoints.matcher or "mutual-ratio")
+        return self.having(**chosen)
 
     def over(self, others: "Encoders") -> "Encoders":
         """Return these encoders, and others for the modules that they leave out."""
@@ -206,14 +216,14 @@ class Encoders:
         Raises:
             BackendError: there is none, or it cannot be loaded.
         """
-        if kind not in self.sources:
-            if self.name == _OWN:
-                raise BackendError(
-                    f"The encoders that were given have no {kind} backend; a map that was made without it is queried "
-                    f"with one in Python: encoders=avlmaps.Encoders({kind}=...)."
-                )
-            raise BackendError(no_backend(self.name, kind))
-        return self.sources[kind].load()
+        if kind in self.sources:
+            return self.sources[kind].load()
+        if self.name == _OWN:
+            raise BackendError(
+                f"The encoders that were given have no {kind} backend; a map that was made without it is queried "
+                f"with one in Python: encoders=avlmaps.Encoders({kind}=...)."
+            )
+        raise BackendError(no_backend(self.name, kind))
 
     @property
     def pixels(self) -> PixelEncoder:
@@ -259,30 +269,131 @@ class Encoders:
         return {kind: self.card(kind) for kind in MODULES if kind in self}
 
 
-def encoders_of(chosen: str | Profile | Encoders) -> Encoders:
-    """Return the encoders of a profile or of its name; encoders are themselves.
+def no_backend(profile: str, kind: Kind) -> str:
+    """Return the sentence of a module that a profile leaves out."""
+    return f"The profile {profile!r} has no {kind} backend; choose another profile (avlmaps profiles)."
+
+
+def _sources(given: Mapping[Kind, object]) -> dict[Kind, Source]:
+    return {kind: Source.of(kind, one) for kind, one in given.items() if one is not None and one != ""}
+
+
+def _known(sources: dict[Kind, Source]) -> dict[Kind, Source]:
+    for source in sources.values():
+        _ = source.backend
+    return sources
+
+
+_PROFILES: dict[str, Encoders] = {}
+
+
+def register_profile(profile: Encoders) -> None:
+    """Make a profile known by its name."""
+    _PROFILES[profile.name] = profile
+
+
+def profiles() -> list[Encoders]:
+    """Return every known profile; other packages bring theirs through the entry point group ``avlmaps.profiles``."""
+    others = {entry.name: brought(entry, "the profile") for entry in entry_points(group=ENTRY_POINT_GROUP)}
+    return list({**_PROFILES, **others, **_PROFILES}.values())
+
+
+def profile(name: str) -> Encoders:
+    """Return the profile of that name.
 
     Raises:
-        BackendError: it is none of these, there is no such profile or backend, or an object lacks a method of its
-            protocol.
+        BackendError: there is none.
     """
-    if isinstance(chosen, Encoders):
-        return chosen
-    if not isinstance(chosen, str | Profile):
+    if name in _PROFILES:  # installed packages need not be searched
+        return _PROFILES[name]
+    known = {one.name: one for one in profiles()}
+    if name not in known:
+        if get := how_to_get("profiles", name):
+            raise BackendError(f"The profile {name!r} is not installed; get it with: {get}")
+        close = f" Did you mean {near}?" if (near := nearest(name, known)) else ""
+        raise BackendError(f"There is no profile called {name!r}; known are: {', '.join(known)}.{close}")
+    return known[name]
+
+
+def encoders_of(chosen: str | Encoders) -> Encoders:
+    """Return the encoders of a profile's name; encoders are themselves.
+
+    Raises:
+        BackendError: it is none of these, or there is no such profile or backend.
+    """
+    if isinstance(chosen, str):
+        chosen = profile(chosen)
+    if not isinstance(chosen, Encoders):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise BackendError(
             f"Encoders are an avlmaps.Encoders or the name of a profile, not {type(chosen).__qualname__}; an encoder "
             "of your own goes in as avlmaps.Encoders(pixels=encoder)."
         )
-    used = profile(chosen)
-    given = {kind.value: getattr(used, kind.value) for kind in MODULES}
-    return Encoders(used.name, **given, weight_variance_m2=used.weight_variance_m2)
+    _known(dict(chosen.sources))
+    return chosen
 
 
-def _source(kind: Kind, one: object) -> Source:
-    if isinstance(one, str):
-        find(kind, one.partition("@")[0])
-        return Source(kind, one)
-    from avlmaps.perception.own_encoder import completed
+def choose_models(name: str, words: Sequence[str] = ()) -> Encoders:
+    """Return a profile's encoders with other backends or models for some modules.
 
-    name = GIVEN + type(one).__qualname__.rpartition(".")[2]
-    return Source(kind, name, completed(kind, one), hasattr(one, "card"))
+    Args:
+        name: of the profile.
+        words: ``module=backend`` or ``module=backend@model``.
+
+    Raises:
+        BackendError: a word is not of that form, or there is no such profile or backend.
+    """
+    try:
+        choices = read_choices(words)
+    except ValueError as problem:
+        raise BackendError(f"A choice of models {problem}") from None
+    return profile(name).choosing(choices)
+
+
+def read_choices(words: Sequence[str]) -> dict[Kind, str]:
+    """Return the backend and model that ``module=backend`` or ``module=backend@model`` choose for each module.
+
+    Raises:
+        ValueError: a word names no module or backend, or two words name the same module; the text continues the name
+            of a flag.
+    """
+    modules = {kind.value: kind for kind in MODULES}
+    choices: dict[Kind, str] = {}
+    for word in words:
+        module, _, backend = word.partition("=")
+        if module not in modules or not backend.partition("@")[0]:
+            raise ValueError(
+                f"takes words like pixels=clip-patches@openai/clip-vit-large-patch14, not {word!r}; the modules are "
+                f"{', '.join(modules)}."
+            )
+        if modules[module] in choices:
+            raise ValueError(f"names {module} twice; choose one.")
+        choices[modules[module]] = backend
+    return choices
+
+
+_KEYPOINTS: Any = {"local": "xfeat", "place": "xfeat", "matcher": "xfeat"}
+# A small network knows a sofa from two metres better than a cushion's width of it from half a metre: with nearly even
+# weights 44 % of the voxels of things are named rightly, with the paper's 41 %.
+_EVEN_M2 = 50.0
+_SHIPPED = (
+    Encoders(
+        "embedded", pixels="embedded", views="embedded", sounds="embedded", **_KEYPOINTS, weight_variance_m2=_EVEN_M2,
+        about="small models shipped with the package: no download, no GPU; its eyes learnt from rendered worlds and "
+        "from frames of NYU Depth V2, a data set for research that states no licence",
+    ),
+    Encoders(
+        "colours", pixels="colours", sounds="embedded", **_KEYPOINTS,
+        about="objects by their colour alone: the quickest, and no network for pictures",
+    ),
+    Encoders(
+        "synthetic", pixels="embedded-synthetic", views="embedded-synthetic", sounds="embedded", **_KEYPOINTS,
+        about="as embedded, but its eyes learnt from rendered worlds alone; weaker in real rooms",
+        weight_variance_m2=_EVEN_M2,
+    ),
+    Encoders(
+        "trained", pixels="trained", views="trained", sounds="embedded", **_KEYPOINTS, weight_variance_m2=_EVEN_M2,
+        about="as embedded, with eyes that you trained yourself",
+    ),
+)  # fmt: skip
+for _profile in _SHIPPED:
+    register_profile(_profile)

@@ -17,8 +17,8 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.files import replace_atomically, user_path, write_bytes_atomically
+from avlmaps.perception.models import user_folder
 from avlmaps.perception.protocols import SoundEncoder
-from avlmaps.perception.user_folder import user_folder
 from avlmaps.recordings.audio import AudioTrack, Sound
 
 SCHEMA = 1

@@ -122,16 +122,6 @@ class BatchPixelEncoder(PixelEncoder, Protocol):
         ...
 
 
-@runtime_checkable
-class GroundReader(Protocol):
-    """A pixel encoder that looks better where ``frame.ground`` is known: a growing map waits with it for the floor."""
-
-    @property
-    def reads_ground(self) -> bool:
-        """True."""
-        ...
-
-
 class NamedEncoder(Protocol):
     """An encoder that distinguishes a closed set of names.
 
@@ -270,7 +260,6 @@ class LocalFeatures:
     Attributes:
         xy: image coordinates in pixels, sub-pixel, the centre of the first pixel at (0.5, 0.5).
         descriptors: one row a keypoint, unit length.
-        scale: size of each keypoint, pixels; empty where it is not known.
         score: the detector's confidence in each keypoint, in [0, 1]; empty where it is not known.
         size: (width, height) of the picture, pixels; (0, 0) where it is not known. Learned matchers need it.
 
@@ -279,13 +268,12 @@ class LocalFeatures:
 
     xy: Float32[np.ndarray, "n 2"]
     descriptors: Float32[np.ndarray, "n d"]
-    scale: Float32[np.ndarray, " n_or_0"] = field(default_factory=lambda: np.zeros(0, np.float32))
     score: Float32[np.ndarray, " n_or_none"] = field(default_factory=lambda: np.zeros(0, np.float32))
     size: tuple[int, int] = (0, 0)
 
     def __post_init__(self) -> None:
         """Leave out keypoints of which something is masked."""
-        arrays = {name: getattr(self, name) for name in ("xy", "descriptors", "scale", "score")}
+        arrays = {name: getattr(self, name) for name in ("xy", "descriptors", "score")}
         if not any(hasattr(array, "mask") for array in arrays.values()):  # numpy.ma takes long to load
             return
         gone = np.zeros(len(self.xy), bool)

@@ -19,7 +19,6 @@ from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.tables import lock_folder
 from avlmaps.perception.encoders import Encoders, encoders_of
-from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, with_findings
 from avlmaps.query.settings import QuerySettings
 from avlmaps.recordings.memory import given_frame
@@ -46,7 +45,7 @@ class VoxelMap:
     def __init__(
         self,
         voxel_size_m: Any = 0.05,
-        encoders: "Encoders | Profile | str | None" = None,
+        encoders: "Encoders | str | None" = None,
         *,
         up_in_world: Any = None,
         settings: BuildSettings | None = None,

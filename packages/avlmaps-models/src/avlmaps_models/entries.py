@@ -1,13 +1,12 @@
 """What is known of the models before one is loaded: backends, profiles, and where each model is published."""
 
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from avlmaps.core.extras import MODELS
 from avlmaps.core.registry import Backend, Kind
-from avlmaps.perception.models.published_models import Published
-from avlmaps.perception.profiles import Profile, profile
+from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.models import Published
 
 
 def _keypoints(repository: str, file: str, size_mb: float, *cached: str) -> Published:
@@ -163,16 +162,19 @@ BACKENDS = (
     ),
 )
 
-LIGHT = replace(
-    profile("embedded"),
-    name="light",
+LIGHT = Encoders(
+    "light",
     pixels="light",
     views="light",
     sounds="light",
+    local="xfeat",
+    place="xfeat",
+    matcher="xfeat",
     about="any word for things, rooms and sounds on a CPU without torch; files of 250 MB, fetched once",
+    weight_variance_m2=50.0,
 )
-FOUNDATION = Profile(
-    name="foundation",
+FOUNDATION = Encoders(
+    "foundation",
     pixels="tipsv2",
     views="siglip2",
     sounds="clap",
@@ -182,8 +184,8 @@ FOUNDATION = Profile(
     about="today's open models under permissive licences; recommended where there is a network and better a GPU",
     weight_variance_m2=50.0,
 )
-PAPER = Profile(
-    name="paper",
+PAPER = Encoders(
+    "paper",
     pixels="lseg",
     views="clip-paper",
     sounds="audioclip",

@@ -26,7 +26,7 @@ def _quick_and_reproducible(tmp_path_factory: pytest.TempPathFactory, monkeypatc
 @pytest.fixture
 def models(tmp_path: Path) -> Iterator[Path]:
     """Return an empty folder of models that is in force for this test."""
-    from avlmaps.perception.models.settings import ModelSettings, using_models
+    from avlmaps.perception.models import ModelSettings, using_models
 
     folder = tmp_path / "models"
     folder.mkdir()

@@ -8,7 +8,7 @@ from training.pixels.batches import Frames, View, draw_batch  # noqa: E402
 from training.pixels.shape import channels_of  # noqa: E402
 
 from avlmaps.core.camera import Pinhole  # noqa: E402
-from avlmaps.perception.embedded.geometry import channels  # noqa: E402
+from avlmaps.perception.embedded.scene_network import channels  # noqa: E402
 
 UP = ((0.0, -1.0, 0.0), (0.3, -0.8, -0.5), (0.0, -0.02, -1.0))
 

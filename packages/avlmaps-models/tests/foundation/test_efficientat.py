@@ -15,7 +15,7 @@ from training.sounds.mixtures import read_audio
 
 from avlmaps.core.registry import Kind, forget_loaded, load
 from avlmaps.perception.conformance import check
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps.recordings.audio import Sound
 from avlmaps_models.light.efficientat import MODEL, RATE_HZ, EfficientATSounds
 

@@ -35,7 +35,7 @@ from avlmaps.core import poses, registry
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Backend, Kind
 from avlmaps.maps.build import BuildSettings, build_map
-from avlmaps.perception.profiles import Profile, register_profile
+from avlmaps.perception.encoders import Encoders, register_profile
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.formats.avlmaps_layout import base_poses
 from avlmaps_models.import_reference.convert import ImportSettings, import_reference_map
@@ -81,7 +81,7 @@ def room_words(seen: list[Seen], monkeypatch: pytest.MonkeyPatch) -> Iterator[No
 
 
 def _own(scene: Path, path: Path) -> AVLMap:
-    register_profile(Profile(name="room words", pixels="lseg"))
+    register_profile(Encoders(name="room words", pixels="lseg"))
     recording = avlmaps.open_recording(scene)
     made = build_map(recording, path, "room words", BuildSettings(voxel_size_m=CELL_M), progress=False)
     return AVLMap(made, path=path)

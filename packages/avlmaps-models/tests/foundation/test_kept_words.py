@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from tiny.clip import write_clip
 
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, cache_folder, using_models
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.perception.user_folder import cache_folder
 from avlmaps_models.common.kept_words import KeptWords
 from avlmaps_models.common.prompts import Prompted
 from avlmaps_models.foundation.clip import ClipViews

@@ -15,7 +15,7 @@ from tiny.disk import write_disk
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps_models.common.pictures import local_features, shrunk
 from avlmaps_models.foundation import aliked, disk
 from helpers.picture_room import painting

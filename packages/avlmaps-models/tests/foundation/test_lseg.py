@@ -13,7 +13,7 @@ from tiny.lseg import Sizes, lseg_layout, random_weights, write_checkpoint, writ
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, find
 from avlmaps.perception.conformance import check, example_frame
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps.perception.protocols import BatchPixelEncoder, ScaledEncoder
 from avlmaps_models.paper.clip_tokens import clip_tokens
 from avlmaps_models.paper.lseg import LSegPixels, read_network

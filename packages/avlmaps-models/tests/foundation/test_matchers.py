@@ -27,8 +27,7 @@ from avlmaps.maps.build import build_map
 from avlmaps.maps.store.folder import read
 from avlmaps.perception.conformance import check
 from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.models.settings import ModelSettings, using_models
-from avlmaps.perception.profiles import Profile
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps.perception.protocols import LearnedMatcher, LocalFeatures
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.locate import locate
@@ -391,7 +390,7 @@ def test_a_map_on_the_disk_locates_by_superglue_and_says_so_where_it_has_no_scor
         write(models)
     put("superglue")
     walk = RoomWalk(frames=2)
-    used = Profile("kept", pixels="colours", local="superpoint", matcher="superglue", place="netvlad")
+    used = Encoders("kept", pixels="colours", local="superpoint", matcher="superglue", place="netvlad")
     path = models.parent / "room.avlmap"
     build_map(walk, path, used, progress=False)
     data = read(path)

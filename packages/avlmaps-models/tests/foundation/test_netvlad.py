@@ -14,7 +14,7 @@ from tiny.netvlad import CLUSTERS, DIM, MEAN, netvlad_net, write_netvlad
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps.perception.protocols import LocalFeatures
 from avlmaps_models.paper.netvlad import NetVlad, convert_netvlad
 from helpers.picture_room import painting

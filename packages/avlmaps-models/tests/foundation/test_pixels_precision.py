@@ -9,7 +9,7 @@ from tiny.regions import write_regions
 from tiny.tipsv2 import write_tipsv2
 
 from avlmaps.perception.conformance import example_frame
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps_models.foundation.clip_patches import ClipPatches
 from avlmaps_models.foundation.regions import RegionPixels
 from avlmaps_models.foundation.tipsv2 import TipsPixels

@@ -38,7 +38,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import install_command
 from avlmaps.core.registry import Backend, Kind, backends, load
 from avlmaps.maps.store.folder import read
-from avlmaps.perception.models.published_models import availability
+from avlmaps.perception.models import availability
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter

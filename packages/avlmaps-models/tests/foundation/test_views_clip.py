@@ -12,7 +12,7 @@ from tiny.siglip2 import write_siglip2
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind
 from avlmaps.perception.conformance import check, example_frame
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps.perception.protocols import ScaledEncoder
 from avlmaps_models.common.prompts import AREA_PROMPTS
 from avlmaps_models.foundation.clip import ClipViews

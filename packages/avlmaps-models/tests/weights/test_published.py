@@ -21,7 +21,7 @@ from kornia.feature.aliked.deform_conv2d import deform_conv2d
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.embedded.xfeat import MAX_KEYPOINTS, XFeat
-from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models import ModelSettings, using_models
 from avlmaps.perception.protocols import LocalFeatures
 from avlmaps_models.foundation.aliked import AlikedKeypoints
 from avlmaps_models.foundation.disk import DiskKeypoints

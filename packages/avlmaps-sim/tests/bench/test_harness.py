@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.registry import Kind
-from avlmaps.perception.profiles import choose_models
+from avlmaps.perception.encoders import choose_models
 from avlmaps.recordings.audio import Sound, write_flac
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
@@ -86,8 +86,8 @@ def test_a_folder_that_does_not_say_what_was_trained_on_is_refused(tmp_path: Pat
 
 
 def test_a_model_is_chosen_by_its_word():
-    assert choose_models("embedded", ["views=clip"]).backend_name(Kind.VIEWS) == "clip"
-    assert choose_models("embedded").backend_name(Kind.VIEWS) == "embedded"
+    assert choose_models("embedded", ["views=clip"]).name_of(Kind.VIEWS) == "clip"
+    assert choose_models("embedded").name_of(Kind.VIEWS) == "embedded"
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from avlmaps.language.learned.linear import INDEX, SYMBOLS
 from avlmaps.language.lexer import Token
 from avlmaps.language.source_words import seeks_source
 from avlmaps.perception.embedded.words import words_checksum
-from avlmaps.perception.models.networks import open_network
+from avlmaps.perception.networks import open_network
 
 _BEAM = 4
 _MOST_TOKENS = 100

@@ -12,7 +12,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.tables import FileInfo
-from avlmaps.perception.models.published_models import public_choice, public_name
+from avlmaps.perception.models import public_choice, public_name
 from avlmaps.perception.protocols import ModelCard
 
 SCHEMA_VERSION = 2

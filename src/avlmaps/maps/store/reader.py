@@ -14,7 +14,7 @@ from avlmaps.core.wording import option
 from avlmaps.maps.store.manifest import GroundInfo, MapInfo
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.models.published_models import public_choice, public_name
+from avlmaps.perception.models import public_choice, public_name
 
 GIVEN_FEATURES = "given:features"  # backend of features that came without an encoder
 

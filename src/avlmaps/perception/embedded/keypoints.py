@@ -52,7 +52,6 @@ class RootSift:
         return LocalFeatures(
             xy=((xy[order] + _PIXEL_CENTRE) * to_picture).astype(np.float32),
             descriptors=root_normalised(histograms[order]),
-            scale=np.array([found[i].size * to_picture[0] for i in order], np.float32),
         )
 
 
@@ -66,7 +65,6 @@ def _no_features() -> LocalFeatures:
     return LocalFeatures(
         xy=np.zeros((0, 2), np.float32),
         descriptors=np.zeros((0, DESCRIPTOR_DIM), np.float32),
-        scale=np.zeros(0, np.float32),
     )
 
 

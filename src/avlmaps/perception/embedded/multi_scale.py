@@ -12,10 +12,10 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32, UInt8
 from avlmaps.core.camera import Pinhole
-from avlmaps.perception.embedded.paired_networks import PairedNetworks
 from avlmaps.perception.embedded.scene_network import (
     PLAIN,
     Augmentation,
+    PairedNetworks,
     SceneNetwork,
     Seen,
     at_working_size,

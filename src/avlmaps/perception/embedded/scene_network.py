@@ -3,10 +3,16 @@
 It looks at geometry in the frame of gravity, and at colour, which joins later and may be finer. It runs in onnxruntime
 at a small size (``Notes.width_px``), for every recording; ``training/pixels`` makes its weights. Two sets ship: one
 that learnt from rendered worlds and real frames, and one that saw rendered worlds alone (the profile ``synthetic``).
+
+``PairedNetworks`` looks with two networks: where they agree on what a frame shows, it is like the worlds that both
+know, and the mean of the two is right more often than either. Where they do not, it is a real frame, of which the
+second knows little: then the first decides. Agreement is the Bhattacharyya coefficient of their probabilities, the mean
+over the frame's cells. Ensembles of networks: Hansen and Salamon, "Neural Network Ensembles", IEEE TPAMI 1990.
 """
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -15,13 +21,97 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float32, UInt8
+from avlmaps.core.arrays import Bool, Float, Float32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.embedded.geometry import channels
-from avlmaps.perception.models.networks import open_network
+from avlmaps.perception.networks import open_network
 from avlmaps.recordings.images import depth_in_colour
 from avlmaps.recordings.types import Frame
+
+CHANNELS = 8
+# Normals are taken over this many pixels to each side; over one where an edge is nearer.
+_REACH_PX = 3
+_LARGEST_STEP = 0.06  # of the depth: a greater step between neighbours is an edge, not a surface
+
+
+def channels(
+    depth_m: Float32[np.ndarray, "h w"], camera: Pinhole, up_in_camera: Float[np.ndarray, "3"], camera_height_m: float
+) -> Float32[np.ndarray, "8 h w"]:
+    """Return the geometry of a depth picture, zero (but for the last channel) where there is no depth.
+
+    The channels: logarithm of a pixel's size on the surface in centimetres; a quarter of the depth; height over the
+    floor in metres, within −1 and 4; the surface normal along up, to the camera's right and along its heading
+    (both level); 1 where there is a depth; the rise of the pixel's ray, −1 straight down to 1 straight up.
+
+    Args:
+        depth_m: z-depth, 0 where there is none.
+        camera: of that picture.
+        up_in_camera: unit vector.
+        camera_height_m: of the camera over the floor.
+    """
+    rows, columns = np.ogrid[: depth_m.shape[0], : depth_m.shape[1]]
+    x, y = ((columns + 0.5 - camera.cx) / camera.fx).astype("f4"), ((rows + 0.5 - camera.cy) / camera.fy).astype("f4")
+    up = np.asarray(up_in_camera, np.float32)
+    known = depth_m > 0.0
+    z = np.where(known, depth_m, np.float32(0.0))
+    rise = up[0] * x + up[1] * y + up[2]
+    out = np.zeros((CHANNELS, *depth_m.shape), np.float32)
+    np.log(z * np.float32(math.exp(4.6) / (0.5 * (camera.fx + camera.fy))), out=out[0], where=known)
+    np.multiply(z, np.float32(0.25), out=out[1])
+    np.clip(z * rise + np.float32(camera_height_m), -1.0, 4.0, out=out[2], where=known)
+    normal = _normals(z, x, y, camera)
+    for channel, along in zip((3, 4, 5), (up, *level_axes(up)), strict=True):
+        out[channel] = sum(part * np.float32(share) for part, share in zip(normal, along, strict=True))
+    out[6] = known
+    out[7] = rise / np.sqrt(x * x + y * y + 1.0)
+    return out
+
+
+def _normals(
+    z: Float32[np.ndarray, "h w"], x: Float32[np.ndarray, "1 w"], y: Float32[np.ndarray, "h 1"], camera: Pinhole
+) -> tuple[Float32[np.ndarray, "h w"], ...]:
+    """Return the normal of the surface at each pixel, towards the camera; zero where its neighbours are of others."""
+    (left, far_left), (right, far_right) = (_neighbour(z, 1, sign) for sign in (-1, 1))
+    (above, far_above), (below, far_below) = (_neighbour(z, 0, sign) for sign in (-1, 1))
+    across, down = right - left, below - above
+    ax = x * across + (far_right * right + far_left * left) / np.float32(camera.fx)
+    by = y * down + (far_below * below + far_above * above) / np.float32(camera.fy)
+    ay, bx = y * across, x * down
+    nx, ny, nz = by * across - down * ay, down * ax - bx * across, bx * ay - by * ax
+    squared = nx * nx + ny * ny + nz * nz
+    seen = (z > 0.0) & (far_left + far_right > 0) & (far_above + far_below > 0) & (squared > 0.0)
+    scale = np.zeros_like(z)
+    np.divide(np.where(nx * x + ny * y + nz > 0.0, -1.0, 1.0), np.sqrt(squared), out=scale, where=seen)
+    return nx * scale, ny * scale, nz * scale
+
+
+def _neighbour(
+    z: Float32[np.ndarray, "h w"], axis: int, sign: int
+) -> tuple[Float32[np.ndarray, "h w"], Float32[np.ndarray, "h w"]]:
+    """Return the depth of each pixel's farthest neighbour on one side that is of its surface, and how far that is."""
+    depth, reach = z.copy(), np.zeros_like(z)
+    largest = np.float32(_LARGEST_STEP) * z
+    for pixels in (1, _REACH_PX):  # the farther one counts
+        beside = [slice(None)] * 2, [slice(None)] * 2
+        beside[0][axis], beside[1][axis] = slice(pixels, None), slice(None, -pixels)
+        here, there = (tuple(one) for one in (beside if sign < 0 else beside[::-1]))
+        other = z[there]
+        same = (other > 0.0) & (np.abs(other - z[here]) < largest[here])
+        np.copyto(depth[here], other, where=same)
+        np.copyto(reach[here], np.float32(pixels), where=same)
+    return depth, reach
+
+
+def level_axes(up_in_camera: Float[np.ndarray, "3"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Return the level directions to the right of the camera and ahead of it, in its own frame.
+
+    Looking straight up or down it has no heading; then the picture's own upper edge is taken for it.
+    """
+    ahead = np.array([0.0, 0.0, 1.0]) if abs(up_in_camera[2]) < 0.99 else np.array([0.0, -1.0, 0.0])
+    forward = ahead - up_in_camera * (up_in_camera @ ahead)
+    forward /= np.linalg.norm(forward)
+    return np.cross(forward, up_in_camera), forward
+
 
 # Without ground a camera is taken to be upright and as high as people and robots mostly hold it.
 _USUAL_HEIGHT_M = 1.3
@@ -287,3 +377,78 @@ def _padded(picture: Float32[np.ndarray, "c h w"], multiple: int) -> Float32[np.
 def _softmax(score: Any) -> Float32[np.ndarray, "..."]:
     e = np.exp(score - score.max(axis=-1, keepdims=True))
     return (e / e.sum(axis=-1, keepdims=True)).astype(np.float32)
+
+
+# Agreement at which the second network begins to count, and from which on both count the same; in between its share
+# grows evenly. Chosen on real frames of the development split and on frames of simulated homes with artists' furniture
+# (training/pixels/README.md).
+NO_SAY, SAME_SAY = 0.75, 0.95
+
+
+class PairedNetworks:
+    """A network and a second one that has a say where the two agree.
+
+    Args:
+        first: its notes are the pair's; its categories hold all of the second's.
+        second: the other one.
+
+    Attributes:
+        notes: of the first.
+        checksum: of both and of how they are mixed.
+
+    Raises:
+        ValueError: the second network has categories that the first lacks, or other kinds of room.
+    """
+
+    def __init__(self, first: SceneNetwork, second: SceneNetwork) -> None:
+        self._first, self._second = first, second
+        self.notes: Notes = first.notes
+        if more := sorted(set(second.notes.categories) - set(first.notes.categories)):
+            raise ValueError(f"The second network has {', '.join(more)}, which the first lacks; swap them.")
+        if second.notes.rooms != first.notes.rooms:
+            raise ValueError("The two networks know different kinds of room; train them with one list.")
+        self._column = np.array([first.notes.categories.index(name) for name in second.notes.categories])
+        both = f"{first.checksum} {second.checksum} {NO_SAY} {SAME_SAY}"
+        self.checksum = sha256(both.encode()).hexdigest()
+
+    def see(self, frame: Frame, augmentation: Augmentation = PLAIN) -> Seen:
+        """Encode a frame with both networks."""
+        seen, second = self._first.see(frame, augmentation), self._second.see(frame, augmentation)
+        other = np.zeros_like(seen.category)
+        other[..., self._column] = second.category
+        share = share_of_second(seen.category, other, seen.known)
+        return replace(
+            seen, category=mixed(seen.category, other, share), room=mixed(seen.room, second.room, share)
+        )  # fmt: skip
+
+
+def share_of_second(
+    first: Float32[np.ndarray, "h w c"], second: Float32[np.ndarray, "h w c"], known: Bool[np.ndarray, "h w"]
+) -> float:
+    """Return the say that a second network has in a frame, from 0 to a half.
+
+    Args:
+        first: probabilities of the network that decides where they differ.
+        second: of the other.
+        known: which cells have a depth; only these are compared.
+    """
+    agreement = np.sqrt(first * second).sum(axis=-1)
+    mean = float(agreement[known].mean()) if known.any() else 0.0
+    return 0.5 * float(np.clip((mean - NO_SAY) / (SAME_SAY - NO_SAY), 0.0, 1.0))
+
+
+def mixed(
+    first: Float32[np.ndarray, "*n c"], second: Float32[np.ndarray, "*n c"], share: float
+) -> Float32[np.ndarray, "*n c"]:
+    """Return the mean of two networks' probabilities, the second's with a weight of ``share``."""
+    return (1.0 - share) * first + share * second if share else first
+
+
+@cache
+def load_pair() -> PairedNetworks:
+    """Return the two networks that ship with the package.
+
+    Raises:
+        BackendError: files are missing or damaged.
+    """
+    return PairedNetworks(load_network(), load_network(SYNTHETIC_WEIGHTS))

@@ -22,7 +22,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded import logmel
 from avlmaps.perception.enrolment import TaughtSound, enrolled_sounds, sounds_folder
-from avlmaps.perception.models.networks import open_network
+from avlmaps.perception.networks import open_network
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.audio import Sound, resample
 

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, UInt8
 
 from avlmaps.perception.embedded.keypoints import MutualRatio, Vlad
-from avlmaps.perception.models.networks import open_network
+from avlmaps.perception.networks import open_network
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 
 DIM = 64

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avlmaps.core.files import sha256_of_file, write_bytes_atomically
-from avlmaps.perception.user_folder import user_folder
+from avlmaps.perception.models import user_folder
 
 _KEPT = "checksums.json"
 

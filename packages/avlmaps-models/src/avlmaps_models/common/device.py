@@ -11,7 +11,7 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.wording import option
-from avlmaps.perception.models.settings import model_settings, resolve_precision
+from avlmaps.perception.models import model_settings, resolve_precision
 from avlmaps_models.common.operators import declare_missing_operators
 
 declare_missing_operators()

@@ -6,8 +6,7 @@ from pathlib import Path
 from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import MODELS, install_command
 from avlmaps.core.wording import option
-from avlmaps.perception.models.published_models import places_of
-from avlmaps.perception.models.settings import model_settings
+from avlmaps.perception.models import model_settings, places_of
 
 # The files of a model's folder that transformers or open_clip need; code and other formats stay where they are.
 _WANTED = ("*.json", "*.safetensors", "*.txt", "*.model", "*.jinja")

@@ -9,10 +9,9 @@ from jaxtyping import Float32
 
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
-from avlmaps.perception.cache.feature_store import FeatureStore, key_of
-from avlmaps.perception.models.settings import precision_in_force
+from avlmaps.perception.cache import FeatureStore, key_of
+from avlmaps.perception.models import cache_folder, precision_in_force
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.perception.user_folder import cache_folder
 
 _LIMIT_BYTES = 2e8
 

@@ -9,7 +9,7 @@ import torch
 from torch import nn
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.settings import model_settings
+from avlmaps.perception.models import model_settings
 from avlmaps_models.common.files import model_file
 
 N = TypeVar("N", bound=nn.Module)

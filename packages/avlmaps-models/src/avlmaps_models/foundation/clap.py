@@ -19,7 +19,7 @@ import numpy as np
 import torch
 from jaxtyping import Float32
 
-from avlmaps.perception.models.published_models import public_name
+from avlmaps.perception.models import public_name
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
 from avlmaps_models.common.checksums import checksum_of, weights_in

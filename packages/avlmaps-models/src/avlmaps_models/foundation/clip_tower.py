@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 
-from avlmaps.perception.models.published_models import public_name
+from avlmaps.perception.models import public_name
 from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import inference, select_device, select_dtype, to_numpy
 from avlmaps_models.common.pretrained import load_helper, load_pretrained, pretrained_folder

@@ -24,7 +24,7 @@ from torch import nn
 from torch.nn import functional
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.published_models import public_name
+from avlmaps.perception.models import public_name
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import select_device, unit_rows

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.published_models import public_name
+from avlmaps.perception.models import public_name
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
 from avlmaps_models.common.checksums import checksum_of

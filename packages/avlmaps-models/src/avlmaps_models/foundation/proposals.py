@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float32, Int, UInt8
 
-from avlmaps.perception.models.published_models import public_name
+from avlmaps.perception.models import public_name
 from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import select_device, to_numpy
 from avlmaps_models.common.precision import mixed_precision

@@ -21,7 +21,7 @@ import numpy as np
 import torch
 from jaxtyping import Float32, UInt8
 
-from avlmaps.perception.models.published_models import public_name
+from avlmaps.perception.models import public_name
 from avlmaps.perception.protocols import ModelCard
 from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import (

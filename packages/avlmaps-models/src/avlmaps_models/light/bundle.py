@@ -12,8 +12,8 @@ import msgspec
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
-from avlmaps.perception.models.networks import open_network
-from avlmaps.perception.models.published_models import folders_of
+from avlmaps.perception.models import folders_of
+from avlmaps.perception.networks import open_network
 from avlmaps_models.common.checksums import checksum_of, remembered_sha256
 
 MODEL = "avlmaps/light-1"

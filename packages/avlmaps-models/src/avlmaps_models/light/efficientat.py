@@ -16,8 +16,8 @@ from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
-from avlmaps.perception.models.networks import open_network
-from avlmaps.perception.models.published_models import local_model
+from avlmaps.perception.models import local_model
+from avlmaps.perception.networks import open_network
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.audio import Sound
 from avlmaps_models.common.checksums import checksum_of

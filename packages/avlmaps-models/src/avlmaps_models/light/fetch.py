@@ -19,8 +19,7 @@ from avlmaps.core.files import sync_folder, user_path
 from avlmaps.core.machine import is_loopback
 from avlmaps.core.progress import progress
 from avlmaps.core.wording import option
-from avlmaps.perception.models.published_models import fetched_folder
-from avlmaps.perception.models.settings import model_settings
+from avlmaps.perception.models import fetched_folder, model_settings
 from avlmaps_models.common.checksums import remembered_sha256
 from avlmaps_models.light.bundle import MANIFEST, MODEL, Manifest, parse_manifest
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from avlmaps.perception.models.remembered import Remembered, key_of
+from avlmaps.perception.networks import Remembered, key_of
 from avlmaps_models.common.picture_sizes import working_size
 from avlmaps_models.light.bundle import PICTURES, Bundle
 

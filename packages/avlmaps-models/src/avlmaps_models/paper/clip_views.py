@@ -16,7 +16,7 @@ import torch
 from jaxtyping import UInt8
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.published_models import public_name
+from avlmaps.perception.models import public_name
 from avlmaps.perception.protocols import ModelCard
 from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import select_device

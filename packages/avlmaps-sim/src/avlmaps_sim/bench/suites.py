@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
-from avlmaps.perception.encoders import Encoders, encoders_of
-from avlmaps.perception.profiles import choose_models
+from avlmaps.perception.encoders import Encoders, choose_models, encoders_of
 from avlmaps_sim.bench.harness.figures import BenchError, Table, in_words, markdown, write_answer
 from avlmaps_sim.bench.harness.settings import checksums, shipped_checksums
 

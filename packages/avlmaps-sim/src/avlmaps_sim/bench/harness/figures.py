@@ -141,7 +141,7 @@ def in_words(answer: Mapping[str, Any]) -> str:
     """Return the provenance of an answer as one paragraph."""
     models = f" with {', '.join(answer['models'])}" if answer.get("models") else ""
     recorded = answer.get("recorded")
-    parts = [f"Profile {answer['profile']}{models}", f"rules {answer.get('rules', 'ours')}", f"seed {answer['seed']}"]
+    parts = [f"Encoders {answer['profile']}{models}", f"rules {answer.get('rules', 'ours')}", f"seed {answer['seed']}"]
     if answer.get("scenes"):
         count = len(answer["scenes"])
         parts.append(f"{count} scene{'s' if count > 1 else ''} ({', '.join(answer['scenes'])})")

@@ -11,8 +11,7 @@ from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
-from avlmaps.perception.encoders import Encoders, encoders_of
-from avlmaps.perception.profiles import choose_models
+from avlmaps.perception.encoders import Encoders, choose_models, encoders_of
 from avlmaps.query.settings import Rules
 from avlmaps_sim.bench.harness.clips import unheard_rows
 from avlmaps_sim.mixing.clips import find_clips

@@ -19,8 +19,7 @@ from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.maps.grid import GridSpec, index_ends
-from avlmaps.perception.encoders import Encoders, encoders_of
-from avlmaps.perception.profiles import choose_models
+from avlmaps.perception.encoders import Encoders, choose_models, encoders_of
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.modalities.image import read_picture
 from avlmaps.query.settings import Rules, build_settings, query_settings

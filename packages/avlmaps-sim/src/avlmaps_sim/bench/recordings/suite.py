@@ -14,7 +14,7 @@ import numpy as np
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import progress
 from avlmaps.maps.build import build_map
-from avlmaps.perception.cache.feature_store import CacheSettings
+from avlmaps.perception.cache import CacheSettings
 from avlmaps.recordings.consistency.suspicions import examine_recording
 from avlmaps.recordings.open import open_recording
 from avlmaps_sim.bench.harness.figures import Table, as_csv, in_percent, wilson

@@ -1,20 +1,159 @@
-"""Models: how they are named, where their files lie and are published, and whether one is here."""
+"""Models: how they are named, where their files lie and are published, and how this process loads them."""
 
 import ntpath
 import os
 import posixpath
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.files import user_path
-from avlmaps.core.registry import Backend, brought, entry_points, load
+from avlmaps.core.registry import Backend, brought, entry_points, forget_loaded, load
 from avlmaps.core.wording import option
-from avlmaps.perception.models.settings import model_settings
-from avlmaps.perception.user_folder import user_folder
+
+
+def user_folder() -> Path:
+    """Return the folder of this person's own profile; it need not exist yet.
+
+    ``AVLMAPS_HOME`` where it is set; else ``%APPDATA%`` on Windows, ``~/Library/Application Support`` on macOS and
+    ``$XDG_DATA_HOME`` (``~/.local/share``) elsewhere, and ``avlmaps`` in it.
+    """
+    own = os.environ.get("AVLMAPS_HOME")
+    if own:
+        return user_path(own)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("APPDATA") or Path.home() / "AppData" / "Roaming")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Application Support"
+    else:
+        base = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
+    return base / "avlmaps"
+
+
+def cache_folder() -> Path:
+    """Return the folder for what can be computed again and may be deleted at any time; it need not exist yet.
+
+    ``cache`` in ``AVLMAPS_HOME`` where that is set; else ``%LOCALAPPDATA%`` on Windows, ``~/Library/Caches`` on macOS
+    and ``$XDG_CACHE_HOME`` (``~/.cache``) elsewhere, and ``avlmaps`` in it.
+    """
+    own = os.environ.get("AVLMAPS_HOME")
+    if own:
+        return user_path(own) / "cache"
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "avlmaps"
+
+
+Precision = Literal["auto", "float32", "float16", "bfloat16"]
+
+
+@dataclass(frozen=True, slots=True)
+class ModelSettings:
+    """How this process loads models.
+
+    Attributes:
+        folder: looked through before the hub's cache; holds models as ``org/name``, ``org--name`` or ``name``, and
+            single files by their name.
+        device: ``auto`` (a GPU where there is one), ``cpu``, ``cuda``, ``cuda:1``, ``mps``.
+        precision: of weights and activations; ``auto`` is float16 on a CUDA device and float32 elsewhere.
+        batch: frames that go through a model at once; 0 lets each model choose (1 on a CPU).
+        offline: never ask a hub; only files that are here.
+    """
+
+    folder: Path | None = None
+    device: str = "auto"
+    precision: Precision = "auto"
+    batch: int = 0
+    offline: bool = False
+
+    def __post_init__(self) -> None:
+        if self.precision not in get_args(Precision):
+            raise BackendError(f"There is no precision {self.precision!r}; choose {', '.join(get_args(Precision))}.")
+        if self.batch < 0:
+            raise BackendError(f"batch is {self.batch}; choose 0 (automatic) or more.")
+        if self.folder is not None and not self.folder.is_dir():
+            raise BackendError(f"The folder of models {self.folder} is not there; make it, or leave it out.")
+
+
+def from_environment() -> ModelSettings:
+    """Return the settings of AVLMAPS_MODELS, AVLMAPS_DEVICE, AVLMAPS_PRECISION, AVLMAPS_BATCH and HF_HUB_OFFLINE.
+
+    Raises:
+        BackendError: one of them is no such value.
+    """
+    batch = os.environ.get("AVLMAPS_BATCH") or "0"
+    if not batch.isdecimal():
+        raise BackendError(f"AVLMAPS_BATCH is {batch!r}; set a whole number, 0 for automatic.")
+    folder = os.environ.get("AVLMAPS_MODELS")
+    return ModelSettings(
+        folder=user_path(folder) if folder else None,
+        device=os.environ.get("AVLMAPS_DEVICE") or "auto",
+        precision=os.environ.get("AVLMAPS_PRECISION") or "auto",  # pyright: ignore[reportArgumentType] - checked there
+        batch=int(batch),
+        offline=os.environ.get("HF_HUB_OFFLINE", "").upper() in ("1", "TRUE", "YES", "ON"),
+    )
+
+
+def environment_of(settings: ModelSettings) -> dict[str, str]:
+    """Return the environment variables that say the same, for processes that this one starts."""
+    return {
+        "AVLMAPS_MODELS": "" if settings.folder is None else str(settings.folder.absolute()),
+        "AVLMAPS_DEVICE": settings.device,
+        "AVLMAPS_PRECISION": settings.precision,
+        "AVLMAPS_BATCH": str(settings.batch),
+        "HF_HUB_OFFLINE": "1" if settings.offline else "0",
+    }
+
+
+def precision_in_force() -> str:
+    """Return the precision in which models on torch run here, ``auto`` resolved once one of them has been loaded."""
+    return model_settings().precision if _current.resolved is None else _current.resolved()
+
+
+def resolve_precision(resolved: Callable[[], str]) -> None:
+    """Take what says in which precision torch runs; who loads torch calls it, since this module stays without."""
+    _current.resolved = resolved
+
+
+@dataclass(slots=True)
+class _Current:
+    settings: ModelSettings | None = None
+    resolved: Callable[[], str] | None = None
+
+
+_current = _Current()
+
+
+def model_settings() -> ModelSettings:
+    """Return the settings in force: those of ``use_models``, else the environment's."""
+    return _current.settings if _current.settings is not None else from_environment()
+
+
+def use_models(settings: ModelSettings | None) -> None:
+    """Load models so from now on, in the whole process; None goes back to the environment. Loaded ones are let go."""
+    _current.settings = settings
+    forget_loaded()
+
+
+@contextmanager
+def using_models(settings: ModelSettings) -> Iterator[None]:
+    """Load models so for a while."""
+    before = _current.settings
+    use_models(settings)
+    try:
+        yield
+    finally:
+        use_models(before)
+
 
 ENTRY_POINT_GROUP = "avlmaps.published_models"
 
