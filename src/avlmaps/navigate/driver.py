@@ -25,7 +25,7 @@ from avlmaps.navigate.controller import (
     turns_for,
 )
 from avlmaps.navigate.costmap import ContactMap, CostSettings, costmap_of
-from avlmaps.navigate.grid_graphs import rooms
+from avlmaps.navigate.grids import rooms
 from avlmaps.navigate.planner import Planner, PlanSettings, Stop
 
 _SAMPLE_M = 0.02  # places along a straight move that are looked at

@@ -1,4 +1,4 @@
-"""The floor grid as graphs for Dijkstra, of its cells and of blocks of cells; what is near and what is seen on it.
+"""The floor grid: a graph of its cells for Dijkstra, its blocks, loops over lines, and what is near and what is seen.
 
 Grids are indexed (i, j) for x and y; places are in cells, so that cell (i, j) covers [i, i + 1) x [j, j + 1).
 """
@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int
+from numba import njit
 from scipy.sparse import csgraph, csr_array
 
 BLOCK = 4
@@ -18,7 +19,6 @@ _STEPS: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {
     (1, 0): (), (0, 1): (), (1, 1): ((1, 0), (0, 1)), (1, -1): ((1, 0), (0, -1)),
     (2, 1): ((1, 0), (1, 1)), (2, -1): ((1, 0), (1, -1)), (1, 2): ((0, 1), (1, 1)), (1, -2): ((0, -1), (1, -1)),
 }  # fmt: skip
-_TOUCHING = ((1, 0), (0, 1), (1, 1), (1, -1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,44 +52,16 @@ class CellGraph:
         return None if nodes is None else self.cells[nodes]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BlockGraph:
-    """The connected parts of blocks of cells, joined where they touch: side by side, or at a corner to be crossed."""
-
-    node: Int[np.ndarray, "nx ny"]
-    middle: Float64[np.ndarray, "parts 2"]
-    weights: csr_array
-
-    @classmethod
-    def of(cls, passable: Bool[np.ndarray, "nx ny"], cost: Float[np.ndarray, "nx ny"]) -> Self:
-        """Split the cells that can be passed into parts of blocks, and join these."""
-        number, cells = _numbered(passable)
-        block = (cells // BLOCK) @ [passable.shape[1] // BLOCK + 1, 1]
-        numbers = np.pad(number, 2, constant_values=-1)
-        joined = [_joined(numbers, cells, step) for step in _TOUCHING]
-        pairs, beside = np.concatenate(joined), np.repeat([True, True, False, False], [len(one) for one in joined])
-        within = block[pairs[:, 0]] == block[pairs[:, 1]]
-        inside = pairs[within & beside]
-        parts, part = csgraph.connected_components(
-            csr_array((np.ones(len(inside), bool), tuple(inside.T)), shape=(len(cells), len(cells))), directed=False
-        )
-        size = np.maximum(np.bincount(part, minlength=parts), 1)
-        means = [np.bincount(part, of, parts) / size for of in (*(cells.T + 0.5), cost[tuple(cells.T)])]
-        middle, mean = np.column_stack(means[:2]), means[2]
-        one, other = np.sort(part[pairs[~within]].astype(np.int64), axis=1).T
-        one, other = np.divmod(np.unique(one * parts + other), max(parts, 1))
-        apart = np.linalg.norm(middle[one] - middle[other], axis=1)
-        node = np.full(passable.shape, -1)
-        node[tuple(cells.T)] = part
-        return cls(
-            node, middle, _symmetric(np.column_stack([one, other]), 0.5 * (mean[one] + mean[other]) * apart, parts)
-        )
-
-    def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"]:
-        """Return the blocks of the cheapest path; those of its ends alone where there is none."""
-        ends = int(self.node[tuple(first)]), int(self.node[tuple(last)])
-        parts = _path(self.weights, *ends)
-        return (self.middle[list(ends) if parts is None else parts] / BLOCK).astype(np.int64)
+def in_blocks(
+    passable: Bool[np.ndarray, "nx ny"], cost: Float[np.ndarray, "nx ny"]
+) -> tuple[Bool[np.ndarray, "bx by"], Float64[np.ndarray, "bx by"]]:
+    """Return which blocks hold a cell that can be passed, and the mean cost of these."""
+    fill = [(0, -size % BLOCK) for size in passable.shape]
+    open_cells = np.pad(passable, fill)
+    tiles = (len(open_cells) // BLOCK, BLOCK, open_cells.shape[1] // BLOCK, BLOCK)
+    count = open_cells.reshape(tiles).sum(axis=(1, 3))
+    total = np.where(open_cells, np.pad(cost, fill), 0.0).reshape(tiles).sum(axis=(1, 3))
+    return count > 0, total / np.maximum(count, 1)
 
 
 def _numbered(mask: Bool[np.ndarray, "nx ny"]) -> tuple[Int[np.ndarray, "nx ny"], Int[np.ndarray, "n 2"]]:
@@ -151,3 +123,80 @@ def farthest_opaque(
     blocked = np.zeros(within.shape, bool)
     blocked[within] = opaque[tuple(at[within].T)]
     return np.where(blocked, part * length[:, None], -1.0).max(axis=1, initial=-1.0)
+
+
+@njit(cache=True)
+def line_cost(ax, ay, bx, by, passable, cost, most):  # noqa: C901  # pragma: no cover - compiled
+    """Return the cost of a straight line (cost of a cell times the length within it).
+
+    It is inf where the line touches a cell that is not passable, a corner included, and where it exceeds ``most``.
+    """
+    nx, ny = passable.shape
+    length = np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+    i, j = int(np.floor(ax)), int(np.floor(ay))
+    for c, d in ((i, j), (int(np.floor(bx)), int(np.floor(by)))):
+        if not (0 <= c < nx and 0 <= d < ny) or not passable[c, d]:
+            return np.inf
+    step_i, step_j = (1 if bx > ax else -1), (1 if by > ay else -1)
+    # The parts of the line at which it crosses into the next cell along an axis, and between two crossings.
+    next_i, delta_i, next_j, delta_j = np.inf, np.inf, np.inf, np.inf
+    if bx != ax:
+        next_i, delta_i = ((i + 1 - ax) if step_i > 0 else (ax - i)) / abs(bx - ax), 1.0 / abs(bx - ax)
+    if by != ay:
+        next_j, delta_j = ((j + 1 - ay) if step_j > 0 else (ay - j)) / abs(by - ay), 1.0 / abs(by - ay)
+    at, total = 0.0, 0.0
+    while True:
+        to = min(next_i, next_j, 1.0)
+        total += (to - at) * length * cost[i, j]
+        if total > most:
+            return np.inf
+        if to >= 1.0 - 1e-12:
+            return total
+        at = to
+        if abs(next_i - next_j) < 1e-9:  # through a corner: the cells beside it are touched
+            for c, d in ((i + step_i, j), (i, j + step_j)):
+                if not (0 <= c < nx and 0 <= d < ny) or not passable[c, d]:
+                    return np.inf
+        if next_i <= to + 1e-9:
+            i += step_i
+            next_i += delta_i
+        if next_j <= to + 1e-9:
+            j += step_j
+            next_j += delta_j
+        if not (0 <= i < nx and 0 <= j < ny) or not passable[i, j]:
+            return np.inf
+
+
+@njit(cache=True)
+def shortcuts(points, passable, cost, window):  # pragma: no cover - compiled
+    """Return which points of a path to keep, so that straight lines between them cost least.
+
+    Args:
+        points: (n, 2) in cells; neighbours are joined by free straight lines.
+        passable: cells that a line may touch.
+        cost: of a cell's length within a cell.
+        window: limit of the points that a line leaps over.
+    """
+    count = points.shape[0]
+    best = np.full(count, np.inf)
+    before = np.zeros(count, np.int64)
+    best[0] = 0.0
+    for b in range(1, count):
+        for back in range(1, min(window, b) + 1):
+            a = b - back
+            most = best[b] - best[a]
+            if np.hypot(points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]) >= most - 1e-9:
+                continue  # a cell costs at least 1, so this line costs at least its length
+            piece = line_cost(points[a, 0], points[a, 1], points[b, 0], points[b, 1], passable, cost, most)
+            if back == 1 and not np.isfinite(piece) and not np.isfinite(best[b]):
+                piece = 1e6 + np.hypot(points[a, 0] - points[b, 0], points[a, 1] - points[b, 1])
+            if best[a] + piece < best[b]:
+                best[b] = best[a] + piece
+                before[b] = a
+    kept = np.zeros(count, np.bool_)
+    at = count - 1
+    while at > 0:
+        kept[at] = True
+        at = before[at]
+    kept[0] = True
+    return kept
