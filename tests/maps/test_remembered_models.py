@@ -112,14 +112,14 @@ def test_only_the_model_that_a_question_needs_is_loaded(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("place", ["/data/of/mine/large.pt", "~/models/large.pt", "./large.pt", "C:\\m\\large.pt"])
 def test_where_a_model_lay_is_nobodys_business(tmp_path: Path, place: str) -> None:
-    stored = build_map(Walk(), tmp_path / "map", used_with(f"chosen@{place}"), SETTINGS)
-    assert stored.data.info.models["pixels"].backend == "chosen@large.pt"
-    assert stored.data.info.models["pixels"].id == "large.pt"
+    data = build_map(Walk(), tmp_path / "map", used_with(f"chosen@{place}"), SETTINGS)
+    assert data.info.models["pixels"].backend == "chosen@large.pt"
+    assert data.info.models["pixels"].id == "large.pt"
     for file in (tmp_path / "map").rglob("*.json"):
         assert place not in json.loads(f"[{json.dumps(file.read_text())}]")[0]
         assert "of/mine" not in file.read_text()
     WEIGHTS["large.pt"] = place  # the same file, found under its name
-    stored.require_model(Kind.PIXELS)
+    AVLMap.open(tmp_path / "map").require_model(Kind.PIXELS)
 
 
 def test_a_path_in_a_strangers_map_is_not_followed(tmp_path: Path) -> None:
