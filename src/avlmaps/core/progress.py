@@ -4,8 +4,8 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Sized
-from contextlib import AbstractContextManager, contextmanager
-from typing import Any, TypeVar
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from typing import Any, TypeVar, cast
 
 from avlmaps.core.printable import printable
 
@@ -114,9 +114,29 @@ def say(message: str) -> None:
 NOTICE = "compiling once for this machine, which later runs skip"
 
 
+_listening: ExitStack | None = None
+
+
 @contextmanager
-def announce_compiling() -> Generator[None]:
-    """Print one line on standard error when something is compiled."""
+def announce_compiling(now: bool = True) -> Generator[None]:
+    """Print one line on standard error when something is compiled.
+
+    That loads the compiler; unless ``now``, it waits for a module of compiled loops to call ``listen_for_compiling``.
+    """
+    global _listening
+    with ExitStack() as _listening:
+        if now or "numba" in sys.modules:
+            listen_for_compiling()
+        try:
+            yield
+        finally:
+            _listening = None
+
+
+def listen_for_compiling() -> None:
+    """Announce what is compiled from now on, where a caller asked for that."""
+    if _listening is None:
+        return
     from numba.core import event
 
     class Listener(event.Listener):
@@ -130,6 +150,5 @@ def announce_compiling() -> Generator[None]:
         def on_end(self, event: object) -> None:
             pass
 
-    install: Callable[..., AbstractContextManager[None]] = event.install_listener  # pyright: ignore[reportUnknownMemberType, reportUnknownVariableType]
-    with install("numba:compile", Listener()):
-        yield
+    announced = event.install_listener("numba:compile", Listener())  # pyright: ignore[reportUnknownMemberType, reportUnknownVariableType]
+    _listening.enter_context(cast("AbstractContextManager[None]", announced))

@@ -8,6 +8,9 @@ from jaxtyping import Float64, Int, Int32, Int64
 from numba import njit
 
 from avlmaps.core.machine import Real, Whole
+from avlmaps.core.progress import listen_for_compiling
+
+listen_for_compiling()
 
 # Blocks within this of the first of them look through the same cones, metres.
 _WIDE_M = 1.6
@@ -177,8 +180,8 @@ def nearest_squared(
         low_after[-t - 1] = min(low_after[-t - 1], low_after[-t])
     reach = np.int64(np.ceil(np.sqrt(limit)))
     for b in range(first, last):
-        begin = np.searchsorted(high_before, low[b, 0] - reach)
-        end = np.searchsorted(low_after, high[b, 0] + reach + 1)
+        begin = np.searchsorted(high_before, np.int64(low[b, 0]) - reach)
+        end = np.searchsorted(low_after, np.int64(high[b, 0]) + reach + 1)
         count = _things_near(low[b], high[b], thing_low, thing_high, begin, end, limit, near, gaps)
         for i in range(starts[b], starts[b + 1]):
             x, y, z = voxels[0, i], voxels[1, i], voxels[2, i]

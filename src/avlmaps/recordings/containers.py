@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Float32
 
+from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import AudioError, NoAudioStreamError
 from avlmaps.core.files import SOUND_BYTES, RefusedFileError, checked_size
 from avlmaps.core.wording import option

@@ -11,8 +11,8 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float32, Int64
 
+from avlmaps.core.arrays import Float32, Int64
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.words import singulars_of
 from avlmaps.language import lexer

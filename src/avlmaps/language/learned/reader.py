@@ -14,8 +14,8 @@ from importlib.resources.abc import Traversable
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32
 
+from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import BackendError
 from avlmaps.language.intents import Inquiry, Intent, Target, on_targets
 from avlmaps.language.learned import linear
