@@ -1,4 +1,4 @@
-"""No module imports itself by way of others, whenever the import is carried out, types included."""
+"""No module imports itself by way of others, whenever the import is carried out; types alone are no import."""
 
 import ast
 from collections import Counter
@@ -22,8 +22,12 @@ def modules() -> dict[str, Path]:
 
 
 def imports(path: Path) -> Iterator[str]:
-    """Yield what a file imports: a module, or a name of one."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    """Yield what a file imports when it runs: a module, or a name of one."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree.body = [
+        node for node in tree.body if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test))
+    ]
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

@@ -49,10 +49,9 @@ def room_map(walk: Path) -> Path:
 
 
 def asked(word: str, encoder: object) -> Question | None:
-    stored = SimpleNamespace(
-        info=SimpleNamespace(models={"pixels": None}, doubts=()), encoders=SimpleNamespace(pixels=encoder)
-    )
-    return thing_alone(Asked(sentence=word), SimpleNamespace(stored=stored))  # pyright: ignore[reportArgumentType]
+    data = SimpleNamespace(info=SimpleNamespace(models={"pixels": None}, doubts=()))
+    avlmap = SimpleNamespace(data=data, encoders=SimpleNamespace(pixels=encoder))
+    return thing_alone(Asked(sentence=word), avlmap)  # pyright: ignore[reportArgumentType]
 
 
 def test_one_word_loads_no_heavy_package(room_map: Path) -> None:

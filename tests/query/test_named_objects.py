@@ -12,19 +12,19 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.pixels import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
 from avlmaps.query import words
-from avlmaps.query.factors import NearAnchors
+from avlmaps.query.factors import NearAnchors, NearThings
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.instances import FeatureVoxels
 from avlmaps.query.modalities.object import colour_in, object_factor
+from avlmaps.query.scores import feature_scores
 from avlmaps.query.settings import HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import (
     ClosestWords,
     EncodedWord,
-    KnownClosestWords,
     Vocabulary,
     least_score_to_count,
-    object_margins,
+    margins_of,
 )
 
 NAMES = ("chair", "dining table", "coffee table", "floor", "other")
@@ -232,14 +232,17 @@ def test_voxels_with_little_of_the_word_need_no_comparison(
     none = dict.fromkeys(("least_confidence", "least_in_company", "guess_below"), 0.0) if rules_of_the_paper else {}
     chosen, part = ObjectSettings(score_in_company=share, **none), Part(Modality.OBJECT, word, Role.PRIMARY)
     vocabulary = Vocabulary.encoded(ENCODER, NAMES)
-    none_known, all_known = (KnownClosestWords.of(vocabulary, len(INDEX)) for _ in range(2))
-    all_known.whole(feature)
-    full, *short = (
-        object_factor(FeatureVoxels(SPACE, feature, ENCODER, each, chosen), part, HeatSettings())
-        for each in (ClosestWords.of(feature, ENCODER, NAMES), vocabulary, none_known, all_known)
-    )
-    for lazy in short:
-        for one, other in ((full, lazy), (full.include_uncertain(), lazy.include_uncertain())):
+    known = vocabulary.closest(feature)
+
+    def found(rivals: Vocabulary) -> tuple[NearThings, NearThings]:
+        one = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, chosen), part, HeatSettings())
+        return one, one.include_uncertain()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(words, "competes_whole", lambda encoder, words: False)  # every voxel is compared
+        full = found(known)
+    for lazy in map(found, (vocabulary, known)):
+        for one, other in zip(full, lazy, strict=True):
             np.testing.assert_array_equal(one.mask, other.mask)
             np.testing.assert_array_equal(one.instance, other.instance)
             np.testing.assert_allclose(one.confidence, other.confidence, atol=1e-6)
@@ -259,15 +262,15 @@ def test_no_voxel_wins_that_its_closest_words_rule_out(
     probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), 200)
     feature = features_of(probability, ENCODER.codes).astype(np.float16)
     feature[::11] = 0.0
-    known = KnownClosestWords.of(Vocabulary.encoded(ENCODER, NAMES), len(feature))
+    known = ClosestWords.of(feature, ENCODER, NAMES)
     encoded = EncodedWord.of_name(ENCODER, word) if alone and word in NAMES else EncodedWord.of(ENCODER, word)
     chosen = ObjectSettings()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(words, "_MOST_PICKED", 1.0)
-        everything = known.whole(feature)
         silent = known.not_competing(ENCODER, encoded, chosen.same_word_cosine)
         rows = known.contenders(ENCODER, encoded, silent, share)
-        margin, score = object_margins(feature, everything, encoded.rows, silent, chosen.least_score)
+        score = feature_scores(feature, encoded.rows)
+        margin = margins_of(score, feature, np.arange(len(score)), known, silent, chosen.least_score)
         assert rows is not None
         assert (np.diff(rows) > 0).all()
         wins = np.flatnonzero((score > share * (score - margin)) | (margin > 0.0))
@@ -275,8 +278,7 @@ def test_no_voxel_wins_that_its_closest_words_rule_out(
 
 
 def test_few_voxels_are_left_for_a_name_that_others_win() -> None:
-    known = KnownClosestWords.of(Vocabulary.encoded(ENCODER, NAMES), len(FEATURE))
-    known.whole(FEATURE)
+    known = ClosestWords.of(FEATURE, ENCODER, NAMES)
     encoded = EncodedWord.of_name(ENCODER, NAMES[3])
     rows = known.contenders(ENCODER, encoded, known.not_competing(ENCODER, encoded, 0.95), 1.0)
     assert rows is not None

@@ -10,9 +10,10 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.query.instances import FeatureVoxels, margin_confidence
 from avlmaps.query.modalities.object import object_factor
+from avlmaps.query.scores import feature_scores
 from avlmaps.query.settings import HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import ClosestWords, object_margins
+from avlmaps.query.words import ClosestWords, margins_of
 
 
 def unit_rows(rng: np.random.Generator, n: int, d: int) -> np.ndarray:
@@ -48,7 +49,8 @@ def test_the_margin_is_that_over_the_best_rival(seed, words, other, few) -> None
     rivals = ClosestWords.of(feature, encoder, encoder.vocabulary)
     silent = np.append(rng.uniform(0, 1, words) < 0.5, [False] * other).astype(bool)
     asked = encoder.table["asked"]
-    margin, _ = object_margins(feature, rivals, asked[None], silent, 0.3)
+    score = feature_scores(feature, asked[None])
+    margin = margins_of(score, feature, np.arange(len(score)), rivals, silent, 0.3)
     wide = feature.astype(np.float32)
     competing = rivals.word_feature[~silent]
     best = (wide @ competing.T).max(axis=1, initial=-np.inf) if len(competing) else np.full(len(wide), -np.inf)

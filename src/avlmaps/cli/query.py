@@ -2,7 +2,6 @@
 
 import shlex
 from collections.abc import Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -94,16 +93,14 @@ class Query(Asking, InFrame, MapVerb):
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
         from avlmaps.core.progress import announce_compiling
         from avlmaps.core.question import Modality
-        from avlmaps.query.asking import AskError, Files, ask, thing_alone
+        from avlmaps.query.asking import AskError, ask
 
-        files, asked = Files(None if self.intrinsics is None else numbers_of(self.intrinsics)), self._asked()
+        asked = replace(self._asked(), camera=None if self.intrinsics is None else numbers_of(self.intrinsics))
         if avlmap.settings != (settings := self._settings()):
             avlmap = type(avlmap)(avlmap.data, avlmap.encoders, path=avlmap.path, settings=settings)
-        # A question about one thing runs no loops that are compiled, and loads nothing to announce them.
-        quick = self.plot is None and thing_alone(asked, avlmap) is not None
         try:
-            with nullcontext() if quick else announce_compiling():
-                found = ask(avlmap, asked, files)
+            with announce_compiling(now=False):
+                found = ask(avlmap, asked)
                 drawn = {}
                 if self.plot is not None and found.heat is not None:
                     drawn = {"plot": str(found.heat.plot(self.plot, top=self.top))}

@@ -28,23 +28,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PartAnswer:
-    """The outcome of one part of a question.
+    """The outcome of one part of a question."""
 
-    Attributes:
-        part: the part.
-        peak: its highest heat anywhere: at the map's voxels and at the places that the heat falls from.
-        found: whether the map holds it: by itself, or since the whole is found.
-        understood: what the encoder could act on.
-        note: why it was not found, or what to know; ``""`` for nothing.
-        probability: that the map holds it.
-    """
-
-    part: Part
-    peak: float
-    found: bool
-    understood: str = ""
-    note: str = ""
-    probability: float = 0.0
+    part: Part  # the part
+    peak: float  # its highest heat anywhere: at the map's voxels and at the places that the heat falls from
+    found: bool  # whether the map holds it: by itself, or since the whole is found
+    understood: str = ""  # what the encoder could act on
+    note: str = ""  # why it was not found, or what to know; ``""`` for nothing
+    probability: float = 0.0  # that the map holds it
 
     def to_dict(self) -> "PartOutcome":
         """Return the part as the command line prints it."""
@@ -65,19 +56,12 @@ class PartAnswer:
 
 @dataclass(frozen=True, slots=True)
 class Alternative:
-    """Another question that the sentence may mean, and its outcome: of "where can I sit?" the armchair.
+    """Another question that the sentence may mean, and its outcome: of "where can I sit?" the armchair."""
 
-    Attributes:
-        question: its parts.
-        probability: that its first goal is right.
-        found: whether that is likely enough.
-        goals: the best one; none where it has none.
-    """
-
-    question: Question
-    probability: float
-    found: bool
-    goals: tuple[Goal, ...] = ()
+    question: Question  # its parts
+    probability: float  # that its first goal is right
+    found: bool  # whether that is likely enough
+    goals: tuple[Goal, ...] = ()  # the best one; none where it has none
 
     def to_dict(self) -> "AlternativeAnswer":
         """Return it as the command line prints it."""
@@ -88,41 +72,27 @@ class Alternative:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Answer:
-    """Goals, best first, and whether they match the query.
+    """Goals, best first, and whether they match the query."""
 
-    Attributes:
-        goals: may hold places even where ``found`` is false: the best guesses, with low scores.
-        found: whether the first goal is likely enough to be right: its probability is at least
-            ``QuerySettings.found_at``.
-        parts: one for each part of the question.
-        elapsed_ms: from the question to the goals.
-        heat: the fused heatmap, for plots.
-        probability: that the first goal is right, all parts together, in [0, 1]; 0 where there is no goal.
-        count: number of likely things, where a sentence asks how many there are.
-        notes: one sentence each: how words were read, and why the map may be wrong.
-        alternatives: what is sought by itself, where nothing is found of it near what the query names; the other
-            questions that a sentence may mean, the likeliest first.
-        storeys: of a map of several.
-        when: the day of each goal, in an answer about several days: when a change was noticed, or a thing last seen.
-        usual: on how many days each goal was there, in an answer about what is usual.
-        alike: number of places that fit as well as the likeliest, itself among them; 0 where nothing is found.
-        text: the answer in one sentence: where the first goal is, or which part failed and what the best guess is.
-    """
-
-    goals: tuple[Goal, ...]
+    goals: tuple[Goal, ...]  # may hold places even where ``found`` is false: the best guesses, with low scores
+    # Whether the first goal is likely enough to be right: its probability is at least ``QuerySettings.found_at``.
     found: bool
-    parts: tuple[PartAnswer, ...]
-    elapsed_ms: float
-    heat: Heatmap | None = field(default=None, repr=False, compare=False)
-    probability: float = 0.0
-    count: int | None = None
-    notes: tuple[str, ...] = ()
+    parts: tuple[PartAnswer, ...]  # one for each part of the question
+    elapsed_ms: float  # from the question to the goals
+    heat: Heatmap | None = field(default=None, repr=False, compare=False)  # the fused heatmap, for plots
+    probability: float = 0.0  # that the first goal is right, all parts together, in [0, 1]; 0 where there is no goal
+    count: int | None = None  # number of likely things, where a sentence asks how many there are
+    notes: tuple[str, ...] = ()  # one sentence each: how words were read, and why the map may be wrong
+    # What is sought by itself, where nothing is found of it near what the query names; the other questions that a
+    # sentence may mean, the likeliest first.
     alternatives: tuple[Alternative, ...] = ()
+    # The answer in one sentence: where the first goal is, or which part failed and what the best guess is.
     text: str = ""
-    storeys: "Storeys | None" = field(default=None, repr=False, compare=False)
+    storeys: "Storeys | None" = field(default=None, repr=False, compare=False)  # of a map of several
+    # The day of each goal, in an answer about several days: when a change was noticed, or a thing last seen.
     when: "tuple[DayAnswer, ...]" = ()
-    usual: "tuple[UsualAnswer, ...]" = ()
-    alike: int = 0
+    usual: "tuple[UsualAnswer, ...]" = ()  # on how many days each goal was there, in an answer about what is usual
+    alike: int = 0  # number of places that fit as well as the likeliest, itself among them; 0 where nothing is found
 
     def __repr__(self) -> str:
         counted = "" if self.count is None else f", count={self.count}"
@@ -132,8 +102,7 @@ class Answer:
     def plot(self, path: str | Path | None = None, *, ax: "Axes | None" = None) -> "Path | Figure":
         """Draw the answer's heat and goals, as ``Heatmap.plot`` does.
 
-        Raises:
-            QueryError: the answer is from a list and has no heat, or the picture cannot be written there.
+        ``QueryError``: the answer is from a list and has no heat, or the picture cannot be written there.
         """
         if self.heat is None:
             raise QueryError("The answer comes from a list of the map, and has no heat to draw; plot the map instead.")
@@ -215,7 +184,6 @@ def found_text(parts: Sequence[PartAnswer], goal: Goal, count: int | None = None
 
 
 def _spelt(one: PartAnswer) -> str:
-    """Return the name of a part, spelt as it was understood: "sofa" for "sofaa"."""
     is_word = len(one.understood.split()) == len(one.part.query.split()) == 1
     return one.understood if is_word else one.part.query
 
@@ -226,13 +194,7 @@ def placed(text: str, goal: Goal) -> str:
 
 
 def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alternative | None) -> str:
-    """Return which part of a query failed, and the best guess.
-
-    Args:
-        parts: of the answer.
-        goals: its best guesses.
-        alone: the thing by itself, where the query says what it is near.
-    """
+    """Return which part of a query failed, and the best guess."""
     lead = next(part for part in parts if part.part.role is Role.PRIMARY)
     missing = [part for part in parts if not part.found]
     if missing:

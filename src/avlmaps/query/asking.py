@@ -1,6 +1,7 @@
 """One function answers every query: a sentence or parts, from Python, the command line, the server and the viewer.
 
-The questions of a sentence are alternatives: the likeliest answer counts, and the others are named beside it.
+``KINDS`` are the kinds of question: each reads what is asked and answers, or leaves it to the next. The questions that
+a sentence may mean are alternatives: the likeliest answer counts, and the others are named beside it.
 """
 
 import itertools
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float
+from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
 from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
@@ -24,23 +26,22 @@ from avlmaps.query.answer import UNDERSTOOD_ONLY, Alternative, Answer, PartAnswe
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
 from avlmaps.query.goals import Goal, alike
 from avlmaps.query.heatmap import Heatmap, product
+from avlmaps.query.modalities.image import Attachment, Photo, read_picture
 from avlmaps.query.places import distance_m, place_given
 from avlmaps.query.whereabouts import own_names
 
 if TYPE_CHECKING:
-    from avlmaps.core.camera import Pinhole
     from avlmaps.language.questions import AskedSentence
     from avlmaps.language.sentence import OwnName
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.queryable import Attachment
 
 _MOST_ALIKE = 10  # goals that are looked at for others that fit as well
-# For a count, up to this many instances are taken; those that are found count.
 MOST_GOALS = 200
+"""For a count, up to this many instances are taken; those that are found count."""
 # Each way to name a storey has one of these: floor, storey, story, stories, level, upstairs.
 _STOREY_STEMS = ("floor", "stor", "level", "stair")
-AS_NEAR = "distance counts, the side does not."
+_AS_NEAR = "distance counts, the side does not."
 _BETWEEN = re.compile(r"\bbetween\b", re.IGNORECASE)
 # "There is no chair in the kitchen, right?"
 _STATED = re.compile(
@@ -60,37 +61,31 @@ class AskError(QueryError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """A query as it is given: a sentence, or parts; a file may come with either.
-
-    Attributes:
-        sentence: in words.
-        object: an object by its name.
-        sound: a sound by its name.
-        area: an area by its name.
-        image: a photo: the path of a file, or the name of an attachment.
-        clip: a sound clip, likewise.
-        primary: the part that is sought. None: the sentence says it, or the first of object, image, sound, area.
-        top: most goals.
-        at: the place of its sounds; None: as the map's settings say, else as the words do.
-        at_by_words: its words chose ``at``: of several sounds, each may have a place of its own.
-    """
+    """A query as it is given: a sentence, parts, or a question made of parts; a file may come with a sentence."""
 
     sentence: str = ""
+    question: Question | None = None
     object: str | None = None
     sound: str | None = None
     area: str | None = None
-    image: str | None = None
-    clip: str | None = None
-    primary: Modality | None = None
+    image: str | None = None  # a photo: the path of a file, or the name of an attachment
+    clip: str | None = None  # a sound clip, likewise
+    primary: Modality | None = None  # the part that is sought; None: the sentence says it, or the first part
     top: int = 3
-    at: HeardAt | None = None
-    near: str | Sequence[float] | None = None
-    at_by_words: bool = False
+    at: HeardAt | None = None  # the place of its sounds; None: as the map's settings say, else as the words do
+    near: str | Sequence[float] | None = None  # the goals nearest to this place come first
+    at_by_words: bool = False  # its words chose ``at``: of several sounds, each may have a place of its own
+    camera: Pinhole | Sequence[float] | None = None  # of its photo, or fx, fy, cx, cy in pixels; None: the map's own
+    attachments: Mapping[str, Attachment] | None = None  # by name; None where the names are those of files
 
     def __post_init__(self) -> None:
         if not isinstance(self.sentence, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise AskError(f"A query is a sentence, such as: {_EXAMPLE}; not {type(self.sentence).__name__}.")
         named = any(part is not None for part in (self.object, self.sound, self.area))
+        if self.question is not None:
+            if named or self.files or self.primary is not None:
+                raise AskError("A question holds its parts already; give a sentence or parts instead.")
+            return
         words = bool(self.sentence.strip())
         if words == named and (words or not self.files):
             raise AskError(
@@ -115,80 +110,60 @@ class Asked:
         )
         return tuple(Part(modality, query, is_file=is_file) for modality, query, is_file in named if query is not None)
 
-
-@dataclass(frozen=True, slots=True)
-class Files:
-    """What belongs to the files of a query.
-
-    Attributes:
-        camera: of its pictures: a camera, or its fx, fy, cx, cy in pixels; None for the map's own.
-        attachments: pictures and sounds by name; None where the names are those of files.
-    """
-
-    camera: "Pinhole | Sequence[float] | None" = None
-    attachments: "Mapping[str, Attachment] | None" = None
-
-    def camera_of(self, question: Question) -> "Pinhole | None":
+    def camera_of(self, question: Question) -> Pinhole | None:
         """Return the camera of a question's picture.
 
-        Raises:
-            AskError: the question has no picture, or no camera has such numbers.
+        ``AskError``: the question has no picture, or no camera has such numbers.
         """
-        from avlmaps.core.camera import Pinhole
-
         if self.camera is None or isinstance(self.camera, Pinhole):
             return self.camera
-        picture = next((part.query for part in question.parts if part.modality is Modality.IMAGE), None)
-        if picture is None:
+        picture = next((part.query for part in question.parts if part.modality is Modality.IMAGE), "")
+        attached = None if self.attachments is None else self.attachments.get(picture)
+        rgb = attached.rgb if isinstance(attached, Photo) else attached
+        if picture and self.attachments is None:
+            rgb = read_picture(user_path(picture))
+        if not isinstance(rgb, np.ndarray):
             raise AskError("Intrinsics belong to a photo; there is none.")
         try:
             fx, fy, cx, cy = self.camera
-            height, width = self._shape(picture)
-            return Pinhole(fx, fy, cx, cy, width=width, height=height)
+            return Pinhole(fx, fy, cx, cy, width=rgb.shape[1], height=rgb.shape[0])
         except ValueError:
             raise AskError(
                 f"Intrinsics are fx,fy,cx,cy in pixels, such as 525,525,320,240; not {tuple(self.camera)}."
             ) from None
 
-    def _shape(self, picture: str) -> tuple[int, int]:
-        from avlmaps.query.modalities.image import read_picture
-        from avlmaps.query.queryable import Photo
 
-        if self.attachments is None:
-            return read_picture(user_path(picture)).shape[:2]
-        attached = self.attachments.get(picture)
-        rgb = attached.rgb if isinstance(attached, Photo) else attached
-        if not isinstance(rgb, np.ndarray):
-            raise AskError("Intrinsics belong to a photo; there is none.")
-        return rgb.shape[:2]
+@dataclass(frozen=True, slots=True)
+class _Asking:
+    avlmap: "AVLMap"
+    asked: Asked
+
+    def but(self, **changes: object) -> "_Asking":
+        return _Asking(self.avlmap, replace(self.asked, **changes))  # pyright: ignore[reportArgumentType]
+
+    def answer(self, kinds: "Sequence[_Kind]") -> Answer:
+        return next(found for kind in kinds if (found := kind(self)) is not None)
 
 
-def ask(avlmap: "AVLMap", asked: Asked, files: Files | None = None) -> Answer:
+_Kind = Callable[[_Asking], Answer | None]
+
+
+def ask(avlmap: "AVLMap", asked: Asked) -> Answer:
     """Answer a sentence or parts.
 
-    Raises:
-        AskError: the sentence does not speak of a file that was given, or intrinsics come without a photo.
-        QueryError: the sentence is not understood, or a part of it cannot be used.
+    ``AskError``: the sentence does not speak of a file that was given, or intrinsics come without a photo.
+    ``QueryError``: the sentence is not understood, or a part of it cannot be used.
     """
-    begin, files = time.perf_counter(), files or Files()
-    sentence = asked.sentence.lower()
-    # A query of one word loads nothing of the language.
-    speaks_of_storeys = any(stem in sentence for stem in _STOREY_STEMS)
+    begin, asking = time.perf_counter(), _Asking(avlmap, asked)
     place = None if asked.near is None else place_given(asked.near)
-    listed = place is not None and _asks_for_list(avlmap, asked)
-    wanted = asked if place is None or listed else replace(asked, top=MOST_GOALS)
-    answer = (_ask_of_storeys if speaks_of_storeys else _ask)(avlmap, wanted, files)
-    if listed:
+    if place is None:
+        answer = asking.answer(KINDS)
+    elif asked.sentence.strip() and _read_list(asking) is not None:
+        answer = asking.answer(KINDS)
         answer = replace(answer, notes=(*answer.notes, _OF_A_LIST))
-    elif place is not None:
-        answer = nearest_first(avlmap, answer, place, asked.top)
+    else:
+        answer = nearest_first(avlmap, asking.but(top=MOST_GOALS).answer(KINDS), place, asked.top)
     return on_storey(replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin)), avlmap.storeys)
-
-
-def _asks_for_list(avlmap: "AVLMap", asked: Asked) -> bool:
-    from avlmaps.language.list_questions import read_list
-
-    return bool(asked.sentence.strip()) and read_list(asked.sentence, own_names(avlmap, asked.sentence)) is not None
 
 
 def nearest_first(avlmap: "AVLMap", answer: Answer, place: Float[np.ndarray, " n"], top: int) -> Answer:
@@ -199,8 +174,7 @@ def nearest_first(avlmap: "AVLMap", answer: Answer, place: Float[np.ndarray, " n
     """
     from avlmaps.language.questions import FROM_NOWHERE
 
-    if top < 1:
-        raise AskError(f"At most {top} goals are wanted; the number must be 1 or more.")
+    _require_some(top)
     if not answer.found or not answer.goals:
         return replace(answer, goals=answer.goals[:top])
     least = max(avlmap.settings.found_at, answer.goals[0].probability / 2.0)
@@ -218,20 +192,6 @@ def nearest_first(avlmap: "AVLMap", answer: Answer, place: Float[np.ndarray, " n
     return replace(answer, goals=goals, text=text, notes=notes)
 
 
-def _ask_of_storeys(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
-    from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
-    from avlmaps.query.lists import answer_on_storey, how_many
-
-    if asks_how_many_storeys(asked.sentence):
-        return how_many(avlmap)
-    said = said_storeys(asked.sentence)
-    if not said:
-        return _ask(avlmap, asked, files)
-    return answer_on_storey(
-        avlmap, said, asked.top, lambda rest, top: _ask(avlmap, replace(asked, sentence=rest, top=top), files)
-    )
-
-
 def on_storey(answer: Answer, storeys: "Storeys | None") -> Answer:
     """Return an answer of a map of several storeys with the storey of each goal, and that of the first in its text."""
     if storeys is None:
@@ -243,64 +203,127 @@ def on_storey(answer: Answer, storeys: "Storeys | None") -> Answer:
     return replace(answer, storeys=storeys, text=text)
 
 
-def _ask(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
-    question = thing_alone(asked, avlmap)
+# The kinds of question.
+
+
+def _of_storeys(asking: _Asking) -> Answer | None:
+    sentence = asking.asked.sentence
+    if not any(stem in sentence.lower() for stem in _STOREY_STEMS):  # a query of one word loads nothing of the language
+        return None
+    from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
+    from avlmaps.query.lists import answer_on_storey, how_many
+
+    if asks_how_many_storeys(sentence):
+        return how_many(asking.avlmap)
+    said = said_storeys(sentence)
+    if not said:
+        return None
+    return answer_on_storey(
+        asking.avlmap, said, asking.asked.top, lambda rest, top: asking.but(sentence=rest, top=top).answer(KINDS[1:])
+    )
+
+
+def _of_parts(asking: _Asking) -> Answer | None:
+    asked = asking.asked
+    question = asked.question or thing_alone(asked, asking.avlmap)
     if question is None and asked.parts and not asked.sentence.strip():
         question = Question.of(asked.parts, asked.primary)
-    if question is not None:
-        return answer_question(avlmap, question.heard_at(asked.at), asked.top, files)
-    return _answer_sentence(avlmap, asked, files)
+    return None if question is None else answer_question(asking.avlmap, question.heard_at(asked.at), asked)
 
 
-def answer_question(
-    avlmap: "AVLMap", question: Question, top: int = 3, files: Files | None = None, *, between: bool = False
-) -> Answer:
-    """Answer a question whose parts are known; ``between`` says that the goals lie between its first two other things.
+def _of_sources(asking: _Asking) -> Answer | None:
+    from avlmaps.language.source_words import asks_for_source
+    from avlmaps.query.sound_sources import no_sources
 
-    Raises:
-        AskError: intrinsics come without a photo, or no goal is wanted.
-        QueryError: a part cannot be used.
-    """
-    begin, files = time.perf_counter(), files or Files()
-    if top < 1:
-        raise AskError(f"At most {top} goals are wanted; the number must be 1 or more.")
-    camera = files.camera_of(question)
-    heats = [avlmap.heat(part, camera, files.attachments) for part in question.parts]
-    heat = product(heats)
-    if between:
-        heat = heat.only(lies_between(heat))
-    several, found = tuple(heat.goals(max(top, _MOST_ALIKE))), heat.found
-    goals, equal = several[:top], alike(several, heat.found_at)
-    said = (replace(part, at=factor.part.at) for part, factor in zip(question.parts, heat.factors, strict=True))
-    question = Question(tuple(said))
-    parts = tuple(_part_answer(*both, heat) for both in zip(question.parts, heat.factors, strict=True))
-    alone = () if found or len(heats) == 1 else (_alone(question, heats),)
-    text = found_text(parts, goals[0], alike=equal) if found else absent_text(parts, goals, next(iter(alone), None))
-    if between:
-        a, b = (part.query for part in question.parts if part.role is Role.CONTEXT and part.modality is Modality.OBJECT)
-        text = text.replace(f"near the {a} near the {b}", f"between the {a} and the {b}")
-    elapsed_ms = 1e3 * (time.perf_counter() - begin)
-    named = {kind: [part.query for part in question.parts if part.modality is kind] for kind in Modality}
-    places = [goal.position for goal in goals] if found else []
-    said = avlmap.edited.said_of(places, named[Modality.OBJECT], named[Modality.AREA])
-    notes = (*avlmap.data.info.doubts, *said)
-    return Answer(
-        goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone, notes=notes,
-        alike=len(equal) if found else 0,
+    if (asking.asked.at or asking.avlmap.settings.sounds.at) is not None or not asks_for_source(asking.asked.sentence):
+        return None
+    why = no_sources(asking.avlmap)
+    answer = (asking if why else asking.but(at="source", at_by_words=True)).answer(KINDS[3:])
+    silent = answer.parts and not any(one.part.modality is Modality.SOUND for one in answer.parts)
+    return answer if silent or not why else replace(answer, notes=(why, *answer.notes))
+
+
+def _of_lists(asking: _Asking) -> Answer | None:
+    from avlmaps.query.lists import answer_list
+
+    listed = _read_list(asking)
+    if listed is None:
+        return None
+    return answer_list(
+        asking.avlmap, listed, asking.asked.top, lambda words: _about(asking, words), asking.asked.at
     )  # fmt: skip
 
 
-def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
-    own = _probability(factor)
-    if not whole.found or factor.found:
-        return PartAnswer(part, _peak(factor), factor.found, factor.understood, factor.note, own)
-    kept = [one for one in factor.note.split("; ") if part.is_file or one.startswith(UNDERSTOOD_ONLY)]
-    return PartAnswer(part, _peak(factor), True, factor.understood, "; ".join(kept), max(own, whole.probability))
+def _read_list(asking: _Asking):
+    from avlmaps.language.list_questions import read_list
+
+    return read_list(asking.asked.sentence, own_names(asking.avlmap, asking.asked.sentence))
 
 
-def _alone(question: Question, heats: Sequence[Heatmap]) -> Alternative:
-    part, heat = next(both for both in zip(question.parts, heats, strict=True) if both[0].role is Role.PRIMARY)
-    return Alternative(Question.of([part]), heat.probability, heat.found, tuple(heat.goals(1)))
+def _about(asking: _Asking, words: str) -> Answer:
+    from avlmaps.language.list_questions import speaks_of_photo
+
+    asked = asking.asked
+    if asked.image is not None and asked.clip is None and speaks_of_photo(words):
+        photo = Part(Modality.IMAGE, asked.image, is_file=True)
+        return answer_question(asking.avlmap, Question.of([photo]), asked)
+    return _read(asking.but(sentence=words, primary=None))
+
+
+def _of_numbers(asking: _Asking) -> Answer | None:
+    from avlmaps.language.list_questions import said_number
+
+    numbered = said_number(asking.asked.sentence)
+    if numbered is None:
+        return None
+    number, what = numbered
+    answer = _read(asking.but(sentence=f"how many {what} are there", top=MOST_GOALS))
+    count = answer.count or 0
+    said = f"{count} of the {number} {what} are found" if count < number else f"{count} {what} are found"
+    goals = answer.goals[: min(max(number, 1), MOST_GOALS)]
+    return replace(answer, goals=goals, found=count >= number, text=f"{said[:1].upper()}{said[1:]}. {answer.text}")
+
+
+def _of_claims(asking: _Asking) -> Answer | None:
+    stated = _STATED.fullmatch(asking.asked.sentence.strip())
+    if stated is None:
+        return None
+    answer = _read(asking.but(sentence=f"{stated['verb'].lower()} there {stated['what']}"))
+    is_right = answer.found != bool(stated["no"])
+    return replace(answer, text=f"{'Yes' if is_right else 'No'}. {answer.text}")
+
+
+def _read(asking: _Asking) -> Answer:
+    asked, avlmap = asking.asked, asking.avlmap
+    questions, notes, counted = _questions(asked, own_names(avlmap, asked.sentence))
+    answers: list[tuple[Question, Answer]] = []
+    for question in (_placed(one, asked.at) for one in questions):
+        if asked.primary is not None:
+            question = Question.of(question.parts, asked.primary)
+        used = {part.query for part in question.parts if part.is_file}
+        if not used.issuperset(asked.files):
+            raise AskError(
+                "The sentence does not speak of the file; say 'near where this photo was taken' or 'near the sound of "
+                "this recording' in it, or take the sentence or the file away."
+            )
+        wanted = replace(asked, top=MOST_GOALS) if counted else asked
+        answers.append((question, answer_question(avlmap, question, wanted, between=_is_between(asked, question))))
+    answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
+    best, others = answers[0][1], answers[1:]
+    alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)
+    if counted and any(one.part.role is Role.PRIMARY and one.part.modality is Modality.AREA for one in best.parts):
+        best = replace(best, goals=_one_a_room(avlmap, best.goals))
+    count = sum(goal.probability >= avlmap.settings.found_at for goal in best.goals) if counted else None
+    text = found_text(best.parts, best.goals[0], count) if best.found and counted else best.text
+    sides = " ".join(note for note in notes if note.endswith(_AS_NEAR)) if best.found else ""
+    return replace(
+        best, goals=best.goals[: asked.top], count=count, notes=(*notes, *best.notes),
+        alternatives=(*best.alternatives, *alternatives), text=f"{text} {sides}".rstrip(),
+    )  # fmt: skip
+
+
+KINDS: tuple[_Kind, ...] = (_of_storeys, _of_parts, _of_sources, _of_lists, _of_numbers, _of_claims, _read)
+"""The kinds of question, in the order in which they are tried."""
 
 
 def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
@@ -321,145 +344,20 @@ def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
     return Question.of([Part(Modality.OBJECT, asked.sentence)]) if is_name else None
 
 
-def _answer_sentence(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
-    from avlmaps.language.source_words import asks_for_source
-    from avlmaps.query.sound_sources import no_sources
-
-    if (asked.at or avlmap.settings.sounds.at) is not None or not asks_for_source(asked.sentence):
-        return _answer_said(avlmap, asked, files)
-    why = no_sources(avlmap)
-    answer = _answer_said(avlmap, asked if why else replace(asked, at="source", at_by_words=True), files)
-    silent = answer.parts and not any(one.part.modality is Modality.SOUND for one in answer.parts)
-    return answer if silent or not why else replace(answer, notes=(why, *answer.notes))
-
-
-def _answer_said(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
-    from avlmaps.language.list_questions import read_list, said_number
-    from avlmaps.query.lists import answer_list
-
-    listed, numbered = read_list(asked.sentence, own_names(avlmap, asked.sentence)), said_number(asked.sentence)
-    if listed is not None:
-        return answer_list(
-            avlmap, listed, asked.top, lambda words: _answer_words(avlmap, asked, words, files), asked.at
-        )
-    stated = _STATED.fullmatch(asked.sentence.strip())
-    if numbered is None and stated is not None:
-        verb, what = stated["verb"].lower(), stated["what"]
-        answer = _answer_read(avlmap, replace(asked, sentence=f"{verb} there {what}"), files)
-        is_right = answer.found != bool(stated["no"])
-        return replace(answer, text=f"{'Yes' if is_right else 'No'}. {answer.text}")
-    if numbered is None:
-        return _answer_read(avlmap, asked, files)
-    number, what = numbered
-    answer = _answer_read(avlmap, replace(asked, sentence=f"how many {what} are there", top=MOST_GOALS), files)
-    count = answer.count or 0
-    said = f"{count} of the {number} {what} are found" if count < number else f"{count} {what} are found"
-    goals = answer.goals[: min(max(number, 1), MOST_GOALS)]
-    return replace(answer, goals=goals, found=count >= number, text=f"{said[:1].upper()}{said[1:]}. {answer.text}")
-
-
-def _answer_words(avlmap: "AVLMap", asked: Asked, words: str, files: Files) -> Answer:
-    from avlmaps.language.list_questions import speaks_of_photo
-
-    if asked.image is not None and asked.clip is None and speaks_of_photo(words):
-        photo = Part(Modality.IMAGE, asked.image, is_file=True)
-        return answer_question(avlmap, Question.of([photo]), asked.top, files)
-    return _answer_read(avlmap, replace(asked, sentence=words, primary=None), files)
-
-
-def _answer_read(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
-    """Answer the questions that a sentence is read as; the likeliest counts."""
-    questions, notes, counted = _questions(asked, own_names(avlmap, asked.sentence))
-    answers: list[tuple[Question, Answer]] = []
-    for question in (_placed(one, asked.at) for one in questions):
-        if asked.primary is not None:
-            question = Question.of(question.parts, asked.primary)
-        used = {part.query for part in question.parts if part.is_file}
-        if not used.issuperset(asked.files):
-            raise AskError(
-                "The sentence does not speak of the file; say 'near where this photo was taken' or 'near the sound of "
-                "this recording' in it, or take the sentence or the file away."
-            )
-        most = MOST_GOALS if counted else asked.top
-        answers.append((question, answer_question(avlmap, question, most, files, between=_is_between(asked, question))))
-    answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
-    best, others = answers[0][1], answers[1:]
-    alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)
-    if counted and any(one.part.role is Role.PRIMARY and one.part.modality is Modality.AREA for one in best.parts):
-        best = replace(best, goals=_one_a_room(avlmap, best.goals))
-    count = sum(goal.probability >= avlmap.settings.found_at for goal in best.goals) if counted else None
-    text = found_text(best.parts, best.goals[0], count) if best.found and counted else best.text
-    sides = " ".join(note for note in notes if note.endswith(AS_NEAR)) if best.found else ""
-    return replace(
-        best,
-        goals=best.goals[: asked.top],
-        count=count,
-        notes=(*notes, *best.notes),
-        alternatives=(*best.alternatives, *alternatives),
-        text=f"{text} {sides}".rstrip(),
-    )
-
-
-def _is_between(asked: Asked, question: Question) -> bool:
-    things = [part for part in question.parts if part.modality is Modality.OBJECT and part.role is Role.CONTEXT]
-    return len(things) == 2 and _BETWEEN.search(asked.sentence) is not None
-
-
-def lies_between(heat: Heatmap) -> "Callable[[Float[np.ndarray, 'n 3']], Bool[np.ndarray, ' n']]":
-    """Return which places lie between an instance of one thing of context and one of another, on the plan."""
-    marks = [factor for factor in heat.factors if isinstance(factor, NearThings) and factor is not heat.lead]
-    one, other = ([_middle(factor, number) for number in range(len(factor.confidence))] for factor in marks[:2])
-
-    def between(places: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
-        level, out = heat.space.level(places)[:, :2], np.zeros(len(places), bool)
-        for a, b in itertools.product(one, other):
-            along = b - a
-            length_m = float(np.linalg.norm(along))
-            share = (level - a) @ along / max(length_m**2, 1e-9)
-            aside_m = np.abs((level - a) @ np.array([-along[1], along[0]])) / max(length_m, 1e-9)
-            out |= (share > 0.0) & (share < 1.0) & (aside_m <= max(length_m / 4.0, _ASIDE_M))
-        return out
-
-    return between
-
-
-def _middle(factor: NearThings, number: int) -> Float[np.ndarray, "2"]:
-    return factor.space.level(factor.anchors[factor.instance == number].mean(axis=0))[:2]
-
-
-def _one_a_room(avlmap: "AVLMap", goals: Sequence[Goal]) -> tuple[Goal, ...]:
-    from avlmaps.query.whereabouts import NOWHERE, Whereabouts
-
-    rooms: list[int] = Whereabouts.of(avlmap).rooms_of(np.array([goal.position for goal in goals])).tolist()
-    first = {room: at for at, room in reversed(list(enumerate(rooms)))}
-    return tuple(goal for at, goal in enumerate(goals) if rooms[at] == NOWHERE or first[rooms[at]] == at)
-
-
-def _placed(question: Question, at: HeardAt | None) -> Question:
-    """Return a question with its sounds at a place.
-
-    Several that say where a thing is have each the place of its own words, if those of one do. Where a sound is sought,
-    the words round it stand at both ends: "where does the barking near the sound of water come from?".
-    """
-    places = [part.at for part in question.parts if part.modality is Modality.SOUND]
-    each = len(places) > 1 and any(places) and question.parts[0].modality is not Modality.SOUND
-    return question if each else question.heard_at(at)
-
-
 def _questions(asked: Asked, own: "tuple[OwnName, ...]") -> tuple[tuple[Question, ...], tuple[str, ...], bool]:
     from avlmaps.language.intents import Ask
     from avlmaps.language.list_questions import said_alternatives
 
-    said = said_alternatives(asked.sentence) or (asked.sentence,)
     at = None if asked.at_by_words else "robot"
-    read = [_read(words, asked.image, asked.clip, own, at) for words in said]
+    said = said_alternatives(asked.sentence) or (asked.sentence,)
+    read = [_read_words(words, asked.image, asked.clip, own, at) for words in said]
     questions = tuple(dict.fromkeys(question for one in read for question in one.questions))
     notes = tuple(dict.fromkeys(note for one in read for note in one.notes))
     return questions, notes, read[0].inquiry.ask is Ask.HOW_MANY
 
 
 @lru_cache(maxsize=512)
-def _read(
+def _read_words(
     sentence: str, image: str | None, clip: str | None, own: "tuple[OwnName, ...]", at: HeardAt | None
 ) -> "AskedSentence":
     from avlmaps.language.questions import read_question
@@ -468,15 +366,100 @@ def _read(
     return read_question(sentence, Attachments(image, clip, knows=lambda _: True, at=at, own=own))
 
 
-def _probability(factor: Factor) -> float:
-    if not factor.is_named:
-        return 0.0
+def _placed(question: Question, at: HeardAt | None) -> Question:
+    # Several sounds that say where a thing is have each the place of its own words, if those of one do. Where a sound
+    # is sought, the words round it stand at both ends: "where does the barking near the sound of water come from?".
+    places = [part.at for part in question.parts if part.modality is Modality.SOUND]
+    each = len(places) > 1 and any(places) and question.parts[0].modality is not Modality.SOUND
+    return question if each else question.heard_at(at)
+
+
+def _is_between(asked: Asked, question: Question) -> bool:
+    things = [part for part in question.parts if part.modality is Modality.OBJECT and part.role is Role.CONTEXT]
+    return len(things) == 2 and _BETWEEN.search(asked.sentence) is not None
+
+
+def _require_some(top: int) -> None:
+    if top < 1:
+        raise AskError(f"At most {top} goals are wanted; the number must be 1 or more.")
+
+
+def answer_question(avlmap: "AVLMap", question: Question, asked: Asked, *, between: bool = False) -> Answer:
+    """Answer a question whose parts are known; ``between`` says that the goals lie between its first two other things.
+
+    ``AskError``: intrinsics come without a photo, or no goal is wanted. ``QueryError``: a part cannot be used.
+    """
+    begin = time.perf_counter()
+    _require_some(asked.top)
+    camera = asked.camera_of(question)
+    heats = [avlmap.heat(part, camera, asked.attachments) for part in question.parts]
+    heat = product(heats)
+    if between:
+        heat = heat.only(_lies_between(heat))
+    several, found = tuple(heat.goals(max(asked.top, _MOST_ALIKE))), heat.found
+    goals, equal = several[: asked.top], alike(several, heat.found_at)
+    said = (replace(part, at=factor.part.at) for part, factor in zip(question.parts, heat.factors, strict=True))
+    question = Question(tuple(said))
+    parts = tuple(_part_answer(*both, heat) for both in zip(question.parts, heat.factors, strict=True))
+    alone = () if found or len(heats) == 1 else (_alone(question, heats),)
+    text = found_text(parts, goals[0], alike=equal) if found else absent_text(parts, goals, next(iter(alone), None))
+    if between:
+        a, b = (part.query for part in question.parts if part.role is Role.CONTEXT and part.modality is Modality.OBJECT)
+        text = text.replace(f"near the {a} near the {b}", f"between the {a} and the {b}")
+    elapsed_ms = 1e3 * (time.perf_counter() - begin)
+    named = {kind: [part.query for part in question.parts if part.modality is kind] for kind in Modality}
+    places = [goal.position for goal in goals] if found else []
+    notes = avlmap.edited.said_of(places, named[Modality.OBJECT], named[Modality.AREA])
+    return Answer(
+        goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone,
+        notes=(*avlmap.data.info.doubts, *notes), alike=len(equal) if found else 0,
+    )  # fmt: skip
+
+
+def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
+    best, peak = float(np.max(factor.confidence, initial=0.0)), 0.0
     if isinstance(factor, NearAnchors):
-        return float((factor.scores * factor.confidence[factor.instance]).max(initial=0.0))
-    return float(np.max(factor.confidence, initial=0.0))
+        best = float((factor.scores * factor.confidence[factor.instance]).max(initial=0.0))
+        peak = float(factor.scores.max(initial=0.0))
+    elif isinstance(factor, NearThings):
+        peak = float(factor.mask.any())
+    own = best if factor.is_named else 0.0
+    if not whole.found or factor.found:
+        return PartAnswer(part, peak, factor.found, factor.understood, factor.note, own)
+    kept = [one for one in factor.note.split("; ") if part.is_file or one.startswith(UNDERSTOOD_ONLY)]
+    return PartAnswer(part, peak, True, factor.understood, "; ".join(kept), max(own, whole.probability))
 
 
-def _peak(factor: Factor) -> float:
-    if isinstance(factor, NearThings):
-        return float(factor.mask.any())
-    return float(factor.scores.max(initial=0.0)) if isinstance(factor, NearAnchors) else 0.0
+def _alone(question: Question, heats: Sequence[Heatmap]) -> Alternative:
+    part, heat = next(both for both in zip(question.parts, heats, strict=True) if both[0].role is Role.PRIMARY)
+    return Alternative(Question.of([part]), heat.probability, heat.found, tuple(heat.goals(1)))
+
+
+def _lies_between(heat: Heatmap) -> "Callable[[Float[np.ndarray, 'n 3']], Bool[np.ndarray, ' n']]":
+    # Which places lie between an instance of one thing of context and one of another, on the plan.
+    marks = [factor for factor in heat.factors if isinstance(factor, NearThings) and factor is not heat.lead]
+    level = heat.space.level
+    one, other = (
+        [level(mark.anchors[mark.instance == k].mean(axis=0))[:2] for k in range(len(mark.confidence))]
+        for mark in marks[:2]
+    )
+
+    def between(places: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
+        at, out = level(places)[:, :2], np.zeros(len(places), bool)
+        for a, b in itertools.product(one, other):
+            along = b - a
+            length_m = float(np.linalg.norm(along))
+            share = (at - a) @ along / max(length_m**2, 1e-9)
+            aside_m = np.abs((at - a) @ np.array([-along[1], along[0]])) / max(length_m, 1e-9)
+            out |= (share > 0.0) & (share < 1.0) & (aside_m <= max(length_m / 4.0, _ASIDE_M))
+        return out
+
+    return between
+
+
+def _one_a_room(avlmap: "AVLMap", goals: Sequence[Goal]) -> tuple[Goal, ...]:
+    from avlmaps.query.whereabouts import NOWHERE, Whereabouts
+
+    rooms: list[int] = Whereabouts.of(avlmap).rooms_of(np.array([goal.position for goal in goals])).tolist()
+    first = {room: at for at, room in reversed(list(enumerate(rooms)))}
+    return tuple(goal for at, goal in enumerate(goals) if rooms[at] == NOWHERE or first[rooms[at]] == at)

@@ -32,23 +32,14 @@ RoomOf = Callable[[tuple[float, float, float]], str | None]
 
 @dataclass(frozen=True, slots=True)
 class Days:
-    """The days of a map and what became of its things.
+    """The days of a map and what became of its things."""
 
-    Attributes:
-        visits: the days, in the order of time.
-        life: of the things.
-    """
-
-    visits: "tuple[Visit, ...]"
-    life: "Life"
+    visits: "tuple[Visit, ...]"  # the days, in the order of time
+    life: "Life"  # of the things
 
     @classmethod
     def of(cls, stored: "AVLMap", corrected: "Callable[[Life], Life] | None" = None) -> "Days":
-        """Return those of a map.
-
-        Raises:
-            QueryError: it was seen on one day alone.
-        """
+        """Return those of a map. ``QueryError``: it was seen on one day alone."""
         life = stored.data.life
         if life is None:
             raise QueryError(
@@ -70,11 +61,8 @@ class Days:
     def visit_of(self, said: str | int) -> int:
         """Return the number of the visit that a day names: a number from 1, or the last one up to a date.
 
-        Args:
-            said: "2", "visit 2" or "day 2", as lists name it; "2026-11-25", "yesterday" or "today".
-
-        Raises:
-            QueryError: there is no such visit, or the days are not known.
+        ``said``: "2", "visit 2" or "day 2", as lists name it; "2026-11-25", "yesterday" or "today". ``QueryError``:
+        there is no such visit, or the days are not known.
         """
         text = str(said).strip().lower()
         text = text.removeprefix("visit ").removeprefix("day ").strip()
@@ -122,19 +110,12 @@ _ORDER = {"new": 0, "moved": 1, "gone": 2, "first seen": 3}
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One change.
+    """One change."""
 
-    Attributes:
-        kind: what happened.
-        visit: the day on which it was noticed.
-        before: number of the stay that ended; None for what is new.
-        after: number of the stay that began; None for what is gone.
-    """
-
-    kind: ChangeKind
-    visit: int
-    before: int | None
-    after: int | None
+    kind: ChangeKind  # what happened
+    visit: int  # the day on which it was noticed
+    before: int | None  # number of the stay that ended; None for what is new
+    after: int | None  # number of the stay that began; None for what is gone
 
     def stay(self, stays: "Sequence[Stay]") -> "Stay":
         """Return where it is now, or where it was."""
@@ -307,17 +288,11 @@ _ONE_PLACE_M = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Usual:
-    """A thing at a place, over the days.
+    """A thing at a place, over the days."""
 
-    Attributes:
-        stay: the last one of it there.
-        there: days on which it was seen there.
-        looked: days on which its place was looked at, those among them.
-    """
-
-    stay: "Stay"
-    there: int
-    looked: int
+    stay: "Stay"  # the last one of it there
+    there: int  # days on which it was seen there
+    looked: int  # days on which its place was looked at, those among them
 
     @property
     def share(self) -> float:
@@ -340,11 +315,7 @@ class Usual:
 
 
 def days_of(stored: "AVLMap", corrected: "Callable[[Life], Life]") -> Days:
-    """Return the days of a map.
-
-    Raises:
-        QueryError: it was seen on one day alone.
-    """
+    """Return the days of a map. ``QueryError``: it was seen on one day alone."""
     if not getattr(stored.data.info, "visits", ()):
         raise QueryError(
             f"{stored.path.name} was seen on one day alone, so that nobody knows what is usual there; add other days "

@@ -18,12 +18,11 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME, plain_point
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
-from avlmaps.query.instances import Instances
+from avlmaps.query.instances import Instances, Segmentation
 from avlmaps.query.modalities.area import area_names, modes, pooled_name_shares
 from avlmaps.query.modalities.sound import sound_features
 from avlmaps.query.rooms import FEWEST_VIEWS, LEAST_PART
-from avlmaps.query.settings import FOUND_AT, AreaSettings
-from avlmaps.query.voxel_space import Space
+from avlmaps.query.settings import FOUND_AT
 
 if TYPE_CHECKING:
     from avlmaps.maps.storeys import Storeys
@@ -49,31 +48,19 @@ UNKNOWN = "room"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Thing:
-    """One thing of the map.
+    """One thing of the map."""
 
-    Attributes:
-        name: the word of the vocabulary.
-        confidence: that it is one, in [0, 1].
-        position: its voxel nearest to its middle, metres, recording frame.
-        size: extent along the axes of the level frame (x and y horizontal, z up), metres.
-        color: mean RGB of its voxels.
-        rows: numbers of its voxels in the map.
-        points: middles of its voxels, metres, recording frame.
-        edited: who corrected it and when, in words; empty for what nobody corrected.
-        heard: sounds that may have come from it; only lists of all that a map holds, or held on a day, know them.
-        room: the name of its room; only lists of contents, and those of a room, know it.
-    """
-
-    name: str
-    confidence: float
-    position: tuple[float, float, float]
-    size: tuple[float, float, float]
-    color: tuple[int, int, int]
-    rows: Int[np.ndarray, " m"] = field(repr=False)
-    points: Float[np.ndarray, "m 3"] = field(repr=False)
-    edited: str = ""
+    name: str  # the word of the vocabulary
+    confidence: float  # that it is one, in [0, 1]
+    position: tuple[float, float, float]  # its voxel nearest to its middle, metres, recording frame
+    size: tuple[float, float, float]  # extent along the axes of the level frame (x and y horizontal, z up), metres
+    color: tuple[int, int, int]  # mean RGB of its voxels
+    rows: Int[np.ndarray, " m"] = field(repr=False)  # numbers of its voxels in the map
+    points: Float[np.ndarray, "m 3"] = field(repr=False)  # middles of its voxels, metres, recording frame
+    edited: str = ""  # who corrected it and when, in words; empty for what nobody corrected
+    # Sounds that may have come from it; only lists of all that a map holds, or held on a day, know them.
     heard: "tuple[HeardFromAnswer, ...]" = ()
-    room: str | None = None
+    room: str | None = None  # the name of its room; only lists of contents, and those of a room, know it
 
     def to_json(self) -> "ThingAnswer":
         """Return the thing as ``avlmaps things --json`` prints it."""
@@ -96,25 +83,16 @@ class Thing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SoundEvent:
-    """One sound of the map.
+    """One sound of the map."""
 
-    Attributes:
-        names: the likeliest names, best first; empty for an encoder with an open vocabulary.
-        confidences: of each name, in [0, 1].
-        onset_s: start, seconds from the start of the recording.
-        offset_s: end, the same.
-        position: middle of the robot's positions during the sound, metres, recording frame.
-        track: the robot's positions during the sound, metres, recording frame.
-        clip: FLAC file of the sound.
-    """
-
-    names: tuple[str, ...]
-    confidences: tuple[float, ...]
-    onset_s: float
-    offset_s: float
-    position: tuple[float, float, float]
+    names: tuple[str, ...]  # the likeliest names, best first; empty for an encoder with an open vocabulary
+    confidences: tuple[float, ...]  # of each name, in [0, 1]
+    onset_s: float  # start, seconds from the start of the recording
+    offset_s: float  # end, the same
+    position: tuple[float, float, float]  # middle of the robot's positions during the sound, metres, recording frame
+    # The robot's positions during the sound, metres, recording frame.
     track: Float[np.ndarray, "t 3"] = field(repr=False)
-    clip: Path
+    clip: Path  # FLAC file of the sound
 
     def to_json(self) -> "SoundAnswer":
         """Return the sound as ``avlmaps things --json`` prints it."""
@@ -130,31 +108,21 @@ class SoundEvent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """One room: a region of the floor that walls and doorways bound, and the keyframes that looked into it.
+    """One room: a region of the floor that walls and doorways bound, and the keyframes that looked into it."""
 
-    Attributes:
-        name: kind of room; ``UNKNOWN`` where none is likely enough.
-        confidence: probability of the likeliest kind, in [0, 1].
-        position: its view's place nearest to their middle, metres, recording frame.
-        views: number of keyframes.
-        places: middle of what each of its keyframes saw, metres, recording frame.
-        names: kinds that it may be and how likely it is each, best first; several of an open plan.
-        region: its number in ``AVLMap.room_regions``; −1 for a room that is a group of views.
-        area_m2: of its floor; None for a group of views.
-        outline: corners on its floor, metres, recording frame; none for a group of views.
-        edited: who named it and when, in words; empty for what nobody corrected.
-    """
-
-    name: str
-    confidence: float
-    position: tuple[float, float, float]
-    views: int
+    name: str  # kind of room; ``UNKNOWN`` where none is likely enough
+    confidence: float  # probability of the likeliest kind, in [0, 1]
+    position: tuple[float, float, float]  # its view's place nearest to their middle, metres, recording frame
+    views: int  # number of keyframes
+    # Middle of what each of its keyframes saw, metres, recording frame.
     places: Float[np.ndarray, "k 3"] = field(repr=False)
+    # Kinds that it may be and how likely it is each, best first; several of an open plan.
     names: tuple[tuple[str, float], ...] = ()
-    region: int = -1
-    area_m2: float | None = None
+    region: int = -1  # its number in ``AVLMap.room_regions``; −1 for a room that is a group of views
+    area_m2: float | None = None  # of its floor; None for a group of views
+    # Corners on its floor, metres, recording frame; none for a group of views.
     outline: Float[np.ndarray, "c 3"] = field(repr=False, default_factory=lambda: np.zeros((0, 3)))
-    edited: str = ""
+    edited: str = ""  # who named it and when, in words; empty for what nobody corrected
 
     def to_json(self, own_name: str) -> "RoomAnswer":
         """Return the room as ``avlmaps rooms --json`` prints it, with a name that no other room of the map has."""
@@ -186,21 +154,13 @@ class Room:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contents:
-    """All that a map holds.
+    """All that a map holds."""
 
-    Attributes:
-        things: most confident first.
-        sounds: in the order of their onset.
-        rooms: those with most views first.
-        doubts: why the map may be wrong, one sentence each.
-        storeys: of a map of several.
-    """
-
-    things: list[Thing]
-    sounds: list[SoundEvent]
-    rooms: list[Room]
-    doubts: tuple[str, ...] = ()
-    storeys: "Storeys | None" = None
+    things: list[Thing]  # most confident first
+    sounds: list[SoundEvent]  # in the order of their onset
+    rooms: list[Room]  # those with most views first
+    doubts: tuple[str, ...] = ()  # why the map may be wrong, one sentence each
+    storeys: "Storeys | None" = None  # of a map of several
 
     def to_json(self, name: str) -> "ContentsAnswer":
         """Return the contents as ``avlmaps things --json`` prints them, under a name for the map."""
@@ -245,8 +205,7 @@ def numbered(names: Sequence[str]) -> tuple[str, ...]:
 def require_known(knows: Callable[[str], bool], names: Sequence[str]) -> None:
     """Raise an error where the pixel encoder does not know one of some names.
 
-    Raises:
-        QueryError: it does not; the sentence says what was probably meant.
+    ``QueryError``: it does not; the sentence says what was probably meant.
     """
     from avlmaps.query.words import unknown_note
 
@@ -257,9 +216,8 @@ def require_known(knows: Callable[[str], bool], names: Sequence[str]) -> None:
 
 
 def find_things(
-    stored: "AVLMap",
-    space: Space,
-    instances_of: Callable[[str, bool], Instances],
+    avlmap: "AVLMap",
+    search: Callable[[str, bool], Segmentation],
     names: Sequence[str] | None = None,
     least_confidence: float = 0.5,
     structure: bool = False,
@@ -267,31 +225,29 @@ def find_things(
 ) -> list[Thing]:
     """Return the things of a map, most confident first.
 
-    ``instances_of`` returns the instances of a word, with its narrower names or alone. ``watch`` is given "things", the
+    ``search`` finds the instances of a word, with its narrower names or alone. ``watch`` is given "things", the
     number of names that were looked for, and of all; what it raises ends the search.
 
-    Raises:
-        QueryError: ``least_confidence`` lies outside [0, 1].
-        BackendError: the map's profile has no pixel encoder.
+    ``QueryError``: ``least_confidence`` lies outside [0, 1]. ``BackendError``: the map's profile has no pixel encoder.
     """
     if not 0.0 <= least_confidence <= 1.0:
         raise QueryError(f"The least confidence is {least_confidence:g}; it must lie between 0 and 1.")
-    encoder = stored.encoders.pixels
+    encoder = avlmap.encoders.pixels
     wanted = [name for name in (encoder.vocabulary if names is None else names) if structure or name not in STRUCTURE]
     searches = searches_for(wanted, encoder)
     claims: list[tuple[bool, float, int, str, Int[np.ndarray, " m"]]] = []
     for number, (name, alone) in enumerate(searches):
         watch("things", number, len(searches))
-        for confidence, rows in _confident(instances_of(name, alone), least_confidence):
+        for confidence, rows in _confident(search(name, alone).instances, least_confidence):
             claims.append((not alone or confidence < FOUND_AT, -confidence, -len(rows), name, rows))
-    owned = np.zeros(len(space), bool)
+    owned = np.zeros(len(avlmap.space), bool)
     things: list[Thing] = []
     # A confident "armchair" stays one, though "chair" takes it in and is more confident still.
     for _, doubt, _, name, rows in sorted(claims, key=lambda claim: claim[:4]):
         if owned[rows].mean() >= _SAME_SHARE or len(rows) < _FEWEST_VOXELS:
             continue
         owned[rows] = True
-        things.append(thing_of(stored, space, name, -doubt, rows))
+        things.append(thing_of(avlmap, name, -doubt, rows))
     return sorted(things, key=lambda thing: -thing.confidence)
 
 
@@ -313,26 +269,26 @@ def _confident(found: Instances, least: float) -> Iterator[tuple[float, Int[np.n
         yield float(found.confidence[number]), found.rows[order[bounds[number] : bounds[number + 1]]]
 
 
-def thing_of(stored: "AVLMap", space: Space, name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:
+def thing_of(avlmap: "AVLMap", name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:
     """Return some voxels of a map as a thing of a name."""
+    space = avlmap.space
     points = space.centres_of(rows)
     extent = np.ptp(space.level(points), axis=0) + space.grid.voxel_size_m
-    colors: UInt8[np.ndarray, "m 3"] = np.asarray(stored.data.voxels.rgb)[rows]
+    colors: UInt8[np.ndarray, "m 3"] = np.asarray(avlmap.data.voxels.rgb)[rows]
     r, g, b = (int(value) for value in colors.mean(axis=0).round())
     return Thing(name, round(confidence, 3), _middle(points), plain_point(extent), (r, g, b), rows, points)
 
 
-def find_sounds(stored: "AVLMap", most_names: int = 3) -> list[SoundEvent]:
+def find_sounds(avlmap: "AVLMap", most_names: int = 3) -> list[SoundEvent]:
     """Return the sounds of a map in the order of their onset, each with its likeliest names.
 
-    Raises:
-        MapError: the map was built with another sound encoder than is installed.
+    ``MapError``: the map was built with another sound encoder than is installed.
     """
-    heard = stored.data.sounds
+    heard = avlmap.data.sounds
     if not len(heard):
         return []
-    stored.require_model(Kind.SOUNDS)
-    encoder = stored.encoders.sounds
+    avlmap.require_model(Kind.SOUNDS)
+    encoder = avlmap.encoders.sounds
     words = list(encoder.vocabulary)
     scores = encoder.score_words(sound_features(heard), words) if words else np.zeros((len(heard), 0))
     events: list[SoundEvent] = []
@@ -347,44 +303,35 @@ def find_sounds(stored: "AVLMap", most_names: int = 3) -> list[SoundEvent]:
                 offset_s=float(heard.offset_s[k]),
                 position=plain_point(track.mean(axis=0)),
                 track=track,
-                clip=stored.data.sounds.clips[k],
+                clip=avlmap.data.sounds.clips[k],
             )
         )
     return events
 
 
-def find_rooms(
-    stored: "AVLMap",
-    space: Space,
-    settings: AreaSettings,
-    least_confidence: float = 0.0,
-    by_floor: "tuple[RoomField, RoomRegions] | None" = None,
-) -> list[Room]:
+def find_rooms(avlmap: "AVLMap", least_confidence: float = 0.0) -> list[Room]:
     """Return the rooms of a map, those with most views first.
 
     A room is a region of the floor that walls and doorways bound and that keyframes looked into. Without a plan it
     is a group of keyframes with one likeliest name whose views' places lie close to one another.
 
-    Raises:
-        BackendError: the map's profile has no view encoder.
+    ``BackendError``: the map's profile has no view encoder.
     """
-    if not len(stored.data.keyframes):
+    keyframes, settings, level = avlmap.data.keyframes, avlmap.settings.areas, avlmap.space.level
+    if not len(keyframes):
         return []
-    encoder = stored.encoders.views
-    stored.require_model(Kind.VIEWS)
-    names = area_names(encoder)
-    places = np.asarray(stored.data.keyframes.centre, np.float64).reshape(-1, 3)
-    if by_floor is None:
-        share = pooled_name_shares(np.asarray(stored.data.keyframes.view), encoder, settings, places)
-        group = _groups_of_views(space.level(places)[:, :2], share, settings.link_m)
-        rooms = [*_rooms_of_views(names, share, places, group)]
+    encoder, field, regions = avlmap.encoders.views, avlmap.room_field, avlmap.room_regions
+    avlmap.require_model(Kind.VIEWS)
+    places, rooms = np.asarray(keyframes.centre, np.float64).reshape(-1, 3), list[Room]()
+    if field is None or regions is None:
+        share = pooled_name_shares(np.asarray(keyframes.view), encoder, settings, places)
+        beyond = np.arange(len(places))
     else:
-        field, regions = by_floor
         own, share = regions.at(places), field.at(places)
-        rooms = [*_rooms_by_floor(field, regions, places, own)]
+        rooms += _rooms_by_floor(field, regions, places, own)
         beyond = np.flatnonzero(own < 0)  # where no floor is mapped, views alone speak
-        group = _groups_of_views(space.level(places[beyond])[:, :2], share[beyond], settings.link_m)
-        rooms += _rooms_of_views(names, share[beyond], places[beyond], group)
+    group = _groups_of_views(level(places[beyond])[:, :2], share[beyond], settings.link_m)
+    rooms += _rooms_of_views(area_names(encoder), share[beyond], places[beyond], group)
     listed = [room for room in rooms if room.views >= FEWEST_VIEWS and room.confidence >= least_confidence]
     return sorted(listed, key=lambda room: (-room.views, room.name))
 
@@ -411,7 +358,6 @@ def _rooms_of_views(
     places: Float[np.ndarray, "k 3"],
     group: Int[np.ndarray, " k"],
 ) -> Iterator[Room]:
-    """Yield groups of views of one likeliest name."""
     likeliest = share.argmax(axis=1)
     for number in np.unique(group):
         members = np.flatnonzero(group == number)

@@ -12,8 +12,8 @@ from avlmaps.core.numbers import checked
 from avlmaps.core.poses import plain_point
 from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, EditedSpot, World, append_edit, in_force, read_edits
-from avlmaps.query.edits import Edited, apply, means, plain_name, said
-from avlmaps.query.places import is_place, place_given, place_of
+from avlmaps.query.edits import Edited, means, plain_name, said
+from avlmaps.query.places import is_place, place_given
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
@@ -31,7 +31,10 @@ _MOST_NAMED = 8
 class Editor:
     """Corrects a map in its folder.
 
-    Edits are stored beside the map and survive another build of it. ``by`` says who made them.
+    Edits are stored beside the map and survive another build of it. ``by`` says who made them, ``thing`` what a thing
+    is called (None for what is at a place), ``at`` where it is, for one of several, and ``to`` its name from now on.
+    ``QueryError``: there is no such thing or room, or there are several, or a name or place is none. ``MapError``: the
+    map lies in memory alone, or cannot be written.
     """
 
     def __init__(self, avlmap: "AVLMap") -> None:
@@ -39,50 +42,22 @@ class Editor:
 
     @checked(QueryError)
     def rename(self, thing: str | None, to: str, *, at: Place | None = None, by: str = "") -> Edit:
-        """Give a thing another name: "that is not a chair, it is a stool".
-
-        Args:
-            thing: what it is called; None for what is at the place.
-            to: its name from now on.
-            at: where it is, for one of several.
-            by: who says so.
-
-        Raises:
-            QueryError: there is no such thing, or there are several, or the name is none.
-            MapError: the map lies in memory alone, or cannot be written.
-        """
+        """Give a thing another name: "that is not a chair, it is a stool"."""
         found, to = self._thing(thing, at), _own_name(to)
         if found.name == to:
             raise QueryError(f"The {to} at {place_text(found.position)} is called so already.")
-        return self._add("rename", [self._map.edited.spot_of(found.name, found.rows)], name=to, by=by)
+        return self._add("rename", [self._spot_of(found)], name=to, by=by)
 
     @checked(QueryError)
     def rename_room(self, room: str, to: str, *, by: str = "") -> Edit:
-        """Give a room another name: "this room is the studio".
-
-        Args:
-            room: what ``rooms`` calls it, or a place in it.
-            to: its name from now on.
-            by: who says so.
-
-        Raises:
-            QueryError: there is no such room, or there are several.
-            MapError: see ``rename``.
-        """
+        """Give a room, by what ``rooms`` calls it or a place in it, another name: "this room is the studio"."""
         return self._add("rename room", [self._room(room)], name=_own_name(to), by=by)
 
     @checked(QueryError)
     def merge(self, *things: Place, to: str = "", by: str = "") -> Edit:
-        """Make one thing of several that the map takes apart.
+        """Make one thing of several that the map takes apart, by a place on each; its name is by default the first's.
 
-        Args:
-            things: the place of each.
-            to: its name; by default that of the first.
-            by: who says so.
-
-        Raises:
-            QueryError: fewer than two different things are meant, or they lie far apart.
-            MapError: see ``rename``.
+        ``QueryError``: fewer than two different things are meant, or they lie far apart.
         """
         found = [self._thing(None, place) for place in things]
         if len({int(one.rows[0]) for one in found}) < 2:
@@ -97,8 +72,7 @@ class Editor:
                     f"{_APART_M:g} m; things that are one touch or nearly do."
                 )
             joined.append(one)
-        spots = [self._map.edited.spot_of(one.name, one.rows) for one in found]
-        return self._add("merge", spots, name=_own_name(to) if to else "", by=by)
+        return self._add("merge", [self._spot_of(one) for one in found], name=_own_name(to) if to else "", by=by)
 
     @checked(QueryError)
     def split(
@@ -110,30 +84,24 @@ class Editor:
         box: Sequence[float] = (),
         by: str = "",
     ) -> Edit:
-        """Take a thing apart: by its connected pieces, by an upright plane, or by a box.
+        """Take a thing apart by its connected pieces, by an upright plane through two places, or by a box.
 
-        Args:
-            thing: what it is called; None for what is at the place.
-            at: where it is, for one of several.
-            plane: two places on the plane.
-            box: x and y of two opposite corners, level frame, metres.
-            by: who says so.
+        The box is x and y of two opposite corners, level frame, metres.
 
-        Raises:
-            QueryError: there is no such thing, or the cut leaves it whole.
-            MapError: see ``rename``.
+        ``QueryError``: there is no such thing, or the cut leaves it whole.
         """
         found = self._thing(thing, at)
         if len(plane) not in (0, 2) or (plane and box):
             raise QueryError("A thing is split by a plane through two places, or by a box, or by neither.")
-        floor_m = float(self._map.space.level(np.array(found.position))[2])
+        space = self._map.space
+        floor_m = float(space.level(np.array(found.position))[2])
         cut = [self._level(place) for place in plane] if plane else _corners(box) if box else []
-        world = self._map.space.world
-        points = [plain_point(world(np.array([xy[0], xy[1], floor_m]))) for xy in cut]
-        spot = self._map.edited.spot_of(found.name, found.rows)
-        edit = self._new("split", [spot], cut=points, by=by)
-        before = sum(bool(np.isin(one.rows, found.rows).any()) for one in self._after().claims)
-        after = sum(bool(np.isin(one.rows, found.rows).any()) for one in self._after(edit).claims)
+        points = [plain_point(space.world(np.array([xy[0], xy[1], floor_m]))) for xy in cut]
+        edit = self._new("split", [self._spot_of(found)], cut=points, by=by)
+        before, after = (
+            sum(bool(np.isin(one.rows, found.rows).any()) for one in self._after(*more).claims)
+            for more in ((), (edit,))
+        )
         if after <= max(before, 1):
             how = "the cut does not meet it" if cut else "it is one connected piece; cut it by a plane or a box"
             raise QueryError(f"The {found.name} at {place_text(found.position)} stays whole: {how}.")
@@ -143,58 +111,38 @@ class Editor:
     def forbid(self, name: str, *, box: Sequence[float] = (), room: str | None = None, by: str = "") -> Edit:
         """Forbid an area to robots: no path goes through it, and no goal in it is accepted.
 
-        Args:
-            name: of the area.
-            box: x and y of two opposite corners, level frame, metres; on the storey where the map's walk began.
-            room: instead of a box, what ``rooms`` calls a room, or a place in it.
-            by: who says so.
+        The box is x and y of two opposite corners, level frame, metres, on the storey where the map's walk began;
+        ``room`` is instead what ``rooms`` calls a room, or a place in it.
 
-        Raises:
-            QueryError: neither or both are given, the box is none or far outside of the map, or there is no such room.
-            MapError: see ``rename``.
+        ``QueryError``: neither or both are given, the box is none or far outside of the map, or there is no such room.
         """
         if bool(box) == (room is not None):
             raise QueryError("An area is forbidden by a box x0,y0,x1,y1 or by a room; give one of them.")
-        corners = [] if room is not None else _corners(box)
-        if corners:
-            self._require_here(np.array(corners), "The box")
-        spot = self._room(room) if room is not None else self._area(corners)
-        return self._add("forbid", [spot], name=_name(name), by=by)
+        if room is not None:
+            return self._add("forbid", [self._room(room)], name=_name(name), by=by)
+        corners, floor_m = _corners(box), self._floor_m()
+        self._require_here(np.array(corners), "The box")
+        points = [self._map.space.world(np.append(corner, floor_m)) for corner in corners]
+        spot = EditedSpot(middle=plain_point(np.mean(points, axis=0)), corners=tuple(map(plain_point, points)))
+        return self._add("forbid", [spot.anchored(self._map.data.keyframes)], name=_name(name), by=by)
 
     @checked(QueryError)
     def pin(self, name: str, at: Place, *, by: str = "") -> Edit:
         """Give a place a name of one's own: "my charging dock". The same name again moves it.
 
-        Args:
-            name: of the place.
-            at: where it is; of two numbers, on the floor of the storey where the map's walk began.
-            by: who says so.
+        A place of two numbers is on the floor of the storey where the map's walk began.
 
-        Raises:
-            QueryError: the place or the name is none, or the place lies far outside of the map.
-            MapError: see ``rename``.
+        ``QueryError``: the place or the name is none, or the place lies far outside of the map.
         """
-        numbers = place_given(at)
         self._require_here(self._level(at)[None], "The place")
-        place = numbers if len(numbers) == 3 else self._map.space.world(np.append(numbers, self._floor_m()))
-        return self._add(
-            "pin",
-            [EditedSpot(middle=plain_point(place)).anchored(self._map.data.keyframes)],
-            name=_own_name(name),
-            by=by,
-        )
+        spot = EditedSpot(middle=plain_point(self._in_space(place_given(at))))
+        return self._add("pin", [spot.anchored(self._map.data.keyframes)], name=_own_name(name), by=by)
 
     @checked(QueryError)
     def undo(self, which: str = "", *, by: str = "") -> Edit:
-        """Undo an edit.
+        """Undo an edit by its id; by default the last that is in force.
 
-        Args:
-            which: its id; by default the last that is in force.
-            by: who says so.
-
-        Raises:
-            QueryError: there is no such edit in force.
-            MapError: see ``rename``.
+        ``QueryError``: there is no such edit in force.
         """
         known = in_force(self._log())
         wanted = [edit for edit in known if edit.id == which] if which else list(known[-1:])
@@ -206,39 +154,47 @@ class Editor:
     def history(self) -> "EditsAnswer":
         """Return all edits, the oldest first, and which of them find nothing to apply to."""
         log = self._log()
-        counting = {edit.id for edit in in_force(log)}
+        rows = {edit.id: edit for edit in log}
         lost = {one.edit.id: one.why for one in self._after().lost}
-        rows = list({edit.id: edit for edit in log}.values())
-        pins = {plain_name(edit.name): edit.id for edit in in_force(log) if edit.does == "pin"}
-        moved = {edit.id for edit in rows if edit.does == "pin"} - set(pins.values()) - set(lost)
-        return {"map": self._map.path.name, "edits": [_row(edit, counting, lost, moved) for edit in rows]}
+        state = dict.fromkeys(rows, "undone") | {edit.id: "applied" for edit in in_force(log)}
+        last = {plain_name(edit.name): edit.id for edit in in_force(log) if edit.does == "pin"}
+        for edit in rows.values():
+            if edit.does == "undo":
+                state[edit.id] = "undo"
+            elif edit.id in lost and state[edit.id] == "applied":
+                state[edit.id] = "lost"
+            elif edit.does == "pin" and state[edit.id] == "applied" and edit.id not in last.values():
+                state[edit.id] = "moved"
+        answers = [_row(edit, state[edit.id], lost.get(edit.id)) for edit in rows.values()]
+        return {"map": self._map.path.name, "edits": answers}
 
     def _thing(self, name: str | None, at: Place | None) -> "Thing":
-        """Return the one thing that is meant."""
         if name is None and at is None:
             raise QueryError("Which thing? Name it, or give its place as x,y,z.")
-        least = 0.5 if at is None else 0.2
-        things = [one for one in self._map.things(None, least) if len(one.rows)]
+        things = [one for one in self._map.things(None, 0.5 if at is None else 0.2) if len(one.rows)]
         if name is not None:
             is_meant = means(name)
             things = [one for one in things if is_meant(one.name)]
         what = name or "thing"
         if at is not None:
             place = place_given(at)
-            things = [one for one in things if self._away_m(one, place) <= _NEAR_M]
-            things.sort(key=lambda one: (round(self._away_m(one, place), 2), -one.confidence))
-            if not things:
+            away = {id(one): self._away_m(one, place) for one in things}
+            near = [one for one in things if away[id(one)] <= _NEAR_M]
+            if not near:
                 raise QueryError(
                     f"The map shows no {what} within {_NEAR_M:g} m of {place_text(place)}; list them with "
                     "`avlmaps things`."
                 )
-            return things[0]
+            return min(near, key=lambda one: (round(away[id(one)], 2), -one.confidence))
         if not things:
             raise QueryError(f"The map shows no {what}; list what it shows with `avlmaps things`.")
         if len(things) > 1:
             places = ", ".join(place_text(one.position) for one in things[:_MOST_NAMED])
             raise QueryError(f"There are {len(things)} things called {what}: say which by its place, one of {places}.")
         return things[0]
+
+    def _spot_of(self, thing: "Thing") -> EditedSpot:
+        return self._map.edited.spot_of(thing.name, thing.rows)
 
     def _away_m(self, thing: "Thing", place: Float[np.ndarray, " n"]) -> float:
         points = thing.points if len(place) == 3 else self._map.space.level(thing.points)[:, :2]
@@ -257,14 +213,13 @@ class Editor:
             )
 
     def _room(self, room: str) -> EditedSpot:
-        """Return the room that is meant."""
         from avlmaps.query.whereabouts import Whereabouts
 
         where = Whereabouts.of(self._map)
         if where.regions is None:
             raise QueryError("The map has no floor plan, so that its rooms are not known.")
         if is_place(room):
-            numbers: list[int] = where.rooms_of(self._in_space(place_of(room))[None]).tolist()
+            numbers: list[int] = where.rooms_of(self._in_space(place_given(room))[None]).tolist()
         else:
             numbers = where.numbers_of(room)
         if len(numbers) > 1:
@@ -276,17 +231,10 @@ class Editor:
         spot = EditedSpot(name=found.name, middle=found.position, corners=tuple(map(plain_point, found.outline)))
         return spot.anchored(self._map.data.keyframes)
 
-    def _area(self, corners: Sequence[Float[np.ndarray, "2"]]) -> EditedSpot:
-        floor_m = self._floor_m()
-        points = [self._map.space.world(np.append(corner, floor_m)) for corner in corners]
-        middle = plain_point(np.mean(points, axis=0))
-        return EditedSpot(middle=middle, corners=tuple(map(plain_point, points))).anchored(self._map.data.keyframes)
-
     def _floor_m(self) -> float:
         space, cameras = self._map.space, np.asarray(self._map.data.keyframes.world_from_camera)[:1, :3, 3]
         if self._map.storeys is not None and len(cameras):
-            storey = int(self._map.storeys.of_places(cameras)[0])
-            return float(self._map.storeys[storey].floor_m)
+            return float(self._map.storeys[int(self._map.storeys.of_places(cameras)[0])].floor_m)
         from avlmaps.maps.obstacles import floor_height
 
         return floor_height(space.level_centres()[:, 2], space.grid.voxel_size_m) if len(space) else 0.0
@@ -328,21 +276,10 @@ class Editor:
         return read_edits(self._map.path)
 
     def _after(self, *more: Edit) -> Edited:
-        return apply((*self._log(), *more), self._map)
+        return Edited((*self._log(), *more), self._map)
 
 
-def _row(edit: Edit, counting: set[str], lost: dict[str, str], moved: set[str]) -> "EditAnswer":
-    state = (
-        "undo"
-        if edit.does == "undo"
-        else "undone"
-        if edit.id not in counting
-        else "lost"
-        if edit.id in lost
-        else "moved"
-        if edit.id in moved
-        else "applied"
-    )
+def _row(edit: Edit, state: str, why: str | None) -> "EditAnswer":
     row: EditAnswer = {
         "id": edit.id,
         "does": edit.does,
@@ -353,29 +290,29 @@ def _row(edit: Edit, counting: set[str], lost: dict[str, str], moved: set[str]) 
         "made": edit.made,
         "state": state,
     }
-    if edit.id in lost:
-        row["why"] = lost[edit.id]
+    if why is not None:
+        row["why"] = why
     return row
 
 
 def edit_text(edit: Edit) -> str:
     """Return what an edit did, in one sentence."""
-    if edit.does == "undo":
-        return f"Edit {edit.of} is undone."
     before = " and the ".join(f"{one.name} at {place_text(one.middle)}" for one in edit.at if one.name)
+    named = f"({said(edit)}, edit {edit.id})" if edit.does != "undo" else ""
     match edit.does:
+        case "undo":
+            return f"Edit {edit.of} is undone."
+        case "forbid":
+            return f"No drive that begins from now on enters {edit.name} {named}; a robot that drives now is stopped."
         case "rename" | "rename room":
             what = f"The {before} is called {edit.name}"
         case "merge":
             what = f"The {before} are one thing" + (f", {edit.name}" if edit.name else "")
         case "split":
             what = f"The {before} is split"
-        case "forbid":
-            named = f"{edit.name} ({said(edit)}, edit {edit.id})"
-            return f"No drive that begins from now on enters {named}; a robot that drives now is stopped."
         case _:
             what = f"{edit.name} is at {place_text(edit.at[0].middle)}"
-    return f"{what} from now on ({said(edit)}, edit {edit.id})."
+    return f"{what} from now on {named}."
 
 
 def _gap_m(one: "Thing", other: "Thing") -> float:
@@ -401,11 +338,10 @@ def _own_name(name: str) -> str:
 
 
 def _corners(box: Sequence[float]) -> list[Float[np.ndarray, "2"]]:
-    if not np.iterable(box):
+    numbers = list(box) if np.iterable(box) else []
+    if len(numbers) != 4 or not all(math.isfinite(value) and abs(value) <= 1e5 for value in numbers):
         raise QueryError(f"A box is x0,y0,x1,y1 in metres of the level frame, two opposite corners; not {box!r}.")
-    if len(box) != 4 or not all(math.isfinite(value) and abs(value) <= 1e5 for value in box):
-        raise QueryError(f"A box is x0,y0,x1,y1 in metres of the level frame, two opposite corners; not {tuple(box)}.")
-    (x0, x1), (y0, y1) = sorted((box[0], box[2])), sorted((box[1], box[3]))
+    (x0, x1), (y0, y1) = sorted((numbers[0], numbers[2])), sorted((numbers[1], numbers[3]))
     if min(x1 - x0, y1 - y0) < 0.01:
-        raise QueryError(f"The box {tuple(box)} has no area; give two opposite corners, x0,y0,x1,y1.")
+        raise QueryError(f"The box {tuple(numbers)} has no area; give two opposite corners, x0,y0,x1,y1.")
     return [np.array(corner, np.float64) for corner in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]

@@ -34,120 +34,38 @@ if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Room, Thing
 
-Box = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]
-"""The lowest and the highest corner, metres, level frame."""
-ALIKE_BOX = 0.2
-"""Share of two boxes together that both hold: perhaps one thing.
-
-Chosen on maps of two simulated homes and four rebuilds of them: of every second or third frame, and by poses that
-drift by .15, .37 and 1.1 m. Of 94 pairs of one thing 91 have this share; of 110 pairs of a thing and the other one that
-is most like it 5. By name first, 89 of 110 things are found again, 15 are lost, and 6 find a thing of their name of
-which the truth is not clear. With .15, 88 are found and three more are wrong; with .25, 86; with
-.4, 80.
-"""
-
-
-class Spots:
-    """Finds what fills the box of a spot, in a map without its edits."""
-
-    def __init__(self, avlmap: "AVLMap") -> None:
-        self._map = avlmap
-
-    def thing_at(self, spot: EditedSpot | None) -> "Thing | None":
-        """Return the thing of the map, as its encoder sees it, that fills the box of a spot best."""
-        if spot is None:
-            return None
-        for name in (spot.name, None):
-            best, most = None, ALIKE_BOX
-            for thing in self._map.things_to_edit(name):
-                share = self.overlap(spot, self.box(thing.rows))
-                if share >= most:
-                    best, most = thing, share
-            if best is not None:
-                return best
-        return None
-
-    def carried(self, spot: EditedSpot) -> EditedSpot | None:
-        """Return where a later day found the thing of a spot, of which an earlier day knew; None where it did not."""
-        life = self._map.data.life if getattr(self._map.data.info, "visits", ()) else None
-        if life is None:
-            return None
-        number = self.stay_at(life, spot)
-        if number is None or life.stays[number].moved_to is None:
-            return None
-        while (after := life.stays[number].moved_to) is not None:
-            number = after
-        points = self._map.space.grid.centre_of(life.voxels(number))
-        low, high = self._box_of(self._map.space.level(points))
-        middle = self._map.space.world((low + high) / 2.0)
-        return EditedSpot(name=spot.name, middle=plain_point(middle), size=plain_point(high - low))
-
-    def stay_at(self, life: "Life", spot: EditedSpot) -> int | None:
-        """Return the number of the stay that fills the box of a spot best."""
-        level = self._map.space.level
-        near = [
-            (self.overlap(spot, self._box_of(level(self._map.space.grid.centre_of(life.voxels(number))))), number)
-            for number in range(len(life))
-            if len(life.voxels(number))
-        ]
-        share, number = max(near, default=(0.0, 0))
-        return number if share >= ALIKE_BOX else None
-
-    def box(self, rows: Int[np.ndarray, " m"]) -> Box:
-        """Return the box of some voxels."""
-        return self._box_of(self._map.space.level(self._map.space.centres_of(rows)))
-
-    def _box_of(self, level: Float[np.ndarray, "m 3"]) -> Box:
-        half = self._map.space.grid.voxel_size_m / 2.0
-        return level.min(axis=0) - half, level.max(axis=0) + half
-
-    def overlap(self, spot: EditedSpot, box: Box) -> float:
-        """Return which share of two boxes together both hold, in [0, 1]."""
-        middle, size = self._map.space.level(np.array(spot.middle)), np.array(spot.size)
-        low, high = middle - size / 2.0, middle + size / 2.0
-        both = np.prod(np.clip(np.minimum(high, box[1]) - np.maximum(low, box[0]), 0.0, None))
-        whole = np.prod(size) + np.prod(box[1] - box[0]) - both
-        return float(both / whole) if whole > 0.0 else 0.0
-
-    def spot_of(self, name: str, rows: Int[np.ndarray, " m"]) -> EditedSpot:
-        """Return what an edit is about: the thing of some voxels."""
-        low, high = self.box(rows)
-        middle = self._map.space.world((low + high) / 2.0)
-        spot = EditedSpot(name=name, middle=plain_point(middle), size=plain_point(high - low))
-        return spot.anchored(self._map.data.keyframes)
-
-
+_ALIKE_BOX = 0.2
+"""Share of two boxes together that both hold: perhaps one thing. Chosen on maps of two simulated homes and four
+rebuilds of them: of every second or third frame, and by poses that drift by .15, .37 and 1.1 m. Of 94 pairs of one
+thing 91 have this share; of 110 pairs of a thing and the other one that is most like it 5. By name first, 89 of 110
+things are found again, 15 are lost, and 6 find a thing of their name of which the truth is not clear."""
 _SAME_BOX = 0.5
-"""Share of two boxes together that both hold from which they are certainly one thing: measured as ``ALIKE_BOX``, 71 of
-94 right pairs have it and none of 110 wrong ones (.34 at most); the half of a thing has no more."""
-HALF = 0.5  # of its voxels: then a thing is in the claim
-_SPECK = 0.05  # share of a thing; smaller pieces belong to the nearest larger one
+"""From this share on they are certainly one thing: 71 of the 94 right pairs have it and none of the 110 wrong ones (.34
+at most); the half of a thing has no more."""
 _SAME_ROOM = 0.25
-"""Share of a room's outline and a region together that both hold: perhaps one room. On the maps of ``ALIKE_BOX`` the
-regions that are most like the 16 rooms have .39 to .97, and those of other rooms .15 at most. A region that holds the
-room's middle may have less: one room was split in the rebuild, .36 and .57."""
+"""Share of a room's outline and a region together that both hold: perhaps one room. On the same maps the regions most
+like the 16 rooms have .39 to .97, and those of other rooms .15 at most. A region that holds the room's middle may have
+less: one room was split in the rebuild, .36 and .57."""
+_HALF = 0.5  # of its voxels: then a thing is in the claim
+_SPECK = 0.05  # share of a thing; smaller pieces belong to the nearest larger one
+_AT_M = 1e-3
 _POSSESSIVES = ("the ", "a ", "an ", "my ", "your ", "our ")
 _DONE = {"rename": "named", "rename room": "named", "merge": "made one thing", "split": "split", "pin": "named",
          "forbid": "forbidden"}  # fmt: skip
 
+Rows = Int[np.ndarray, " m"]
+Box = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Claim:
-    """Voxels that an edit made one thing.
-
-    Attributes:
-        name: of the thing.
-        rows: numbers of its voxels in the map, ascending.
-        confidence: that it has this name, in [0, 1]; 1 where a person said so.
-        is_named: whether a person said so.
-        edit: the last one that made it.
-    """
+    """Voxels that an edit made one thing."""
 
     name: str
-    rows: Int[np.ndarray, " m"]
-    confidence: float
-    is_named: bool
-    edit: Edit
+    rows: Rows  # numbers of its voxels in the map, ascending
+    confidence: float  # that it has this name, in [0, 1]; 1 where a person said so
+    is_named: bool  # whether a person said so
+    edit: Edit  # the last one that made it
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,180 +93,6 @@ def plain_name(name: str) -> str:
     return next((word.removeprefix(one) for one in _POSSESSIVES if word.startswith(one)), word)
 
 
-class FoundEdits:
-    """Edits, and what each is about. What is computed of them once is stored.
-
-    Attributes:
-        edits: those in force.
-    """
-
-    def __init__(self, edits: tuple[Edit, ...], avlmap: "AVLMap") -> None:
-        self.edits = edits
-        self._map, self._spots = avlmap, Spots(avlmap)
-        self._lost: dict[str, LostEdit] = {}
-
-    def __bool__(self) -> bool:
-        return bool(self.edits)
-
-    @cached_property
-    def claims(self) -> tuple[Claim, ...]:
-        """The things that were renamed, merged or split, by their first voxel."""
-        claims: list[Claim] = []
-        for edit in self._of("rename", "merge", "split"):
-            found = [self._targets(spot.now(self._map.data.keyframes), claims) for spot in edit.at]
-            if not all(found):
-                at = edit.at[[bool(one) for one in found].index(False)]
-                self._lose(edit, f"nothing like the {at.name or 'thing'} is at {place_text(at.middle)} any more")
-                continue
-            targets = list({one.rows[0]: one for each in found for one in each}.values())
-            claims = [one for one in claims if all(one is not other for other in targets)]
-            claims += self._made(edit, targets)
-        return tuple(sorted(claims, key=lambda one: int(one.rows[0])))
-
-    def _made(self, edit: Edit, targets: Sequence[Claim]) -> list[Claim]:
-        if edit.does == "rename":
-            return [replace(one, name=edit.name, confidence=1.0, is_named=True, edit=edit) for one in targets]
-        if edit.does == "split":
-            return [replace(one, rows=rows, edit=edit) for one in targets for rows in self._pieces(one.rows, edit)]
-        first = targets[0]
-        named = bool(edit.name) or first.is_named
-        sure = 1.0 if edit.name else max(one.confidence for one in targets if one.name == first.name)
-        rows = np.unique(np.concatenate([one.rows for one in targets]))
-        return [Claim(edit.name or first.name, rows, sure, named, edit)]
-
-    def _pieces(self, rows: Int[np.ndarray, " m"], edit: Edit) -> list[Int[np.ndarray, " m"]]:
-        space = self._map.space
-        level = space.level(space.centres_of(rows))
-        cut = self._cut_of(edit)
-        if len(cut) == 2:
-            along = cut[1] - cut[0]
-            which = ((level[:, :2] - cut[0]) @ np.array([-along[1], along[0]]) > 0.0).astype(np.int64)
-        elif len(cut):
-            which = in_polygon(level[:, :2], cut).astype(np.int64)
-        else:
-            which = linked(np.asarray(space.index)[rows], 1)
-            which = _without_specks(which, level)
-        return [rows[which == number] for number in np.unique(which)]
-
-    def _cut_of(self, edit: Edit) -> Float[np.ndarray, "k 2"]:
-        if not edit.cut:
-            return np.zeros((0, 2))
-        spot = edit.at[0]
-        with_cut = EditedSpot(middle=spot.middle, corners=edit.cut, seen_from=spot.seen_from).now(
-            self._map.data.keyframes
-        )
-        return self._map.space.level(np.array(with_cut.corners, np.float64))[:, :2]
-
-    def _targets(self, spot: EditedSpot, claims: Sequence[Claim]) -> list[Claim]:
-        """Return the claims, or the thing of the map, that a spot is about; none where there is nothing like it."""
-        own = [(self._spots.overlap(spot, self._spots.box(one.rows)), one) for one in claims]
-        share, best = max(own, key=lambda one: one[0], default=(0.0, None))
-        if best is not None and share >= _SAME_BOX:
-            return [best]
-        thing = self._spots.thing_at(spot) or self._spots.thing_at(self._spots.carried(spot))
-        if thing is None:
-            return [best] if best is not None and share >= ALIKE_BOX else []
-        holding = [one for one in claims if share_in(thing.rows, one.rows) >= HALF]
-        inside = [one for one in claims if share_in(one.rows, thing.rows) >= HALF]
-        if holding or inside:
-            return holding[:1] or inside
-        taken = np.concatenate([np.zeros(0, np.int64), *(one.rows for one in claims)])
-        rows = np.setdiff1d(thing.rows, taken)
-        nobody = Edit(schema=1, id="", does="rename", made="")
-        return [Claim(thing.name, rows, thing.confidence, False, nobody)] if len(rows) else []
-
-    def spot_of(self, name: str, rows: Int[np.ndarray, " m"]) -> EditedSpot:
-        """Return what an edit is about: the thing of some voxels."""
-        return self._spots.spot_of(name, rows)
-
-    @cached_property
-    def rooms(self) -> Mapping[int, Edit]:
-        """The edits of rooms, by the number of the region in ``AVLMap.room_regions``."""
-        edits, regions = self._of("rename room"), None
-        if edits:
-            regions = self._map.room_regions
-        found: dict[int, Edit] = {}
-        for edit in edits:
-            spot = edit.at[0].now(self._map.data.keyframes)
-            share = np.zeros(1)
-            if regions is not None and len(regions) and spot.corners:
-                share = regions.shares_of(np.array(spot.middle), np.array(spot.corners))
-            number = int(share.argmax())
-            if share[number] < _SAME_ROOM:
-                self._lose(edit, f"no room like the {spot.name} is at {place_text(spot.middle)} any more")
-            else:
-                found[number] = edit
-        return found
-
-    @cached_property
-    def pins(self) -> Mapping[str, tuple[Edit, Float[np.ndarray, "3"]]]:
-        """The places that were named, by plain names: the last place of each."""
-        keyframes = self._map.data.keyframes
-        return {plain_name(edit.name): (edit, np.array(edit.at[0].now(keyframes).middle)) for edit in self._of("pin")}
-
-    @cached_property
-    def forbidden(self) -> "tuple[ForbiddenArea, ...]":
-        """The areas that no robot enters; several may have one name, as each wet floor has."""
-        from avlmaps.maps.obstacles import ForbiddenArea
-
-        areas: list[ForbiddenArea] = []
-        storeys = self._map.storeys
-        for edit in self._of("forbid"):
-            corners = np.array(edit.at[0].now(self._map.data.keyframes).corners, np.float64)
-            storey = 0 if storeys is None else int(storeys.of_places(corners.mean(axis=0))[0])
-            level = self._map.space.level(corners)[:, :2]
-            areas.append(ForbiddenArea(edit.name, said(edit), level, storey))
-        return tuple(areas)
-
-    @property
-    def unheeded(self) -> tuple[str, ...]:
-        """A sentence for each area that was forbidden and that this map does not know, so that a robot may enter it."""
-        _ = self.forbidden
-        lost = (self._lost[edit.id] for edit in self.edits if edit.does == "forbid" and edit.id in self._lost)
-        return tuple(f"The robot may enter {one.edit.name}, which was forbidden: {one.why}." for one in lost)
-
-    @property
-    def lost(self) -> tuple[LostEdit, ...]:
-        """The edits that find nothing to apply to; finding that out looks for what each is about."""
-        _ = self.claims, self.rooms, self.pins, self.forbidden
-        return tuple(self._lost[edit.id] for edit in self.edits if edit.id in self._lost)
-
-    def _of(self, *does: str) -> list[Edit]:
-        wanted = [edit for edit in self.edits if edit.does in does]
-        own: list[Edit] = []
-        for edit in wanted:
-            if edit.world is None or edit.world.is_that_of(World.of(self._map.data.info)):
-                own.append(edit)
-            else:
-                self._lose(edit, f"it was made in a map of another recording, {edit.world.name}")
-        return own
-
-    def _lose(self, edit: Edit, why: str) -> None:
-        self._lost[edit.id] = LostEdit(edit, why)
-
-
-def _without_specks(which: Int[np.ndarray, " m"], level: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
-    from scipy.spatial import KDTree
-
-    count = np.bincount(which)
-    large = count >= max(2.0, _SPECK * len(which))
-    if large.all() or not large.any():
-        return which
-    on_large = large[which]
-    nearest = KDTree(level[on_large]).query(level[~on_large])[1]
-    out = which.copy()
-    out[~on_large] = which[on_large][nearest]
-    return out
-
-
-def share_in(rows: Int[np.ndarray, " m"], others: Int[np.ndarray, " k"]) -> float:
-    """Return which share of some voxels are among others."""
-    return float(np.isin(rows, others).mean()) if len(rows) else 0.0
-
-
-_AT_M = 1e-3
-
-
 def means(asked: str) -> Callable[[str], bool]:
     """Return whether the name of a thing is meant by a word: it is the same, another word for it, or a narrower one."""
     known, word = lexicon(), plain_name(asked)
@@ -364,18 +108,195 @@ def means(asked: str) -> Callable[[str], bool]:
     return is_meant
 
 
-def apply(edits: Sequence[Edit], avlmap: "AVLMap") -> "Edited":
-    """Return what edits make of a map: of no edits, everything stays the same object.
+class Edited:
+    """What follows from edits for questions and lists of a map; without edits, everything stays the same object.
 
-    Args:
-        edits: all of a log, the oldest first; those that are undone do not count.
-        avlmap: the map.
+    Attributes:
+        edits: those in force.
     """
-    return Edited(in_force(edits), avlmap)
 
+    def __init__(self, edits: Sequence[Edit], avlmap: "AVLMap") -> None:
+        """Take all edits of a log, the oldest first; those that are undone do not count."""
+        self.edits = in_force(edits)
+        self._map = avlmap
+        self._lost: dict[str, LostEdit] = {}
 
-class Edited(FoundEdits):
-    """What follows from edits for questions and lists of a map."""
+    def __bool__(self) -> bool:
+        return bool(self.edits)
+
+    def _of(self, *does: str) -> list[Edit]:
+        own: list[Edit] = []
+        for edit in self.edits:
+            if edit.does not in does:
+                continue
+            if edit.world is None or edit.world.is_that_of(World.of(self._map.data.info)):
+                own.append(edit)
+            else:
+                self._lose(edit, f"it was made in a map of another recording, {edit.world.name}")
+        return own
+
+    def _lose(self, edit: Edit, why: str) -> None:
+        self._lost[edit.id] = LostEdit(edit, why)
+
+    def _now(self, spot: EditedSpot) -> EditedSpot:
+        return spot.now(self._map.data.keyframes)
+
+    @property
+    def lost(self) -> tuple[LostEdit, ...]:
+        """The edits that find nothing to apply to; finding that out looks for what each is about."""
+        _ = self.claims, self.rooms, self.pins, self.forbidden
+        return tuple(self._lost[edit.id] for edit in self.edits if edit.id in self._lost)
+
+    # Where edits are in the map as it is now.
+
+    @cached_property
+    def claims(self) -> tuple[Claim, ...]:
+        """The things that were renamed, merged or split, by their first voxel."""
+        claims: list[Claim] = []
+        for edit in self._of("rename", "merge", "split"):
+            found = [self._targets(self._now(spot), claims) for spot in edit.at]
+            if not all(found):
+                at = edit.at[[bool(one) for one in found].index(False)]
+                self._lose(edit, f"nothing like the {at.name or 'thing'} is at {place_text(at.middle)} any more")
+                continue
+            targets = list({one.rows[0]: one for each in found for one in each}.values())
+            claims = [one for one in claims if all(one is not other for other in targets)]
+            claims += self._made(edit, targets)
+        return tuple(sorted(claims, key=lambda one: int(one.rows[0])))
+
+    def _made(self, edit: Edit, targets: Sequence[Claim]) -> list[Claim]:
+        if edit.does == "rename":
+            return [replace(one, name=edit.name, confidence=1.0, is_named=True, edit=edit) for one in targets]
+        if edit.does == "split":
+            return [replace(one, rows=rows, edit=edit) for one in targets for rows in self._pieces(one.rows, edit)]
+        first = targets[0]
+        sure = 1.0 if edit.name else max(one.confidence for one in targets if one.name == first.name)
+        rows = np.unique(np.concatenate([one.rows for one in targets]))
+        return [Claim(edit.name or first.name, rows, sure, bool(edit.name) or first.is_named, edit)]
+
+    def _pieces(self, rows: Rows, edit: Edit) -> list[Rows]:
+        space, spot = self._map.space, edit.at[0]
+        level = space.level(space.centres_of(rows))
+        if edit.cut:
+            with_cut = self._now(EditedSpot(middle=spot.middle, corners=edit.cut, seen_from=spot.seen_from))
+            cut = space.level(np.array(with_cut.corners, np.float64))[:, :2]
+            if len(cut) == 2:
+                along = cut[1] - cut[0]
+                which = (level[:, :2] - cut[0]) @ np.array([-along[1], along[0]]) > 0.0
+            else:
+                which = in_polygon(level[:, :2], cut)
+        else:
+            which = _without_specks(linked(np.asarray(space.index)[rows], 1), level)
+        return [rows[which == number] for number in np.unique(which)]
+
+    def _targets(self, spot: EditedSpot, claims: Sequence[Claim]) -> list[Claim]:
+        # The claims, or the thing of the map, that a spot is about; none where there is nothing like it.
+        own = [(self._overlap(spot, self._box(one.rows)), one) for one in claims]
+        share, best = max(own, key=lambda one: one[0], default=(0.0, None))
+        if best is not None and share >= _SAME_BOX:
+            return [best]
+        thing = self._thing_at(spot) or self._thing_at(self._carried(spot))
+        if thing is None:
+            return [best] if best is not None and share >= _ALIKE_BOX else []
+        holding = [one for one in claims if np.isin(thing.rows, one.rows).mean() >= _HALF]
+        inside = [one for one in claims if np.isin(one.rows, thing.rows).mean() >= _HALF]
+        if holding or inside:
+            return holding[:1] or inside
+        rows = np.setdiff1d(thing.rows, np.concatenate([np.zeros(0, np.int64), *(one.rows for one in claims)]))
+        nobody = Edit(schema=1, id="", does="rename", made="")
+        return [Claim(thing.name, rows, thing.confidence, False, nobody)] if len(rows) else []
+
+    def _thing_at(self, spot: EditedSpot | None) -> "Thing | None":
+        # The thing of the map, as its encoder sees it, that fills the box of a spot best; of the spot's name first.
+        if spot is None:
+            return None
+        for name in (spot.name, None):
+            found = [(self._overlap(spot, self._box(one.rows)), one) for one in self._map.things_to_edit(name)]
+            share, best = max(reversed(found), key=lambda one: one[0], default=(0.0, None))
+            if share >= _ALIKE_BOX:
+                return best
+        return None
+
+    def _carried(self, spot: EditedSpot) -> EditedSpot | None:
+        # Where a later day found the thing of a spot, of which an earlier day knew.
+        life = self._map.data.life if self._map.data.info.visits else None
+        number = None if life is None else self._stay_at(life, spot)
+        if life is None or number is None or life.stays[number].moved_to is None:
+            return None
+        while (after := life.stays[number].moved_to) is not None:
+            number = after
+        return self._spot(spot.name, self._box_of(self._map.space.grid.centre_of(life.voxels(number))))
+
+    def _stay_at(self, life: "Life", spot: EditedSpot) -> int | None:
+        centre_of = self._map.space.grid.centre_of
+        stays = ((number, life.voxels(number)) for number in range(len(life)))
+        near = [(self._overlap(spot, self._box_of(centre_of(own))), number) for number, own in stays if len(own)]
+        share, number = max(near, default=(0.0, 0))
+        return number if share >= _ALIKE_BOX else None
+
+    def _box(self, rows: Rows) -> Box:
+        return self._box_of(self._map.space.centres_of(rows))
+
+    def _box_of(self, points: Float[np.ndarray, "m 3"]) -> Box:
+        level, half = self._map.space.level(points), self._map.space.grid.voxel_size_m / 2.0
+        return level.min(axis=0) - half, level.max(axis=0) + half
+
+    def _overlap(self, spot: EditedSpot, box: Box) -> float:
+        middle, size = self._map.space.level(np.array(spot.middle)), np.array(spot.size)
+        low, high = middle - size / 2.0, middle + size / 2.0
+        both = np.prod(np.clip(np.minimum(high, box[1]) - np.maximum(low, box[0]), 0.0, None))
+        whole = np.prod(size) + np.prod(box[1] - box[0]) - both
+        return float(both / whole) if whole > 0.0 else 0.0
+
+    def _spot(self, name: str, box: Box) -> EditedSpot:
+        middle = self._map.space.world((box[0] + box[1]) / 2.0)
+        return EditedSpot(name=name, middle=plain_point(middle), size=plain_point(box[1] - box[0]))
+
+    def spot_of(self, name: str, rows: Rows) -> EditedSpot:
+        """Return what an edit is about: the thing of some voxels."""
+        return self._spot(name, self._box(rows)).anchored(self._map.data.keyframes)
+
+    @cached_property
+    def rooms(self) -> Mapping[int, Edit]:
+        """The edits of rooms, by the number of the region in ``AVLMap.room_regions``."""
+        found: dict[int, Edit] = {}
+        for edit in self._of("rename room"):
+            spot, regions, share = self._now(edit.at[0]), self._map.room_regions, np.zeros(1)
+            if regions is not None and len(regions) and spot.corners:
+                share = regions.shares_of(np.array(spot.middle), np.array(spot.corners))
+            number = int(share.argmax())
+            if share[number] < _SAME_ROOM:
+                self._lose(edit, f"no room like the {spot.name} is at {place_text(spot.middle)} any more")
+            else:
+                found[number] = edit
+        return found
+
+    @cached_property
+    def pins(self) -> Mapping[str, tuple[Edit, Float[np.ndarray, "3"]]]:
+        """The places that were named, by plain names: the last place of each."""
+        return {plain_name(edit.name): (edit, np.array(self._now(edit.at[0]).middle)) for edit in self._of("pin")}
+
+    @cached_property
+    def forbidden(self) -> "tuple[ForbiddenArea, ...]":
+        """The areas that no robot enters; several may have one name, as each wet floor has."""
+        from avlmaps.maps.obstacles import ForbiddenArea
+
+        areas: list[ForbiddenArea] = []
+        storeys = self._map.storeys
+        for edit in self._of("forbid"):
+            corners = np.array(self._now(edit.at[0]).corners, np.float64)
+            storey = 0 if storeys is None else int(storeys.of_places(corners.mean(axis=0))[0])
+            areas.append(ForbiddenArea(edit.name, said(edit), self._map.space.level(corners)[:, :2], storey))
+        return tuple(areas)
+
+    @property
+    def unheeded(self) -> tuple[str, ...]:
+        """A sentence for each area that was forbidden and that this map does not know, so that a robot may enter it."""
+        _ = self.forbidden
+        lost = (self._lost[edit.id] for edit in self.edits if edit.does == "forbid" and edit.id in self._lost)
+        return tuple(f"The robot may enter {one.edit.name}, which was forbidden: {one.why}." for one in lost)
+
+    # What follows for questions and lists.
 
     @property
     def own_names(self) -> tuple[tuple[str, bool], ...]:
@@ -385,24 +306,19 @@ class Edited(FoundEdits):
 
     def knows(self, phrase: str) -> bool:
         """Return whether a person named something so."""
-        word = plain_name(phrase)
-        return any(name == word for name, _ in self.own_names)
+        return any(name == plain_name(phrase) for name, _ in self.own_names)
 
     def is_room(self, phrase: str) -> bool:
         """Return whether a person named a room so, and nothing else."""
-        word = plain_name(phrase)
-        kinds = {is_room for name, is_room in self.own_names if name == word}
-        return kinds == {True}
+        return {is_room for name, is_room in self.own_names if name == plain_name(phrase)} == {True}
 
     def pinned(self, part: Part, heat: HeatSettings) -> NearAnchors | None:
         """Return the heat of a place that a person named; None where nobody named one so."""
         known = self.pins.get(plain_name(part.query)) if self.edits else None
         if known is None:
             return None
-        falloff = heat.falloff_per_m(part.role)
-        return NearAnchors(
-            self._map.space, part, falloff, known[1][None], np.ones(1), np.zeros(1, np.int64), True, part.query
-        )
+        anchor = known[1][None], np.ones(1), np.zeros(1, np.int64)
+        return NearAnchors(self._map.space, part, heat.falloff_per_m(part.role), *anchor, True, part.query)
 
     def object_factor(self, part: Part, heat: HeatSettings, find: Callable[[], NearThings]) -> NearThings:
         """Return the heat of the things that a part of a question names, as people corrected them."""
@@ -411,8 +327,7 @@ class Edited(FoundEdits):
         try:
             raw = find()
         except QueryError:
-            is_meant = means(part.query)
-            if not any(is_meant(one.name) for one in self.claims):
+            if not any(map(means(part.query), (one.name for one in self.claims))):
                 raise
             nothing = np.zeros(len(self._map.space), np.bool_), np.zeros(0, np.int64), np.zeros(0, np.float32)
             raw = NearThings(self._map.space, part, heat.falloff_per_m(part.role), *nothing, found=False)
@@ -424,17 +339,15 @@ class Edited(FoundEdits):
             return raw
         rows = np.flatnonzero(raw.mask)
         rows, instance, confidence, given = self._claimed(rows, raw.instance, raw.confidence, word)
-        if colour is not None and lexicon().find(word, EntryKind.THING) is None and len(given):
-            last = np.arange(len(confidence) - len(given), len(confidence))
+        if colour is not None and lexicon().find(word, EntryKind.THING) is None:
             rgb = np.asarray(self._map.data.voxels.rgb)
-            for number, claim in zip(last, given, strict=True):
+            for number, claim in enumerate(given, len(confidence) - len(given)):
                 own = np.zeros(len(claim.rows), np.int64)
                 confidence[number] *= colour_share(rgb, claim.rows, own, colour)[0]
         mask = np.zeros(len(raw.mask), np.bool_)
         mask[rows] = True
-        best, uncertain = float(confidence.max(initial=0.0)), raw.with_uncertain
-        is_named = raw.is_named or bool(given)
-        found = best >= FOUND_AT and is_named
+        is_named, uncertain = raw.is_named or bool(given), raw.with_uncertain
+        found = float(confidence.max(initial=0.0)) >= FOUND_AT and is_named
         lost = f"what looks like {word!r} was named otherwise by a person" if raw.found else raw.note
         return replace(
             raw, mask=mask, instance=instance, confidence=confidence, found=found, is_named=is_named,
@@ -447,35 +360,26 @@ class Edited(FoundEdits):
         if not self.edits or not self.claims:
             return found
         rows, instance, confidence, _ = self._claimed(found.rows, found.instance, found.confidence, word)
-        margin, score = np.ones(len(rows), np.float32), np.ones(len(rows), np.float32)
-        at = np.minimum(np.searchsorted(found.rows, rows), max(len(found.rows) - 1, 0))
-        if len(found.rows):
-            known = found.rows[at] == rows
-            margin[known], score[known] = found.margin[at[known]], found.score[at[known]]
-        return Instances(rows, instance, margin, score, confidence.astype(np.float32))
+        margin, score = np.ones(len(self._map.space), np.float32), np.ones(len(self._map.space), np.float32)
+        margin[found.rows], score[found.rows] = found.margin, found.score
+        return Instances(rows, instance, margin[rows], score[rows], confidence.astype(np.float32))
 
     def _claimed(
-        self,
-        rows: Int[np.ndarray, " a"],
-        instance: Int[np.ndarray, " a"],
-        confidence: Float[np.ndarray, " i"],
-        word: str,
-    ) -> tuple[Int[np.ndarray, " b"], Int[np.ndarray, " b"], Float[np.ndarray, " j"], list[Claim]]:
-        """Return instances without what people named otherwise, with the claims that the word means behind them."""
-        is_meant = means(word)
+        self, rows: Rows, instance: Rows, confidence: Float[np.ndarray, " i"], word: str
+    ) -> tuple[Rows, Rows, Float[np.ndarray, " j"], list[Claim]]:
+        # Instances without what people named otherwise, with the claims that the word means behind them.
         exact = [one for one in self.claims if plain_name(one.name) == plain_name(word)]
+        is_meant = means(word)
         given = exact or [one for one in self.claims if is_meant(one.name)]
         taken = self._voxels(one for one in self.claims if one.is_named or one in given)
         count = np.bincount(instance, minlength=len(confidence))
         left = np.bincount(instance[~taken[rows]], minlength=len(confidence))
-        stays = (left > 0) & (left >= HALF * count)
+        stays = (left > 0) & (left >= _HALF * count)
         own = stays[instance] & ~taken[rows]
-        number = np.cumsum(stays) - 1
         kept = int(stays.sum())
         new_rows = np.concatenate([rows[own], *(one.rows for one in given)])
-        new_instance = np.concatenate(
-            [number[instance[own]], *(np.full(len(one.rows), kept + k) for k, one in enumerate(given))]
-        ).astype(np.int64)
+        of_given = [np.full(len(one.rows), kept + k) for k, one in enumerate(given)]
+        new_instance = np.concatenate([(np.cumsum(stays) - 1)[instance[own]], *of_given]).astype(np.int64)
         order = np.argsort(new_rows, kind="stable")
         sure = np.concatenate([confidence[stays], [one.confidence for one in given]])
         return new_rows[order], new_instance[order], sure, given
@@ -490,31 +394,32 @@ class Edited(FoundEdits):
         """Return a list of things as people corrected it, most confident first."""
         if not self.edits or not (self.claims or self.pins):
             return found
-        from avlmaps.query.contents import thing_of
+        from avlmaps.query.contents import Thing, thing_of
 
         taken = self._voxels(self.claims)
-        kept = [one for one in found if not len(one.rows) or taken[one.rows].mean() < HALF]
+        things = [one for one in found if not len(one.rows) or taken[one.rows].mean() < _HALF]
         wanted = None if names is None else [means(name) for name in names]
 
         def is_wanted(name: str, sure: float) -> bool:
             return sure >= least_confidence and (wanted is None or any(one(name) for one in wanted))
 
-        stored, space = self._map, self._map.space
-        own = [
-            replace(thing_of(stored, space, one.name, one.confidence, one.rows), edited=said(one.edit))
-            for one in self.claims
-            if is_wanted(one.name, one.confidence)
-        ]
-        pinned = [_pinned(edit, place) for edit, place in self.pins.values() if is_wanted(edit.name, 1.0)]
-        return sorted([*kept, *own, *pinned], key=lambda one: -one.confidence)
+        for one in self.claims:
+            if is_wanted(one.name, one.confidence):
+                thing = thing_of(self._map, one.name, one.confidence, one.rows)
+                things.append(replace(thing, edited=said(one.edit)))
+        for edit, place in self.pins.values():
+            if is_wanted(edit.name, 1.0):
+                nothing = (0.0, 0.0, 0.0), (0, 0, 0), np.zeros(0, np.int64), place[None]
+                things.append(Thing(edit.name, 1.0, plain_point(place), *nothing, said(edit)))
+        return sorted(things, key=lambda one: -one.confidence)
 
-    def named_at(self, rows: Int[np.ndarray, " m"]) -> str | None:
+    def named_at(self, rows: Rows) -> str | None:
         """Return what people named most of some voxels; None where they named nothing there."""
         if not self.edits or not len(rows):
             return None
-        named = [(share_in(rows, one.rows), one.name) for one in self.claims if one.is_named]
+        named = [(float(np.isin(rows, one.rows).mean()), one.name) for one in self.claims if one.is_named]
         share, name = max(named, default=(0.0, ""))
-        return name if share >= HALF else None
+        return name if share >= _HALF else None
 
     def room_field(self, field: RoomField) -> RoomField:
         """Return how likely each place is each kind of room, where people said so with certainty."""
@@ -528,10 +433,8 @@ class Edited(FoundEdits):
         """Return rooms that say who named them."""
         if not self.edits or not self.rooms:
             return rooms
-        return [
-            room if (edit := self.rooms.get(room.region)) is None else replace(room, edited=said(edit))
-            for room in rooms
-        ]
+        named = {number: said(edit) for number, edit in self.rooms.items()}
+        return [replace(room, edited=named[room.region]) if room.region in named else room for room in rooms]
 
     def life(self, life: "Life") -> "Life":
         """Return what became of things over days, under the names that people gave them, wherever they moved."""
@@ -541,7 +444,7 @@ class Edited(FoundEdits):
 
         stays, changed = list(life.stays), False
         for edit in self._of("rename"):
-            number = self._spots.stay_at(life, edit.at[0].now(self._map.data.keyframes))
+            number = self._stay_at(life, self._now(edit.at[0]))
             if number is None:
                 continue
             while (before := stays[number].moved_from) is not None:
@@ -563,24 +466,25 @@ class Edited(FoundEdits):
         def is_at(own: Float[np.ndarray, "m 3"]) -> bool:
             return any(float(np.linalg.norm(own - point, axis=1).min()) < _AT_M for point in points)
 
-        told = [edit for name, (edit, place) in self.pins.items() if name in names or is_at(place[None])]
-        told += [edit for edit in self.rooms.values() if any(same_place(edit.name, room) for room in rooms)]
-        said_of = [f"{_the(edit.name)} was {said(edit)}." for edit in told]
-        said_of += [
-            f"{_the(one.name)} was {said(one.edit)}."
-            for one in self.claims
-            if plain_name(one.name) in names or is_at(space.centres_of(one.rows))
+        made = [(edit.name, edit) for name, (edit, at) in self.pins.items() if name in names or is_at(at[None])]
+        made += [
+            (edit.name, edit) for edit in self.rooms.values() if any(same_place(edit.name, room) for room in rooms)
         ]
-        said_of += [str(one) for one in self._lost.values() if plain_name(one.edit.name) in {*names, *rooms}]
-        return tuple(dict.fromkeys(said_of))
+        for one in self.claims:
+            if plain_name(one.name) in names or is_at(space.centres_of(one.rows)):
+                made.append((one.name, one.edit))
+        told = [f"The {plain_name(name)} was {said(edit)}." for name, edit in made]
+        told += [str(one) for one in self._lost.values() if plain_name(one.edit.name) in {*names, *rooms}]
+        return tuple(dict.fromkeys(told))
 
 
-def _pinned(edit: Edit, place: Float[np.ndarray, "3"]) -> "Thing":
-    from avlmaps.query.contents import Thing
+def _without_specks(which: Rows, level: Float[np.ndarray, "m 3"]) -> Rows:
+    from scipy.spatial import KDTree
 
-    no_voxels = np.zeros(0, np.int64)
-    return Thing(edit.name, 1.0, plain_point(place), (0.0, 0.0, 0.0), (0, 0, 0), no_voxels, place[None], said(edit))
-
-
-def _the(name: str) -> str:
-    return f"The {plain_name(name)}"
+    count = np.bincount(which)
+    large = count >= max(2.0, _SPECK * len(which))
+    if large.all() or not large.any():
+        return which
+    on_large, out = large[which], which.copy()
+    out[~on_large] = which[on_large][KDTree(level[on_large]).query(level[~on_large])[1]]
+    return out

@@ -103,16 +103,9 @@ def write_ply(
 ) -> Path:
     """Write a binary PLY point cloud; comments in its head name the frame, and turn it into the other one.
 
-    Args:
-        path: file.
-        points: metres, recording frame.
-        colors: RGB.
-        columns: more numbers for each point (``heat``, ``weight``), written as float32.
-        space: of the map; needed for the level frame.
-        frame: of the coordinates in the file.
-
-    Raises:
-        QueryError: the file cannot be written.
+    ``points``: metres, recording frame. ``colors``: RGB. ``columns``: more numbers for each point (``heat``,
+    ``weight``), written as float32. ``space``: of the map; needed for the level frame. ``QueryError``: the file cannot
+    be written.
     """
     columns = columns or {}
     points = _in_frame(points, space, frame)
@@ -170,16 +163,9 @@ def write_glb(
 ) -> Path:
     """Write the voxels as blocks into a GLB file; its ``extras`` name the frame.
 
-    Args:
-        path: file.
-        index: of the voxels.
-        voxel_size_m: their edge.
-        colors: RGB of each.
-        space: of the map; needed for the level frame.
-        frame: level: x of the level frame to the right, its z up along the file's y, its y away along −z.
-
-    Raises:
-        QueryError: the map is empty, or the file cannot be written.
+    ``colors``: RGB of each. ``space``: of the map; needed for the level frame. ``frame``: level: x of the level frame
+    to the right, its z up along the file's y, its y away along −z. ``QueryError``: the map is empty, or the file cannot
+    be written.
     """
     import trimesh
     from trimesh.exchange.gltf import export_glb  # pyright: ignore[reportUnknownVariableType]
@@ -215,15 +201,7 @@ def write_occupancy(path: Path, obstacles: "Obstacles") -> tuple[Path, Path]:
 
     The grid is in the level frame: x to the right, y up, the first row of the picture at the largest y.
 
-    Args:
-        path: of the PGM; the YAML file has the same name with the suffix ``.yaml``.
-        obstacles: of the body that is to drive there.
-
-    Returns:
-        Both files.
-
-    Raises:
-        QueryError: a file cannot be written.
+    Returns both files. ``QueryError``: a file cannot be written.
     """
     from avlmaps.maps.obstacles import CellState
 
@@ -259,8 +237,7 @@ def write_table(
     The column ``frame`` names that of the positions, metres. Sizes are along the axes of the level frame in either, as
     the column ``size_frame`` says. Where rows have a storey, a room or a distance, these are columns at the end.
 
-    Raises:
-        QueryError: the file cannot be written.
+    ``QueryError``: the file cannot be written.
     """
     rows: list[dict[str, object]] = []
     for thing in things:
@@ -286,11 +263,7 @@ def _millis(value: float) -> str:
 
 
 def to_open3d(points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"]) -> Any:
-    """Return an ``open3d.geometry.PointCloud``.
-
-    Raises:
-        BackendError: open3d is not installed.
-    """
+    """Return an ``open3d.geometry.PointCloud``. ``BackendError``: open3d is not installed."""
     try:
         open3d: Any = import_module("open3d")
     except ImportError as fault:
@@ -311,8 +284,7 @@ def to_trimesh(points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"
 def explain_write_errors(path: Path) -> Generator[None]:
     """Make the folder of a file that is written then; a fault of the disk is one sentence.
 
-    Raises:
-        QueryError: it cannot be written.
+    ``QueryError``: it cannot be written.
     """
     made = [folder for folder in path.parents if not folder.exists()]
     try:
@@ -337,8 +309,7 @@ FILES = ("embeddings.npy", "index.npy", "point_cloud.pcd")
 def write_openlex3d(folder: Path, opened: "AVLMap") -> tuple[Path, ...]:
     """Write the three files; voxels without a feature are left out.
 
-    Raises:
-        QueryError: no voxel has a feature, or a file cannot be written.
+    ``QueryError``: no voxel has a feature, or a file cannot be written.
     """
     voxels = opened.data.voxels
     rows = np.flatnonzero(np.asarray(voxels.weight) > 0.0)

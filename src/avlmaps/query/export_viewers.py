@@ -27,23 +27,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ExportedBox:
-    """A thing's box, upright in the room.
+    """A thing's box, upright in the room."""
 
-    Attributes:
-        name: of the thing.
-        confidence: that it is one, in [0, 1].
-        centre: metres.
-        size: extent along the axes of the level frame, metres.
-        quaternion: x y z w, from the level frame's axes to those of the layers.
-        color: RGB.
-    """
-
-    name: str
-    confidence: float
-    centre: tuple[float, float, float]
-    size: tuple[float, float, float]
-    quaternion: tuple[float, float, float, float]
-    color: tuple[int, int, int]
+    name: str  # of the thing
+    confidence: float  # that it is one, in [0, 1]
+    centre: tuple[float, float, float]  # metres
+    size: tuple[float, float, float]  # extent along the axes of the level frame, metres
+    quaternion: tuple[float, float, float, float]  # x y z w, from the level frame's axes to those of the layers
+    color: tuple[int, int, int]  # RGB
 
     @property
     def label(self) -> str:
@@ -53,21 +44,13 @@ class ExportedBox:
 
 @dataclass(frozen=True, slots=True)
 class ExportedSound:
-    """A sound, where the robot was when it heard it.
+    """A sound, where the robot was when it heard it."""
 
-    Attributes:
-        name: the likeliest one; ``sound`` where it has none.
-        confidence: of the name, in [0, 1]; None where it has none.
-        position: metres.
-        onset_s: start, the recording's time.
-        offset_s: end.
-    """
-
-    name: str
-    confidence: float | None
-    position: tuple[float, float, float]
-    onset_s: float
-    offset_s: float
+    name: str  # the likeliest one; ``sound`` where it has none
+    confidence: float | None  # of the name, in [0, 1]; None where it has none
+    position: tuple[float, float, float]  # metres
+    onset_s: float  # start, the recording's time
+    offset_s: float  # end
 
     @property
     def label(self) -> str:
@@ -77,33 +60,20 @@ class ExportedSound:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layers:
-    """A map's layers, each in the same frame, metres; times are the recording's, seconds.
+    """A map's layers, each in the same frame, metres; times are the recording's, seconds."""
 
-    Attributes:
-        frame: its name.
-        points: middles of the voxels.
-        colors: RGB of each.
-        voxel_size_m: their edge.
-        things: boxes.
-        sounds: in the order of their onset.
-        heat: of each voxel in [0, 1], and the question that it answers; None without one.
-        stamp_s: when each keyframe was taken.
-        frame_from_camera: pose of the colour camera at each keyframe.
-        camera: of the stored pictures, which may be smaller than those recorded.
-        pictures: JPEG file of each keyframe.
-    """
-
-    frame: FrameName
-    points: Float32[np.ndarray, "n 3"]
-    colors: UInt8[np.ndarray, "n 3"]
-    voxel_size_m: float
-    things: tuple[ExportedBox, ...]
-    sounds: tuple[ExportedSound, ...]
+    frame: FrameName  # its name
+    points: Float32[np.ndarray, "n 3"]  # middles of the voxels
+    colors: UInt8[np.ndarray, "n 3"]  # RGB of each
+    voxel_size_m: float  # their edge
+    things: tuple[ExportedBox, ...]  # boxes
+    sounds: tuple[ExportedSound, ...]  # in the order of their onset
+    # Of each voxel in [0, 1], and the question that it answers; None without one.
     heat: tuple[str, Float32[np.ndarray, " n"]] | None
-    stamp_s: Float64[np.ndarray, " k"]
-    frame_from_camera: Float64[np.ndarray, "k 4 4"]
-    camera: Pinhole
-    pictures: tuple[bytes, ...] = field(repr=False)
+    stamp_s: Float64[np.ndarray, " k"]  # when each keyframe was taken
+    frame_from_camera: Float64[np.ndarray, "k 4 4"]  # pose of the colour camera at each keyframe
+    camera: Pinhole  # of the stored pictures, which may be smaller than those recorded
+    pictures: tuple[bytes, ...] = field(repr=False)  # JPEG file of each keyframe
 
     @property
     def start_s(self) -> float:
@@ -119,11 +89,7 @@ class Layers:
 def layers_of(
     opened: "AVLMap", frame: FrameName = FrameName.LEVEL, heat: str | None = None, least_confidence: float = 0.5
 ) -> Layers:
-    """Gather what a map shows.
-
-    Raises:
-        QueryError: the question cannot be answered.
-    """
+    """Gather what a map shows. ``QueryError``: the question cannot be answered."""
     space, stored = opened.space, opened
     level = space.level_from_recording
     turn = level if frame is FrameName.LEVEL else np.eye(4)
@@ -182,9 +148,7 @@ TIMELINE = "recording"
 def write_rerun(path: Path, layers: Layers) -> Path:
     """Write a map's layers for Rerun.
 
-    Raises:
-        BackendError: rerun-sdk is not installed.
-        QueryError: the file cannot be written.
+    ``BackendError``: rerun-sdk is not installed. ``QueryError``: the file cannot be written.
     """
     try:
         rr: Any = import_module("rerun")
@@ -200,7 +164,6 @@ def write_rerun(path: Path, layers: Layers) -> Path:
 
 
 def _log_still(rr: Any, stream: Any, layers: Layers) -> None:
-    """Log what holds at any time."""
     if layers.frame is FrameName.LEVEL:
         stream.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     radius = layers.voxel_size_m / 2.0
@@ -227,7 +190,6 @@ def _log_still(rr: Any, stream: Any, layers: Layers) -> None:
 
 
 def _log_drive(rr: Any, stream: Any, layers: Layers) -> None:
-    """Log what happened, at its time."""
     camera = layers.camera
     pinhole = rr.Pinhole(
         focal_length=(camera.fx, camera.fy),
@@ -254,9 +216,7 @@ _SOUND_M = 0.3
 def write_foxglove(path: Path, layers: Layers) -> Path:
     """Write a map's layers as MCAP.
 
-    Raises:
-        BackendError: foxglove-sdk is not installed.
-        QueryError: the file cannot be written.
+    ``BackendError``: foxglove-sdk is not installed. ``QueryError``: the file cannot be written.
     """
     try:
         foxglove: Any = import_module("foxglove")
@@ -282,27 +242,28 @@ class _Writer:
         self._open: dict[str, Any] = {}
 
     def write(self) -> None:
-        layers, start_s = self._layers, self._layers.start_s
-        self._log("/map", self._cloud(layers.colors, None), start_s)
+        m, layers = self._messages, self._layers
+        still = {"timestamp": self._time(layers.start_s), "frame_id": self._frame}
+        self._log("/map", self._cloud(still, layers.colors, None), layers.start_s)
         if layers.heat is not None:
             heat = layers.heat[1]
-            self._log("/heat", self._cloud(heat_colors(heat), heat), start_s)
-        self._log("/things", self._messages.SceneUpdate(entities=self._boxes()), start_s)
-        self._log("/path", self._path(), start_s)
+            self._log("/heat", self._cloud(still, heat_colors(heat), heat), layers.start_s)
+        boxes = [self._thing(number, box) for number, box in enumerate(layers.things)]
+        self._log("/things", m.SceneUpdate(entities=boxes), layers.start_s)
+        path = [self._pose(pose[:3, 3].tolist(), to_quaternion(pose).tolist()) for pose in layers.frame_from_camera]
+        self._log("/path", m.PosesInFrame(**still, poses=path), layers.start_s)
         self._write_pictures()
         for number, sound in enumerate(layers.sounds):
-            self._log("/sounds", self._messages.SceneUpdate(entities=[self._sound(number, sound)]), sound.onset_s)
+            self._log("/sounds", m.SceneUpdate(entities=[self._sound(number, sound)]), sound.onset_s)
 
     def _log(self, topic: str, message: Any, stamp_s: float) -> None:
-        channel = self._open.get(topic)
-        if channel is None:
+        if topic not in self._open:
             kind = getattr(self._channels, f"{type(message).__name__}Channel")
-            channel = self._open[topic] = kind(topic, context=self._context)
-        channel.log(message, log_time=_nanoseconds(stamp_s))
+            self._open[topic] = kind(topic, context=self._context)
+        self._open[topic].log(message, log_time=_nanoseconds(stamp_s))
 
     def _time(self, stamp_s: float) -> Any:
-        seconds, nanoseconds = divmod(_nanoseconds(stamp_s), 1_000_000_000)
-        return self._messages.Timestamp(seconds, nanoseconds)
+        return self._messages.Timestamp(*divmod(_nanoseconds(stamp_s), 1_000_000_000))
 
     def _pose(self, place: Sequence[float], quaternion: Sequence[float] = (0.0, 0.0, 0.0, 1.0)) -> Any:
         m = self._messages
@@ -312,62 +273,55 @@ class _Writer:
         r, g, b = (value / 255.0 for value in rgb)
         return self._messages.Color(r=r, g=g, b=b, a=alpha)
 
-    def _cloud(self, colors: UInt8[np.ndarray, "n 3"], heat: Float32[np.ndarray, " n"] | None) -> Any:
+    def _cloud(
+        self, still: dict[str, Any], colors: UInt8[np.ndarray, "n 3"], heat: Float32[np.ndarray, " n"] | None
+    ) -> Any:
         """Return the voxels as points with a colour, and the heat where there is one."""
-        types = self._messages.PackedElementFieldNumericType
-        numbers = {"<f4": types.Float32, "u1": types.Uint8}
-        kinds = [(axis, "<f4") for axis in "xyz"] + [("heat", "<f4")] * (heat is not None)
-        kinds += [(name, "u1") for name in ("red", "green", "blue", "alpha")]
-        rows = np.zeros(len(colors), np.dtype(kinds))
-        for k, axis in enumerate("xyz"):
-            rows[axis] = self._layers.points[:, k]
-        for k, name in enumerate(("red", "green", "blue")):
-            rows[name] = colors[:, k]
+        m = self._messages
+        types = {"<f4": m.PackedElementFieldNumericType.Float32, "u1": m.PackedElementFieldNumericType.Uint8}
+        columns = {axis: ("<f4", self._layers.points[:, k]) for k, axis in enumerate("xyz")}
+        columns |= {} if heat is None else {"heat": ("<f4", heat)}
+        columns |= {name: ("u1", colors[:, k]) for k, name in enumerate(("red", "green", "blue"))}
+        rows = np.zeros(
+            len(colors), np.dtype([(name, kind) for name, (kind, _) in columns.items()] + [("alpha", "u1")])
+        )
+        for name, (_, values) in columns.items():
+            rows[name] = values
         rows["alpha"] = 255
-        if heat is not None:
-            rows["heat"] = heat
-        offsets = np.cumsum([0, *(np.dtype(kind).itemsize for _, kind in kinds)])
-        return self._messages.PointCloud(
-            timestamp=self._time(self._layers.start_s),
-            frame_id=self._frame,
+        fields: Any = rows.dtype.fields
+        packed = [
+            m.PackedElementField(name=name, offset=int(fields[name][1]), type=types["<f4" if size == 4 else "u1"])
+            for name in rows.dtype.names or ()
+            for size in (fields[name][0].itemsize,)
+        ]
+        return m.PointCloud(
+            **still,
             pose=self._pose((0.0, 0.0, 0.0)),
             point_stride=rows.dtype.itemsize,
-            fields=[
-                self._messages.PackedElementField(name=name, offset=int(offset), type=numbers[kind])
-                for (name, kind), offset in zip(kinds, offsets, strict=False)
-            ],
+            fields=packed,
             data=rows.tobytes(),
         )
 
-    def _boxes(self) -> list[Any]:
-        m = self._messages
-        return [
-            m.SceneEntity(
-                timestamp=self._time(self._layers.start_s),
-                frame_id=self._frame,
-                id=f"thing {number}",
-                metadata=[
-                    m.KeyValuePair(key="name", value=box.name),
-                    m.KeyValuePair(key="confidence", value=f"{box.confidence:.3f}"),
-                ],
-                cubes=[
-                    m.CubePrimitive(
-                        pose=self._pose(box.centre, box.quaternion),
-                        size=m.Vector3(**_named(box.size)),
-                        color=self._color(box.color, 0.35),
-                    )
-                ],
-                texts=[self._text(box.label, box.centre)],
-            )
-            for number, box in enumerate(self._layers.things)
-        ]
-
-    def _text(self, label: str, place: Sequence[float]) -> Any:
-        dark = self._color((20, 20, 20), 1.0)
-        pose = self._pose(place)
-        return self._messages.TextPrimitive(
-            pose=pose, billboard=True, font_size=14.0, scale_invariant=True, color=dark, text=label
+    def _entity(
+        self, name: str, stamp_s: float, label: str, place: Sequence[float], said: dict[str, str], **shapes: Any
+    ) -> Any:
+        m, dark = self._messages, self._color((20, 20, 20), 1.0)
+        text = m.TextPrimitive(
+            pose=self._pose(place), billboard=True, font_size=14.0, scale_invariant=True, color=dark, text=label
         )
+        metadata = [m.KeyValuePair(key=key, value=value) for key, value in said.items()]
+        at = {"timestamp": self._time(stamp_s), "frame_id": self._frame}
+        return m.SceneEntity(**at, id=name, metadata=metadata, texts=[text], **shapes)
+
+    def _thing(self, number: int, box: ExportedBox) -> Any:
+        m = self._messages
+        cube = m.CubePrimitive(
+            pose=self._pose(box.centre, box.quaternion),
+            size=m.Vector3(**_named(box.size)),
+            color=self._color(box.color, 0.35),
+        )
+        said = {"name": box.name, "confidence": f"{box.confidence:.3f}"}
+        return self._entity(f"thing {number}", self._layers.start_s, box.label, box.centre, said, cubes=[cube])
 
     def _sound(self, number: int, sound: ExportedSound) -> Any:
         m = self._messages
@@ -376,58 +330,29 @@ class _Writer:
             size=m.Vector3(x=_SOUND_M, y=_SOUND_M, z=_SOUND_M),
             color=self._color((230, 120, 30), 0.8),
         )
-        known = sound.confidence is not None
-        confidence = [m.KeyValuePair(key="confidence", value=f"{sound.confidence:.3f}")] if known else []
-        return m.SceneEntity(
-            timestamp=self._time(sound.onset_s),
-            frame_id=self._frame,
-            id=f"sound {number}",
-            metadata=[
-                m.KeyValuePair(key="name", value=sound.name),
-                *confidence,
-                m.KeyValuePair(key="ends_s", value=f"{sound.offset_s:.3f}"),
-            ],
-            spheres=[ball],
-            texts=[self._text(sound.label, sound.position)],
-        )
-
-    def _path(self) -> Any:
-        poses = self._layers.frame_from_camera
-        return self._messages.PosesInFrame(
-            timestamp=self._time(self._layers.start_s),
-            frame_id=self._frame,
-            poses=[self._pose(p[:3, 3].tolist(), to_quaternion(p).tolist()) for p in poses],
-        )
+        confidence = {} if sound.confidence is None else {"confidence": f"{sound.confidence:.3f}"}
+        said = {"name": sound.name, **confidence, "ends_s": f"{sound.offset_s:.3f}"}
+        return self._entity(f"sound {number}", sound.onset_s, sound.label, sound.position, said, spheres=[ball])
 
     def _write_pictures(self) -> None:
         m, camera = self._messages, self._layers.camera
         k = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
+        calibrated = {"width": camera.width, "height": camera.height, "distortion_model": "plumb_bob", "D": [0.0] * 5,
+                      "K": k, "R": np.eye(3).ravel().tolist(),
+                      "P": [*k[:3], 0.0, *k[3:6], 0.0, *k[6:], 0.0]}  # fmt: skip
         for stamp_s, pose, picture in self._layers.shots():
-            at = self._time(stamp_s)
+            at = {"timestamp": self._time(stamp_s), "frame_id": CAMERA_FRAME}
             transform = m.FrameTransform(
-                timestamp=at,
+                timestamp=self._time(stamp_s),
                 parent_frame_id=self._frame,
                 child_frame_id=CAMERA_FRAME,
                 translation=m.Vector3(**_named(pose[:3, 3].tolist())),
                 rotation=m.Quaternion(**_named(to_quaternion(pose).tolist())),
             )
             self._log("/tf", transform, stamp_s)
-            if not picture:
-                continue
-            calibration = m.CameraCalibration(
-                timestamp=at,
-                frame_id=CAMERA_FRAME,
-                width=camera.width,
-                height=camera.height,
-                distortion_model="plumb_bob",
-                D=[0.0] * 5,
-                K=k,
-                R=np.eye(3).ravel().tolist(),
-                P=[*k[:3], 0.0, *k[3:6], 0.0, *k[6:], 0.0],
-            )
-            self._log("/camera_info", calibration, stamp_s)
-            image = m.CompressedImage(timestamp=at, frame_id=CAMERA_FRAME, data=picture, format="jpeg")
-            self._log("/camera", image, stamp_s)
+            if picture:
+                self._log("/camera_info", m.CameraCalibration(**at, **calibrated), stamp_s)
+                self._log("/camera", m.CompressedImage(**at, data=picture, format="jpeg"), stamp_s)
 
 
 def _named(values: Sequence[float]) -> dict[str, float]:

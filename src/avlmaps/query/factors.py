@@ -31,36 +31,23 @@ _SOME_POINTS = 16  # that are looked at together where there are more pairs than
 
 
 class Factor(ABC):
-    """The heat of one part of the query.
+    """The heat of one part of the query."""
 
-    Attributes:
-        space: the map's voxels.
-        part: the part of the query.
-        falloff_per_m: ε.
-        anchors: (a, 3) places that the heat falls from, metres, world.
-        instance: (a,) number of the distinct thing that each anchor belongs to.
-        confidence: (instances,) in [0, 1]: the probability that each matches the part; 0.5 and more is yes.
-        found: whether the map holds the part.
-        understood: what the encoder could act on.
-        note: one sentence on why it was not found, or ``""``.
-        flat: whether the heat is the same at every height.
-        is_named: whether what was said of it is understood; False where only a colour is ("red elephant").
-        regional: whether the heat says in which region a place lies, not how near it is: a thing lies in one region,
-            so the mean over its voxels counts (``goals.share_voxels``).
-    """
-
-    space: Space
-    part: Part
-    falloff_per_m: float
-    anchors: Float[np.ndarray, "a 3"]
-    instance: Int[np.ndarray, " a"]
+    space: Space  # the map's voxels
+    part: Part  # the part of the query
+    falloff_per_m: float  # ε
+    anchors: Float[np.ndarray, "a 3"]  # (a, 3) places that the heat falls from, metres, world
+    instance: Int[np.ndarray, " a"]  # (a,) number of the distinct thing that each anchor belongs to
+    # (instances,) in [0, 1]: the probability that each matches the part; 0.5 and more is yes.
     confidence: Float[np.ndarray, " i"]
-    found: bool
-    understood: str
-    note: str
-    flat: bool
+    found: bool  # whether the map holds the part
+    understood: str  # what the encoder could act on
+    note: str  # one sentence on why it was not found, or ``""``
+    flat: bool  # whether the heat is the same at every height
+    # Whether the heat says in which region a place lies, not how near it is: a thing lies in one region, so the mean
+    # over its voxels counts (``goals.share_voxels``).
     regional: bool = False
-    is_named: bool = True
+    is_named: bool = True  # whether what was said of it is understood; False where only a colour is ("red elephant")
     # The heat and the anchors of all voxels, once they were computed.
     _of_all: tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]] | None = None
 
@@ -124,26 +111,21 @@ class Factor(ABC):
 
 @dataclass(frozen=True, eq=False)
 class NearThings(Factor):
-    """Heat of an object: max(1 − ε·d, 0), d the 3D distance to the nearest of its voxels.
-
-    Attributes:
-        mask: which voxels are the object; the anchors are their middles, in the same order.
-        with_uncertain: makes the same with the instances whose confidence is too low to count in a query for the
-        thing alone: the context may select one of them. None where there are no others.
-        is_named: see ``Factor``.
-    """
+    """Heat of an object: max(1 − ε·d, 0), d the 3D distance to the nearest of its voxels."""
 
     space: Space
     part: Part
     falloff_per_m: float
-    mask: Bool[np.ndarray, " n"]
+    mask: Bool[np.ndarray, " n"]  # which voxels are the object; the anchors are their middles, in the same order
     instance: Int[np.ndarray, " a"]
     confidence: Float[np.ndarray, " i"]
     found: bool
     understood: str = ""
     note: str = ""
+    # Makes the same with the instances whose confidence is too low to count in a query for the thing alone: the context
+    # may select one of them. None where there are no others.
     with_uncertain: "Callable[[], NearThings] | None" = None
-    is_named: bool = True
+    is_named: bool = True  # see ``Factor``
     flat: bool = field(default=False, init=False)
 
     def for_product(self) -> "NearThings":
@@ -193,23 +175,18 @@ class NearThings(Factor):
 
 @dataclass(frozen=True, eq=False)
 class NearAnchors(Factor):
-    """Heat of an image, an area or a sound: max over anchors of s − ε·d_xy, floored at 0.
-
-    Attributes:
-        scores: (a,) in [0, 1], one for each anchor.
-        certainty: the confidence of every instance: 1 where the scores are calibrated already.
-    """
+    """Heat of an image, an area or a sound: max over anchors of s − ε·d_xy, floored at 0."""
 
     space: Space
     part: Part
     falloff_per_m: float
     anchors: Float[np.ndarray, "a 3"]
-    scores: Float[np.ndarray, " a"]
+    scores: Float[np.ndarray, " a"]  # (a,) in [0, 1], one for each anchor
     instance: Int[np.ndarray, " a"]
     found: bool
     understood: str = ""
     note: str = ""
-    certainty: float = 1.0
+    certainty: float = 1.0  # the confidence of every instance: 1 where the scores are calibrated already
     flat: bool = field(default=True, init=False)
 
     def __post_init__(self) -> None:
@@ -293,8 +270,7 @@ def stretch_scores(scores: Float[np.ndarray, " a"]) -> Float[np.ndarray, " a"]:
     Where all are equal within rounding (or there is one only) no anchor is better than another, and all become 1;
     that of nothing is nothing. Only order survives: use it for scores that are not calibrated.
 
-    Raises:
-        ValueError: a score is NaN or infinite.
+    ``ValueError``: a score is NaN or infinite.
     """
     if not np.isfinite(scores).all():
         raise ValueError("a score is NaN or infinite")
@@ -311,14 +287,8 @@ def object_heat(
 
     Works on squared distances between voxel indices, which are whole numbers, so nothing is approximated.
 
-    Args:
-        space: of the map.
-        mask: the object.
-        falloff_per_m: ε.
-        among: the voxels that are wanted; others have no heat. None: all.
-
-    Returns:
-        The heat, and the number of the nearest voxel among those of the mask (−1 where there is no heat).
+    ``among``: the voxels that are wanted; others have no heat. None: all. Returns the heat, and the number of the
+    nearest voxel among those of the mask (−1 where there is no heat).
     """
     from avlmaps.query.kernels import nearest_squared
 
@@ -357,12 +327,8 @@ def anchor_heat(
 
     Cones that lie under another everywhere are left out first; that changes nothing.
 
-    Args:
-        space: of the map.
-        anchors: metres, world.
-        scores: s, in [0, 1].
-        falloff_per_m: ε.
-        among: the voxels that are wanted; others have no heat. None: all.
+    ``anchors``: metres, world. ``scores``: s, in [0, 1]. ``among``: the voxels that are wanted; others have no heat.
+    None: all.
     """
     from avlmaps.query.kernels import cone_heat, undominated
 

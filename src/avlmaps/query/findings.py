@@ -5,7 +5,7 @@ with other encoders or settings than those is looked through again.
 """
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 
-from avlmaps.core.arrays import Float, Int, UInt8
+from avlmaps.core.arrays import Float, Float16, Int, UInt8
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.question import Part
 from avlmaps.core.registry import Kind
@@ -25,17 +25,14 @@ from avlmaps.query.instances import FeatureVoxels, Instances, Segmentation, conf
 from avlmaps.query.modalities.area import area_anchors, area_names, name_shares
 from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.room_regions import RoomRegions
-from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, ThingsInRooms, rooms_of_cells, seen_twice, voting_rows
+from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, rooms_of_cells, seen_twice, voting_rows
 from avlmaps.query.scores import Closest
 from avlmaps.query.settings import AreaSettings
 from avlmaps.query.storey_grid import StoreyGrid
-from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import ClosestWords, EncodedWord, KnownClosestWords, Vocabulary
+from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary, competes_whole
 
 if TYPE_CHECKING:
-    from avlmaps.maps.storeys import Storeys
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.settings import QuerySettings
 
 Findings = Mapping[str, np.ndarray]
 Search = tuple[str, bool]
@@ -145,110 +142,99 @@ def field_from(
 class MapNames:
     """What the pixel encoder sees in a map; computed when it is asked for, or as the build found it."""
 
-    def __init__(
-        self,
-        stored: "AVLMap",
-        space: Space,
-        settings: "QuerySettings",
-        in_rooms: Callable[[], ThingsInRooms | None],
-    ) -> None:
-        """Take a map; ``in_rooms`` returns the evidence of its rooms on the things in them."""
-        self._stored, self._space, self._settings, self._in_rooms = stored, space, settings, in_rooms
+    def __init__(self, avlmap: "AVLMap") -> None:
+        self._map = avlmap
         self._rivals: tuple[tuple[str, ...], ClosestWords] | None = None
 
     def heat(self, part: Part, vocabulary: Sequence[str] | None) -> NearThings:
         """Return the heat of an object as the encoder sees it."""
-        encoder = self._stored.encoders.pixels
-        # Of names, most voxels have too little of the word to be compared with all others.
-        words = self._known_words if vocabulary is None else None
-        rivals = self.closest_words(vocabulary) if words is None else words
-        voxels = self._feature_voxels(encoder, rivals, self._stored.data.voxels.rgb)
-        known = (
-            dict(self._known_searches) if vocabulary is None else {}
-        )  # of a name of the encoder, narrower names with it
-        found = known.get((part.query, False)) or known.get((part.query, True))
-        return object_factor(voxels, part, self._settings.heat, found)
+        encoder = self._map.encoders.pixels
+        rivals = self._own if vocabulary is None and self._is_closed else self.closest_words(vocabulary)
+        voxels = self._feature_voxels(encoder, rivals, self._map.data.voxels.rgb)
+        found = None
+        if vocabulary is None:
+            found = self._known_searches.get((part.query, False)) or self._known_searches.get((part.query, True))
+        return object_factor(voxels, part, self._map.settings.heat, found)
 
     def search(self, word: str, alone: bool) -> Segmentation:
         """Return the instances of a word; ``alone`` leaves out the narrower names that one of the encoder takes in."""
         known = self._known_searches.get((word, alone))
         if known is not None:
             return known
-        encoder = self._stored.encoders.pixels
-        everywhere = self.closest_words()
-        rivals = everywhere if self._known_words is None else self._known_words  # which knows all of them now
+        encoder = self._map.encoders.pixels
         if alone and isinstance(encoder, NamedPixelEncoder) and word in encoder.names:
             encoded = EncodedWord.of_name(encoder, word)
         else:
             encoded = EncodedWord.of(encoder, word)
-        return confident_instances(self._feature_voxels(encoder, rivals), encoded)
+        return confident_instances(self._feature_voxels(encoder, self.closest_words()), encoded)
 
     def _feature_voxels(
         self, encoder: PixelEncoder, rivals: Vocabulary, rgb: UInt8[np.ndarray, "n 3"] | None = None
     ) -> FeatureVoxels:
-        feature, settings = self._stored.data.voxels.feature, self._settings.objects
-        return FeatureVoxels(self._space, feature, encoder, rivals, settings, rgb, self._in_rooms)
+        settings = self._map.settings.objects
+        return FeatureVoxels(
+            self._map.space, self._feature, encoder, rivals, settings, rgb, lambda: self._map.things_in_rooms
+        )
 
     def closest_words(self, vocabulary: Sequence[str] | None = None) -> ClosestWords:
         """Return the two words of a vocabulary, by default the encoder's own, that are closest to each voxel."""
-        encoder = self._stored.encoders.pixels
-        self._stored.require_model(Kind.PIXELS)
-        feature, known = self._stored.data.voxels.feature, self._known_words if vocabulary is None else None
-        if known is not None:
-            return known.whole(feature)
-        names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
-        if self._rivals is None or self._rivals[0] != names:
-            self._rivals = names, ClosestWords.of(feature, encoder, names)
+        if vocabulary is None:
+            self._own = self._own if isinstance(self._own, ClosestWords) else self._own.closest(self._feature)
+            return self._own
+        self._map.require_model(Kind.PIXELS)
+        if self._rivals is None or self._rivals[0] != tuple(vocabulary):
+            closest = ClosestWords.of(self._feature, self._map.encoders.pixels, vocabulary)
+            self._rivals = tuple(vocabulary), closest
         return self._rivals[1]
 
     @cached_property
-    def _known_words(self) -> KnownClosestWords | None:
-        """The names of an encoder that has a list of them, and those closest to the voxels that queries needed.
-
-        None for an encoder of any words, and where names of an encoder do not compete.
-        """
-        encoder = self._stored.encoders.pixels
-        if not isinstance(encoder, NamedPixelEncoder) or not {*encoder.names} <= {*encoder.vocabulary, "other"}:
-            return None
-        self._stored.require_model(Kind.PIXELS)
+    def _own(self) -> Vocabulary:
+        # Of names, most voxels have too little of a word to be compared with all others: the two closest to each are
+        # known where the build found them, or once all were asked for.
+        encoder = self._map.encoders.pixels
+        self._map.require_model(Kind.PIXELS)
         vocabulary = Vocabulary.encoded(encoder, encoder.vocabulary)
-        closest = names_from(self._stored.data.findings, key_of(vocabulary.digest))
-        if closest is not None:
-            return KnownClosestWords.known_everywhere(vocabulary, closest)
-        return KnownClosestWords.of(vocabulary, len(self._stored.data.voxels))
+        closest = names_from(self._map.data.findings, key_of(vocabulary.digest)) if self._is_closed else None
+        return vocabulary if closest is None else vocabulary.with_closest(closest)
+
+    @property
+    def _feature(self) -> Float16[np.ndarray, "n d"]:
+        return self._map.data.voxels.feature
+
+    @property
+    def _is_closed(self) -> bool:
+        encoder = self._map.encoders.pixels
+        return competes_whole(encoder, encoder.vocabulary)
 
     def found(self) -> dict[str, np.ndarray]:
         """Return the names closest to each voxel and the instances of all names; none of an encoder of any words."""
         from avlmaps.query.contents import STRUCTURE, searches_for
 
-        known, encoder = self._known_words, self._stored.encoders.pixels
-        if known is None:
+        encoder = self._map.encoders.pixels
+        if not self._is_closed:
             return {}
-        words = known.whole(self._stored.data.voxels.feature)
+        words = self.closest_words()
         closest = words.best, words.best_word, words.second, words.second_word
         searches = searches_for([name for name in encoder.vocabulary if name not in STRUCTURE], encoder)
         things = {one: self.search(*one) for one in searches}
-        names = names_to_arrays(closest, key_of(known.digest))
-        return names | searches_to_arrays(things, self._key_of_searches)
+        return names_to_arrays(closest, key_of(words.digest)) | searches_to_arrays(things, self._key_of_searches)
 
     @property
     def _key_of_searches(self) -> np.ndarray:
-        words, settings = self._known_words, self._settings
-        return key_of(words and words.digest, asdict(settings.objects), asdict(settings.areas))
+        digest = self._own.digest if self._is_closed else None
+        return key_of(digest, asdict(self._map.settings.objects), asdict(self._map.settings.areas))
 
     @cached_property
     def _known_searches(self) -> Mapping[tuple[str, bool], Segmentation]:
-        stored = self._stored.data.findings
+        stored = self._map.data.findings
         return searches_from(stored, self._key_of_searches) if stored else {}
 
 
 class MapRooms:
     """What the encoders see of the rooms of a map; computed when it is asked for, or as the build found it."""
 
-    def __init__(
-        self, stored: "AVLMap", space: Space, settings: AreaSettings, storeys: "Callable[[], Storeys | None]"
-    ) -> None:
-        self._stored, self._space, self._settings, self._storeys = stored, space, settings, storeys
+    def __init__(self, avlmap: "AVLMap") -> None:
+        self._map, self._settings = avlmap, avlmap.settings.areas
 
     @cached_property
     def votes(self) -> Rooms | None:
@@ -258,14 +244,14 @@ class MapRooms:
         """
         from avlmaps.maps.storeys import one_storey
 
-        settings, stored = self._settings, self._stored
-        if not settings.by_room or not len(stored.data.keyframes):
+        settings, avlmap = self._settings, self._map
+        if not settings.by_room or not len(avlmap.data.keyframes):
             return None
-        cameras = self._space.level(np.asarray(stored.data.keyframes.world_from_camera, np.float64)[:, :3, 3])[:, 2]
-        ground = stored.data.info.ground
+        cameras = self._map.space.level(np.asarray(avlmap.data.keyframes.world_from_camera, np.float64)[:, :3, 3])[:, 2]
+        ground = avlmap.data.info.ground
         known = [(floor.best.height_m, floor.cameras) for floor in ground.floors] if ground is not None else []
-        places = area_anchors(stored.data.keyframes, settings)
-        plan = FloorPlan.of(self._space, self._storeys() or one_storey(known, cameras), places)
+        places = area_anchors(avlmap.data.keyframes, settings)
+        plan = FloorPlan.of(self._map.space, self._map.storeys or one_storey(known, cameras), places)
         return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms)
 
     @cached_property
@@ -274,15 +260,15 @@ class MapRooms:
         votes = self.votes
         if votes is None:
             return None
-        known = regions_from(self._stored.data.findings, votes.plan)
+        known = regions_from(self._map.data.findings, votes.plan)
         regions = self._seen_regions(votes) if known is None else known
         field = self.known_field
         return regions if field is None else regions.joined(seen_twice(field, regions))
 
     def _seen_regions(self, votes: Rooms) -> RoomRegions:
-        camera = self._stored.data.rig.depth
+        camera = self._map.data.rig.depth
         width_rad = 2.0 * float(np.arctan2(camera.width, 2.0 * camera.fx))
-        return RoomRegions.of(votes.plan, np.asarray(self._stored.data.keyframes.world_from_camera), width_rad)
+        return RoomRegions.of(votes.plan, np.asarray(self._map.data.keyframes.world_from_camera), width_rad)
 
     @cached_property
     def field(self) -> RoomField | None:
@@ -290,13 +276,13 @@ class MapRooms:
         votes = self.votes
         if votes is None:
             return None
-        encoder = self._stored.encoders.views
-        self._stored.require_model(Kind.VIEWS)
+        encoder = self._map.encoders.views
+        self._map.require_model(Kind.VIEWS)
         kinds = area_names(encoder)
-        known = field_from(self._stored.data.findings, votes.plan, kinds, self._settings)
+        known = field_from(self._map.data.findings, votes.plan, kinds, self._settings)
         if known is not None:
             return known
-        return votes.field(kinds, name_shares(np.asarray(self._stored.data.keyframes.view), encoder, self._settings))
+        return votes.field(kinds, name_shares(np.asarray(self._map.data.keyframes.view), encoder, self._settings))
 
     @property
     def known_field(self) -> RoomField | None:
@@ -307,19 +293,19 @@ class MapRooms:
             return None
 
     def _voting_voxels(self) -> NamedVoxels | None:
-        """Return the voxels whose names vote on kinds of room; None where the map holds no probabilities of names."""
+        # The voxels whose names vote on kinds of room; None where the map holds no probabilities of names.
         from avlmaps.query.naming import VoxelNamer
 
         try:
-            namer = VoxelNamer(self._stored)
+            namer = VoxelNamer(self._map)
         except (BackendError, MapError):  # no features of things, or those of another encoder: views vote alone
             return None
         if not namer.calibrated or not namer.names:
             return None
-        feature = self._stored.data.voxels.feature
-        rows, every = voting_rows(np.asarray(self._stored.data.voxels.index), len(namer.names) * feature.shape[1])
-        area_m2 = every * self._space.grid.voxel_size_m**2
-        encoder = self._stored.encoders.pixels
+        feature = self._map.data.voxels.feature
+        rows, every = voting_rows(np.asarray(self._map.data.voxels.index), len(namer.names) * feature.shape[1])
+        area_m2 = every * self._map.space.grid.voxel_size_m**2
+        encoder = self._map.encoders.pixels
         surveyed = encoder.room_contents if isinstance(encoder, SurveyedEncoder) else None
         contents = surveyed or read_room_contents()
         return NamedVoxels(rows, namer.names, namer.confidences(rows), area_m2, contents)
@@ -333,7 +319,7 @@ class MapRooms:
     def room_of_cells(self) -> Int[np.ndarray, " c"]:
         """The number of the room of each cell of the floor plan."""
         assert self.regions is not None
-        return rooms_of_cells(self.regions, area_anchors(self._stored.data.keyframes, self._settings))
+        return rooms_of_cells(self.regions, area_anchors(self._map.data.keyframes, self._settings))
 
     def found(self) -> dict[str, np.ndarray]:
         """Return the rooms and their kinds, for ``findings``; none where there is no floor plan."""

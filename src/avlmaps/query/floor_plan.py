@@ -28,32 +28,21 @@ _CHUNK = 1 << 17  # voxels, or shares of cells, that are worked on at once: they
 
 @dataclass(frozen=True, eq=False)
 class FloorPlan:
-    """A grid for each storey; cell (s, i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · CELL_M`` of the level frame.
+    """Grids, one a storey; cell (s, i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · CELL_M`` of the level frame."""
 
-    Attributes:
-        space: the map's voxels.
-        storeys: of the map, with their floors' heights.
-        origin_m: level x and y of the corner of cell (0, 0).
-        wall: which cells are walls.
-        open: which cells are no walls, and seen or between seen ones; evidence spreads over these.
-        voxel_cell: number of the cell that each voxel of the map lies in, wall or not.
-    """
-
-    space: Space
-    storeys: Storeys
-    origin_m: Float[np.ndarray, "2"]
-    wall: Bool[np.ndarray, "s nx ny"]
+    space: Space  # the map's voxels
+    storeys: Storeys  # of the map, with their floors' heights
+    origin_m: Float[np.ndarray, "2"]  # level x and y of the corner of cell (0, 0)
+    wall: Bool[np.ndarray, "s nx ny"]  # which cells are walls
+    # Which cells are no walls, and seen or between seen ones; evidence spreads over these.
     open: Bool[np.ndarray, "s nx ny"]
-    voxel_cell: Int[np.ndarray, " n"]
+    voxel_cell: Int[np.ndarray, " n"]  # number of the cell that each voxel of the map lies in, wall or not
 
     @classmethod
     def of(cls, space: Space, storeys: Storeys, places: Float[np.ndarray, "k 3"] | None = None) -> "FloorPlan | None":
         """Find the walls of a map; None for a map without voxels, or one that is too large for a grid of it.
 
-        Args:
-            space: its voxels.
-            storeys: of the map.
-            places: other points that the grid must cover, metres, world.
+        ``places``: other points that the grid must cover, metres, world.
         """
         if not len(space):
             return None
@@ -127,11 +116,9 @@ class FloorPlan:
         return np.asarray(KDTree(points).query(centres)[1], np.int64)
 
     def _nearest_open(self, cells: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return the open cells nearest to cells on their storeys: themselves where they are open, or where none is.
-
-        Walls are thin: most of their cells lie beside an open one, so rings of growing radius find it at once, and a
-        query needs no OpenCV, which takes longer to load.
-        """
+        # The open cells nearest to cells on their storeys: themselves where they are open, or where none is. Walls are
+        # thin: most of their cells lie beside an open one, so rings of growing radius find it at once, and a query
+        # needs no OpenCV, which takes longer to load.
         out = cells.copy()
         left = np.flatnonzero(~self.open.reshape(-1)[cells])
         storey, i, j = np.unravel_index(cells[left], self.wall.shape)
@@ -179,9 +166,7 @@ class FloorPlan:
 
         On a floor without walls that is a Gaussian.
 
-        Args:
-            mass: in each cell, any number of kinds.
-            sigma_m: standard deviation along each axis, metres.
+        ``mass``: in each cell, any number of kinds. ``sigma_m``: standard deviation along each axis, metres.
         """
         whole = np.array(mass, np.float32).reshape(*self.wall.shape, -1)
         some = max(1, _CHUNK // max(len(self), 1))

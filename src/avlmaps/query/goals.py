@@ -41,25 +41,15 @@ _LEAST_HEAT, _LEAST_SCORE = 0.02, 0.01
 
 @dataclass(frozen=True, slots=True)
 class GoalEvidence:
-    """What speaks for a goal.
+    """What speaks for a goal."""
 
-    Attributes:
-        lead: what is sought.
-        context: what it is near or in; empty for a query of one part.
-        alone: probability that the thing there is what is sought, by itself.
-        thing: log-odds of that.
-        near: log of the heat of what it is near, there; 0 beside it.
-        room: log of the probability that it stands in such an area.
-        marks: log-odds of the least certain of the things, sounds and photos that it is near.
-    """
-
-    lead: Modality
-    context: tuple[Modality, ...]
-    alone: float
-    thing: float
-    near: float = 0.0
-    room: float = 0.0
-    marks: float = 0.0
+    lead: Modality  # what is sought
+    context: tuple[Modality, ...]  # what it is near or in; empty for a query of one part
+    alone: float  # probability that the thing there is what is sought, by itself
+    thing: float  # log-odds of that
+    near: float = 0.0  # log of the heat of what it is near, there; 0 beside it
+    room: float = 0.0  # log of the probability that it stands in such an area
+    marks: float = 0.0  # log-odds of the least certain of the things, sounds and photos that it is near
 
 
 def evidence_of(
@@ -155,26 +145,20 @@ _NEARLY = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """One distinct place that answers a question.
+    """One distinct place that answers a question."""
 
-    Attributes:
-        position: metres, world: on the object if the primary part is one, else the sound position or the camera's.
-        score: in [0, 1]: the heat there times the confidence that the primary thing matches the query. Of the heat of
-            a region ("in the kitchen") it is the mean over the thing.
-        size: extent of the instance along the axes of the level frame (x and y horizontal, z up), metres. For an
-            object its voxels' box; for a sound or an area the box of the places it was heard or seen from.
-        parts: heat of each modality there; a second part of a modality is called ``object_2`` and so on.
-        probability: that the goal is right, all parts together.
-        name: what is there, for an answer from the lists of a map; ``""`` for others.
-        spread: how well the place is known, where that is less well than usual: the source of a sound.
-    """
-
+    # Metres, world: on the object if the primary part is one, else the sound position or the camera's.
     position: tuple[float, float, float]
+    # In [0, 1]: the heat there times the confidence that the primary thing matches the query. Of the heat of a region
+    # ("in the kitchen") it is the mean over the thing.
     score: float
+    # Extent of the instance along the axes of the level frame (x and y horizontal, z up), metres. For an object its
+    # voxels' box; for a sound or an area the box of the places it was heard or seen from.
     size: tuple[float, float, float]
-    parts: dict[str, float]
-    probability: float = 0.0
-    name: str = ""
+    parts: dict[str, float]  # heat of each modality there; a second part of a modality is called ``object_2`` and so on
+    probability: float = 0.0  # that the goal is right, all parts together
+    name: str = ""  # what is there, for an answer from the lists of a map; ``""`` for others
+    # How well the place is known, where that is less well than usual: the source of a sound.
     spread: "Spread | None" = None
 
     def to_json(self) -> "GoalAnswer":
@@ -203,20 +187,13 @@ def alike(goals: Sequence[Goal], found_at: float) -> list[Goal]:
 
 @dataclass(frozen=True, slots=True)
 class Shares:
-    """Heated voxels and anchors, each with the instance whose share it lies in.
+    """Heated voxels and anchors, each with the instance whose share it lies in."""
 
-    Attributes:
-        lead: whose instances share.
-        rows: the map's rows of those that are voxels; they come first.
-        heat: the product there.
-        instance: whose share.
-        peak: (instances,) highest heat in each share; that of a region is averaged over the instance's voxels.
-    """
-
-    lead: Factor
-    rows: Int[np.ndarray, " v"]
-    heat: Float[np.ndarray, " m"]
-    instance: Int[np.ndarray, " m"]
+    lead: Factor  # whose instances share
+    rows: Int[np.ndarray, " v"]  # the map's rows of those that are voxels; they come first
+    heat: Float[np.ndarray, " m"]  # the product there
+    instance: Int[np.ndarray, " m"]  # whose share
+    # (instances,) highest heat in each share; that of a region is averaged over the instance's voxels.
     peak: Float[np.ndarray, " i"]
 
     def places(self, which: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k 3"]:
@@ -235,11 +212,8 @@ def share_voxels(
 ) -> Shares:
     """Divide the heated voxels among the instances of the lead.
 
-    Args:
-        factors: one or more, of one map.
-        values: returns their product at every voxel; not called for one object alone, whose heat is 1 on it, nor for
-            the anchors of one sound, area or image.
-        of_things: returns the product without regions.
+    ``values``: returns their product at every voxel; not called for one object alone, whose heat is 1 on it, nor for
+    the anchors of one sound, area or image. ``of_things``: returns the product without regions.
     """
     lead = lead_of(factors)
     if isinstance(lead, NearThings) and len(factors) == 1:
@@ -333,7 +307,6 @@ class _Extents:
 
 
 def _position(factors: Sequence[Factor], lead: Factor, shares: Shares, instance: int) -> Float[np.ndarray, "3"]:
-    """Return the hottest place of a share; the middle one of a plateau, and an anchor rather than a voxel."""
     if isinstance(lead, NearThings):
         return _place_on_thing(lead, shares, instance)
     rows = np.flatnonzero((shares.instance == instance) & (shares.heat >= shares.peak[instance] - _SAME))

@@ -51,11 +51,8 @@ class Heat(ABC):
     def at(self, points_world: Any) -> Float[np.ndarray, "*m"]:
         """Return the heat at any points.
 
-        Args:
-            points_world: one point, or an array (..., 3) of them; metres, recording frame.
-
-        Raises:
-            QueryError: they are no points.
+        ``points_world``: one point, or an array (..., 3) of them; metres, recording frame. ``QueryError``: they are no
+        points.
         """
         points = np.asarray(points_world)
         if points.dtype.kind not in "fiu" or points.ndim == 0 or points.shape[-1] != 3 or not np.isfinite(points).all():
@@ -84,11 +81,7 @@ class Heat(ABC):
         return float(self.values.min()) if len(self) else 0.0
 
     def argmax(self) -> int:
-        """Return the number of the hottest voxel.
-
-        Raises:
-            QueryError: the map is empty.
-        """
+        """Return the number of the hottest voxel. ``QueryError``: the map is empty."""
         if not len(self):
             raise QueryError("The map holds no voxels, so that none is the hottest.")
         return int(self.values.argmax())
@@ -191,18 +184,12 @@ class Heatmap(Heat):
     """Heat in [0, 1] of every occupied voxel; ``a * b`` fuses two, ``0.7 * a + 0.3 * b`` weighs them.
 
     ``np.asarray(heat)`` is in the order of the map's ``points``; ``heat.at(points)`` is the heat anywhere.
-
-    Attributes:
-        space: the map's voxels.
-        factors: the parts of the query, one factor each.
-        found_at: from this probability of the first goal on the query is found.
-        where: says of places (n, 3), metres, world, which may be goals; None: all.
     """
 
-    space: Space
-    factors: tuple[Factor, ...]
-    found_at: float = FOUND_AT
-    where: "_Where | None" = None
+    space: Space  # the map's voxels
+    factors: tuple[Factor, ...]  # the parts of the query, one factor each
+    found_at: float = FOUND_AT  # from this probability of the first goal on the query is found
+    where: "_Where | None" = None  # says of places (n, 3), metres, world, which may be goals; None: all
 
     @classmethod
     def of(cls, factor: Factor, found_at: float = FOUND_AT) -> "Heatmap":
@@ -329,13 +316,8 @@ class Heatmap(Heat):
     def plot(self, path: str | Path | None = None, *, top: int = 3, ax: "Axes | None" = None) -> "Path | Figure":
         """Draw the map from above, each factor's heat and the product, with the goals numbered.
 
-        Args:
-            path: the picture to write; without one, the figure is returned, for a notebook to show.
-            top: how many goals are numbered.
-            ax: draw the product alone into these axes.
-
-        Raises:
-            QueryError: the picture cannot be written there.
+        ``path``: the picture to write; without one, the figure is returned, for a notebook to show. ``QueryError``: the
+        picture cannot be written there.
         """
         from avlmaps.query.plots import draw_heat, draw_heat_into, save
 
@@ -369,9 +351,7 @@ class HeatCache:
     def __init__(self, most_bytes: int, watch: Callable[[Part], object] = lambda part: None) -> None:
         """Begin empty.
 
-        Args:
-            most_bytes: about how much heat may take.
-            watch: is given each part before its heat is looked up.
+        ``most_bytes``: about how much heat may take. ``watch``: is given each part before its heat is looked up.
         """
         self._most_bytes, self._watch = most_bytes, watch
         self._held: OrderedDict[Part, tuple[Heatmap, int]] = OrderedDict()

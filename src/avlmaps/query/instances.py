@@ -73,17 +73,10 @@ def cut_at_weak(
 ) -> tuple[Int[np.ndarray, " a"], Int[np.ndarray, " j"]]:
     """Cut instances that are too long where their voxels score least.
 
-    Args:
-        index: of the voxels, in the order of a map's.
-        points_level: their centres, metres, with z up.
-        score: how well each fits the name.
-        instance: which each belongs to, 0 to the highest without gaps.
-        longest: an instance no longer than this stays whole, metres.
-        reach: voxels this near along every axis are connected.
-
-    Returns:
-        Which instance each belongs to now, again without gaps, −1 for a voxel that only linked others; and of which
-        instance each is a piece: what was part of something too long is as doubtful as that.
+    ``points_level``: their centres, metres, with z up. ``score``: how well each fits the name. ``instance``: which each
+    belongs to, 0 to the highest without gaps. ``longest``: an instance no longer than this stays whole, metres. Returns
+    which instance each belongs to now, again without gaps, −1 for a voxel that only linked others; and of which
+    instance each is a piece: what was part of something too long is as doubtful as that.
     """
     count = int(instance.max(initial=-1)) + 1
     out = np.array(instance, np.int64)
@@ -106,8 +99,6 @@ def _pieces(
     longest: float,
     reach: int,
 ) -> Iterator[Int[np.ndarray, " p"]]:
-    """Yield the voxels of each piece that an instance falls to; what no level cuts stays as it is."""
-
     def fits(some: Int[np.ndarray, " p"]) -> bool:
         return bool(np.ptp(points_level[some, :2], axis=0).max() <= longest)
 
@@ -146,20 +137,13 @@ _SPECK_M2 = 0.0199  # a guess shows at least as much surface as a mug
 
 @dataclass(frozen=True, slots=True)
 class Instances:
-    """Groups of connected voxels, each of which may be one thing.
+    """Groups of connected voxels, each of which may be one thing."""
 
-    Attributes:
-        rows: numbers of their voxels in the map, ascending.
-        instance: which instance each of these voxels belongs to: 0 to i - 1, each with a voxel.
-        margin: by how much the word beats its best rival at each voxel.
-        score: of the word at each voxel (the root of its probability, for an encoder of names).
-        confidence: of each instance, in [0, 1]: the probability that it matches the query; 0 before it is scored.
-    """
-
-    rows: Int[np.ndarray, " a"]
-    instance: Int[np.ndarray, " a"]
-    margin: Float32[np.ndarray, " a"]
-    score: Float32[np.ndarray, " a"]
+    rows: Int[np.ndarray, " a"]  # numbers of their voxels in the map, ascending
+    instance: Int[np.ndarray, " a"]  # which instance each of these voxels belongs to: 0 to i - 1, each with a voxel
+    margin: Float32[np.ndarray, " a"]  # by how much the word beats its best rival at each voxel
+    score: Float32[np.ndarray, " a"]  # of the word at each voxel (the root of its probability, for an encoder of names)
+    # Of each instance, in [0, 1]: the probability that it matches the query; 0 before it is scored.
     confidence: Float32[np.ndarray, " i"]
 
     def __len__(self) -> int:
@@ -205,41 +189,28 @@ class Instances:
 
 @dataclass(frozen=True, slots=True)
 class FeatureVoxels:
-    """The voxels of a map, as a search for an object takes them.
+    """The voxels of a map, as a search for an object takes them."""
 
-    Attributes:
-        space: their places.
-        feature: what was perceived in each.
-        encoder: that made the features.
-        rivals: what competes with a word. Without the two words closest to each voxel (a ``Vocabulary`` only), the
-            encoder is one of names and these are all its names: then voxels with little of the word are not compared.
-        settings: from a word to instances.
-        rgb: their colours, with which an encoder of names is helped out that knows none; None where they do not count.
-        rooms: finds the map's rooms, when an instance is scored for the first time; None where they say nothing.
-    """
-
-    space: Space
-    feature: Float16[np.ndarray, "n d"]
-    encoder: PixelEncoder
+    space: Space  # their places
+    feature: Float16[np.ndarray, "n d"]  # what was perceived in each
+    encoder: PixelEncoder  # that made the features
+    # What competes with a word. Without the two words closest to each voxel (a ``Vocabulary`` only), the encoder is one
+    # of names and these are all its names: then voxels with little of the word are not compared.
     rivals: Vocabulary
-    settings: ObjectSettings
+    settings: ObjectSettings  # from a word to instances
+    # Their colours, with which an encoder of names is helped out that knows none; None where they do not count.
     rgb: UInt8[np.ndarray, "n 3"] | None = None
+    # Finds the map's rooms, when an instance is scored for the first time; None where they say nothing.
     rooms: "Callable[[], ThingsInRooms | None]" = lambda: None
 
 
 @dataclass(frozen=True, slots=True)
 class Segmentation:
-    """The instances of a word that are confident enough to count, and what is known of the others.
+    """The instances of a word that are confident enough to count, and what is known of the others."""
 
-    Attributes:
-        instances: those that count.
-        won: how many voxels the word won.
-        best: highest confidence of all instances.
-    """
-
-    instances: Instances
-    won: int
-    best: float
+    instances: Instances  # those that count
+    won: int  # how many voxels the word won
+    best: float  # highest confidence of all instances
 
 
 def confident_instances(voxels: FeatureVoxels, word: EncodedWord) -> Segmentation:
@@ -307,11 +278,7 @@ def score(
 ) -> Instances:
     """Return instances with the confidence that each matches the word: by looks, by length and by its room.
 
-    Args:
-        voxels: of the map.
-        word: that was queried.
-        found: the instances.
-        length_m: how long each counts as; None measures it.
+    ``length_m``: how long each counts as; None measures it.
     """
     space, encoder, settings = voxels.space, voxels.encoder, voxels.settings
     if not isinstance(encoder, NamedPixelEncoder):
@@ -342,9 +309,8 @@ def cut(
 ) -> tuple[Instances, Float[np.ndarray, " i"] | None]:
     """Cut instances that are too long for a thing of their name, where their voxels score least.
 
-    Returns:
-        The instances, unscored, or the same object where none is cut; and how long each counts as: a piece is as
-        doubtful as what it was cut from.
+    Returns the instances, unscored, or the same object where none is cut; and how long each counts as: a piece is as
+    doubtful as what it was cut from.
     """
     if not (math.isfinite(longest_m) and len(found)):
         return found, None
@@ -371,11 +337,7 @@ def joined_columns(
     Two are one thing where at least half of the smaller one's columns (of ``cell_m``, top-down) hold the other too,
     with nothing else between them and at most ``join_m`` in height.
 
-    Args:
-        points_level: the voxels' middles, metres, level frame.
-        instance: which each belongs to.
-        cell_m: edge of a column.
-        join_m: largest gap in height.
+    ``points_level``: the voxels' middles, metres, level frame. ``instance``: which each belongs to.
     """
     count = int(instance.max(initial=-1)) + 1
     column = np.floor(points_level[:, :2] / cell_m).astype(np.int64)

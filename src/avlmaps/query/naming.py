@@ -31,9 +31,8 @@ class VoxelNamer:
     def __init__(self, stored: "AVLMap", vocabulary: Sequence[str] | None = None) -> None:
         """Take the encoder's names, or a vocabulary for one that has none of its own.
 
-        Raises:
-            BackendError: the map's profile has no pixel encoder.
-            MapError: the map was built with another encoder than is installed.
+        ``BackendError``: the map's profile has no pixel encoder. ``MapError``: the map was built with another encoder
+        than is installed.
         """
         self._voxels = stored.data.voxels
         encoder = stored.encoders.pixels
@@ -74,10 +73,7 @@ class VoxelNamer:
     ) -> tuple[Int[np.ndarray, " m"], Float32[np.ndarray, " m"]]:
         """Return for each of some voxels the number of its likeliest name (-1 for none) and its confidence.
 
-        Args:
-            rows: numbers of the voxels in the map; by default all.
-            rivals: the words closest to every voxel, as far as they are known: where they are these names, no feature
-                is read.
+        ``rows``: numbers of the voxels in the map; by default all.
         """
         rows = np.arange(len(self._voxels)) if rows is None else rows
         if self._named and rivals is not None and set(rivals.words) == set(self.names):

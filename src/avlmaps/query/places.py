@@ -26,11 +26,7 @@ if TYPE_CHECKING:
 
 
 def place_of(text: str) -> Float[np.ndarray, " n"]:
-    """Return the two or three numbers of a place.
-
-    Raises:
-        QueryError: they are not.
-    """
+    """Return the two or three numbers of a place. ``QueryError``: they are not."""
     try:
         numbers = [float(word) for word in text.split(",")]
     except ValueError:
@@ -43,8 +39,7 @@ def place_of(text: str) -> Float[np.ndarray, " n"]:
 def place_given(place: str | Sequence[float]) -> Float[np.ndarray, " n"]:
     """Return the numbers of a place that comes as a text or as a list.
 
-    Raises:
-        QueryError: they are no two or three numbers.
+    ``QueryError``: they are no two or three numbers.
     """
     if isinstance(place, str):
         return place_of(place)
@@ -61,10 +56,8 @@ def distance_m(
 ) -> float:
     """Return how far a point lies from a place: in space, or level where the place has no height.
 
-    Args:
-        level: turns points of the recording frame into the level one.
-        point: x, y, z, recording frame.
-        place: of two or three numbers.
+    ``level``: turns points of the recording frame into the level one. ``point``: x, y, z, recording frame. ``place``:
+    of two or three numbers.
     """
     here = np.array(point)
     return math.dist(here, place) if len(place) == 3 else math.dist(level(here)[:2], place)
@@ -141,13 +134,8 @@ def column_point(avlmap: "AVLMap", level_xy: Float[np.ndarray, "2"], radius_m: f
 def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: float = 0.15) -> PlaceAnswer:
     """Return the content of a map at a point.
 
-    Args:
-        avlmap: the map.
-        point: metres, recording frame.
-        radius_m: voxels within it count; at most 5 m.
-
-    Raises:
-        QueryError: a number is not finite, or the radius not in (0, 5].
+    ``point``: metres, recording frame. ``radius_m``: voxels within it count; at most 5 m. ``QueryError``: a number is
+    not finite, or the radius not in (0, 5].
     """
     if not (np.isfinite(point).all() and np.abs(point).max(initial=0.0) <= FARTHEST_M):
         raise QueryError("The place is not a point in metres; give finite numbers, such as 1.5,2.0,0.8.")
@@ -249,8 +237,7 @@ class LastSeenAnswer(TypedDict):
 def last_seen(avlmap: "AVLMap", thing: str, top: int = 3) -> LastSeenAnswer:
     """Return when a thing was last seen: the latest time of any voxel of each of its instances.
 
-    Raises:
-        QueryError: the name is empty, or the pixel encoder understands nothing of it.
+    ``QueryError``: the name is empty, or the pixel encoder understands nothing of it.
     """
     heat = avlmap.heat(Part(Modality.OBJECT, thing, Role.PRIMARY))
     factor = heat.factors[0]
@@ -277,10 +264,8 @@ def last_seen(avlmap: "AVLMap", thing: str, top: int = 3) -> LastSeenAnswer:
 def answer_in(answer: Mapping[str, Any], frame: FrameName, level_from_recording: Float[np.ndarray, "4 4"]) -> Any:
     """Return an answer of the command line with all its positions, poses and texts about them in a frame.
 
-    Args:
-        answer: in the recording's frame: with ``position``, ``outline`` and ``world_from_camera`` at any depth.
-        frame: that is wanted.
-        level_from_recording: 4x4, metres.
+    ``answer``: in the recording's frame: with ``position``, ``outline`` and ``world_from_camera`` at any depth.
+    ``level_from_recording``: 4x4, metres.
     """
     if frame is FrameName.RECORDING:
         return dict(answer)

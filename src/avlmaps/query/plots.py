@@ -39,19 +39,12 @@ _MOST_CELLS = 2500
 
 @dataclass(frozen=True, slots=True)
 class TopDown:
-    """A raster over the level frame; row 0 has the least y.
+    """A raster over the level frame; row 0 has the least y."""
 
-    Attributes:
-        rgb: mean colour of the highest voxels of each column.
-        seen: which columns have any.
-        cell: (n, 2) row and column of each voxel of the map.
-        extent: (left, right, bottom, top) in metres.
-    """
-
-    rgb: UInt8[np.ndarray, "h w 3"]
-    seen: Bool[np.ndarray, "h w"]
-    cell: Int[np.ndarray, "n 2"]
-    extent: tuple[float, float, float, float]
+    rgb: UInt8[np.ndarray, "h w 3"]  # mean colour of the highest voxels of each column
+    seen: Bool[np.ndarray, "h w"]  # which columns have any
+    cell: Int[np.ndarray, "n 2"]  # (n, 2) row and column of each voxel of the map
+    extent: tuple[float, float, float, float]  # (left, right, bottom, top) in metres
 
     @classmethod
     def of(cls, space: Space) -> "TopDown":
@@ -103,7 +96,6 @@ def _highest_colours(
     visible: Bool[np.ndarray, " n"],
     shape: tuple[int, int],
 ) -> tuple[UInt8[np.ndarray, "h w 3"], Bool[np.ndarray, "h w"]]:
-    """Return the mean colour of the voxels at the top of each column, and which columns have any."""
     rows = np.flatnonzero(visible)
     column = cell[rows, 0] * shape[1] + cell[rows, 1]
     order = np.lexsort((-height_m[rows], column))
@@ -145,11 +137,8 @@ def draw_heat(
     The colour of a place is its heat times the confidence that the thing there is what was queried, as a goal's
     score is; what was not found stays dark.
 
-    Args:
-        factors: one or more, of one map.
-        shown: the product's heat times the confidence, in [0, 1].
-        found: whether all parts are in the map and come together.
-        goals: numbered in the last panel, best first.
+    ``shown``: the product's heat times the confidence, in [0, 1]. ``found``: whether all parts are in the map and come
+    together.
     """
     space = factors[0].space
     view = TopDown.of(space)
@@ -189,14 +178,8 @@ def png_of(figure: "Figure") -> bytes:
 def plot_map(stored: "AVLMap", path: Path | str, things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = ()) -> Path:
     """Write a top-down picture of a map, with the camera's path, the sounds, and the names of things and rooms.
 
-    Args:
-        stored: the map.
-        path: PNG, JPEG, SVG or PDF, by its suffix.
-        things: get their names; of more than ``MOST_NAMES`` those that cover most ground.
-        rooms: get their names, larger.
-
-    Raises:
-        QueryError: the picture cannot be written there.
+    ``things``: get their names; of more than ``MOST_NAMES`` those that cover most ground. ``QueryError``: the picture
+    cannot be written there.
     """
     return save(draw_map(stored, things, rooms), path)
 
@@ -226,7 +209,7 @@ def draw_map(
 
 
 def _draw_names(ax: "Axes", space: Space, things: "Sequence[Thing]", rooms: "Sequence[Room]") -> None:
-    """Write names where things and rooms are, and draw the outlines of rooms."""
+    # Write names where things and rooms are, and draw the outlines of rooms.
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=2.5, foreground="white", alpha=0.85)]
@@ -281,11 +264,8 @@ def draw_ground(ax: "Axes", view: TopDown, space: Space, with_walk: bool = True)
 
 
 def _name_axes(ax: "Axes", space: Space) -> None:
-    """Name the axes so that their numbers are true.
-
-    Where both axes of the picture are the recording's, they carry those names and numbers; else they are axes of the
-    level frame, and arrows show where the recording's axes point.
-    """
+    # Name the axes so that their numbers are true. Where both axes of the picture are the recording's, they carry those
+    # names and numbers; else they are axes of the level frame, and arrows show where the recording's axes point.
     names = [recording_axis(row) for row in space.level_from_world[:2]]
     if picture_frame(space) is FrameName.LEVEL:
         names = [None, None]  # the picture has one frame
@@ -421,11 +401,7 @@ def _rgb(colour: str) -> Float[np.ndarray, "3"]:
 
 
 def save(figure: "Figure", path: Path | str) -> Path:
-    """Write a picture, in the format of its suffix.
-
-    Raises:
-        QueryError: the picture cannot be written there.
-    """
+    """Write a picture, in the format of its suffix. ``QueryError``: the picture cannot be written there."""
     path = user_path(path)
     if path.suffix.lower().lstrip(".") not in figure.canvas.get_supported_filetypes():
         raise QueryError(f"A picture cannot be written as {path.name!r}; give it the suffix .png, .jpg, .svg or .pdf.")

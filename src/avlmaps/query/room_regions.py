@@ -223,7 +223,7 @@ def _sums(cells: Cells) -> Int[np.ndarray, "r c1"]:
 
 
 def _nearest(cells: Cells) -> tuple[Labels, Labels]:
-    column = np.arange(cells.shape[1])
+    column = np.arange(int(cells.shape[1]))
     before = np.maximum.accumulate(np.where(cells, column, -1), axis=1)
     after = np.minimum.accumulate(np.where(cells, column, len(column))[:, ::-1], axis=1)[:, ::-1]
     return before, after
@@ -293,7 +293,7 @@ def _parted(inside: Cells, half_m: Float32[np.ndarray, "r c"], cell_m: float) ->
             pair = min(root[one], root[other]), max(root[one], root[other])
             if pair[0] == pair[1] or pair in apart:
                 continue
-            low, high = sorted(pair, key=lambda each: peak[each])
+            low, high = sorted(pair, key=peak.__getitem__)
             if from_m <= _NARROW_M + 1e-6 and peak[low] >= from_m + _WIDER_M - 1e-6:
                 apart.add(pair)
                 continue
@@ -430,7 +430,7 @@ class RoomRegions:
         )
 
     @cached_property
-    def _boxes(self) -> dict[int, tuple[int, tuple[slice, slice]]]:
+    def _boxes(self) -> dict[int, tuple[int, tuple[slice, ...]]]:
         from scipy.ndimage import find_objects
 
         return {

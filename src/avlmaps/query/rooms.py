@@ -35,12 +35,10 @@ def _nats_of(contents: RoomContents, surface_m2: Float64[np.ndarray, "t r"]) -> 
 def votes(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -> Float[np.ndarray, "t n"]:
     """Return by how much, in nats, a square metre of each thing speaks for each kind of room.
 
-    Args:
-        things: names, as an encoder has them; one that the table does not hold speaks for none. A thing speaks against
-            no kind of room that its entry of the lexicon lists.
-        kinds: kinds of room. One that the table does not hold gets the mean vote of those that it holds, which for
-            most things is against it; one that belongs to a kind of the table (a kitchenette) gets that kind's.
-        contents: the table.
+    ``things``: names, as an encoder has them; one that the table does not hold speaks for none. A thing speaks against
+    no kind of room that its entry of the lexicon lists. ``kinds``: kinds of room. One that the table does not hold gets
+    the mean vote of those that it holds, which for most things is against it; one that belongs to a kind of the table
+    (a kitchenette) gets that kind's.
     """
     ratios, known = _log_ratios(contents), lexicon()
     row_of = {known.find(name, EntryKind.THING): number for number, name in enumerate(contents.things)}
@@ -58,13 +56,7 @@ def commonness(things: Sequence[str], kinds: Sequence[str], contents: RoomConten
 
     Their narrower kinds count as well: a kitchen cabinet is a cabinet.
 
-    Args:
-        things: names, all of which are meant.
-        kinds: kinds of room; see ``votes``.
-        contents: the table.
-
-    Returns:
-        Nats; None where the table holds none of them.
+    Returns nats; None where the table holds none of them.
     """
     is_a = lexicon().is_a
     rows = [
@@ -82,10 +74,8 @@ def commonness(things: Sequence[str], kinds: Sequence[str], contents: RoomConten
 def _not_against(
     nats: Float[np.ndarray, " n"], kinds: Sequence[str], entries: Iterable[Entry]
 ) -> Float[np.ndarray, " n"]:
-    """Return nats that speak against no kind of room in which the lexicon says that such things stand.
-
-    The homes that are counted have tables to dine at in dining rooms alone; many a kitchen has one.
-    """
+    # Nats that speak against no kind of room in which the lexicon says that such things stand. The homes that are
+    # counted have tables to dine at in dining rooms alone; many a kitchen has one.
     usual = {room for entry in entries for room in entry.rooms}
     return np.where([kind in usual for kind in kinds], np.maximum(nats, 0.0), nats)
 
@@ -132,37 +122,23 @@ _ONE_IF_BESIDE = ("kitchen", "living room", "dining room", *_PASSAGES)
 
 @dataclass(frozen=True, slots=True)
 class NamedVoxels:
-    """Some voxels of the map, and how likely each is each thing.
+    """Some voxels of the map, and how likely each is each thing."""
 
-    Attributes:
-        rows: their numbers in the map.
-        names: the things.
-        confidence: of each name.
-        area_m2: surface of the map that each voxel stands for.
-        contents: what the encoder that named them names in rooms of each kind, or what stands there.
-    """
-
-    rows: Int[np.ndarray, " m"]
-    names: tuple[str, ...]
-    confidence: Float32[np.ndarray, "m t"]
-    area_m2: float
-    contents: RoomContents
+    rows: Int[np.ndarray, " m"]  # their numbers in the map
+    names: tuple[str, ...]  # the things
+    confidence: Float32[np.ndarray, "m t"]  # of each name
+    area_m2: float  # surface of the map that each voxel stands for
+    contents: RoomContents  # what the encoder that named them names in rooms of each kind, or what stands there
 
 
 @dataclass(frozen=True, eq=False)
 class RoomField:
-    """How likely each cell of the floor plan is each kind of room.
+    """How likely each cell of the floor plan is each kind of room."""
 
-    Attributes:
-        plan: the cells.
-        kinds: kinds of room.
-        share: of each cell; rows add up to 1.
-        views: number of views that vote there, each by its nearness in [0, 1]; more between walls that reflect it.
-    """
-
-    plan: FloorPlan
-    kinds: tuple[str, ...]
-    share: Float32[np.ndarray, "c n"]
+    plan: FloorPlan  # the cells
+    kinds: tuple[str, ...]  # kinds of room
+    share: Float32[np.ndarray, "c n"]  # of each cell; rows add up to 1
+    # Number of views that vote there, each by its nearness in [0, 1]; more between walls that reflect it.
     views: Float32[np.ndarray, " c"]
 
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float32[np.ndarray, "m n"]:
@@ -172,8 +148,7 @@ class RoomField:
     def with_certain(self, named: "Sequence[tuple[str, Bool[np.ndarray, ' c']]]") -> "RoomField":
         """Return the field where some cells are certain to be of a kind; new kinds come behind the others.
 
-        Args:
-            named: kinds, each with its cells; of several on one cell the last counts.
+        ``named``: kinds, each with its cells; of several on one cell the last counts.
         """
         kinds = list(dict.fromkeys([*self.kinds, *(name for name, _ in named)]))
         share = np.zeros((len(self.share), len(kinds)), np.float32)
@@ -186,8 +161,7 @@ class RoomField:
     def of_cells(self, weights: Float[np.ndarray, " n"]) -> Float32[np.ndarray, " c"]:
         """Return for every cell how likely it is in a room of some kinds, in [0, 1].
 
-        Args:
-            weights: how much each kind is meant, in [0, 1].
+        ``weights``: how much each kind is meant, in [0, 1].
         """
         return np.clip(self.share @ weights, 0.0, 1.0).astype(np.float32)
 
@@ -234,9 +208,7 @@ class RoomField:
     def settled(self, regions: RoomRegions, room_of_cell: Int[np.ndarray, " c"]) -> "RoomField":
         """Return the field in which all of a room is of its kind, and of an open plan each place of one of its parts.
 
-        Args:
-            regions: the rooms.
-            room_of_cell: the room that each cell belongs to; ``NONE`` leaves a cell as it is.
+        ``room_of_cell``: the room that each cell belongs to; ``NONE`` leaves a cell as it is.
         """
         inside = np.flatnonzero(room_of_cell != NONE)
         room = room_of_cell[inside]
@@ -263,9 +235,7 @@ def rooms_of_cells(regions: RoomRegions, places: Float[np.ndarray, "k 3"]) -> In
 
     Regions into which fewer than ``FEWEST_VIEWS`` views looked are no rooms. ``NONE``: near views beyond all floors.
 
-    Args:
-        regions: of the map.
-        places: middle of what each keyframe saw, metres, world.
+    ``places``: middle of what each keyframe saw, metres, world.
     """
     own = regions.at(places)
     is_room = np.append(np.bincount(own[own != NONE], minlength=len(regions)) >= FEWEST_VIEWS, False)
@@ -307,9 +277,7 @@ class Rooms:
     def field(self, kinds: Sequence[str], share: Float[np.ndarray, "k n"]) -> RoomField:
         """Return how likely each place is each kind of room.
 
-        Args:
-            kinds: kinds of room that compete.
-            share: how likely each keyframe's view shows each of them; rows add up to 1.
+        ``share``: how likely each keyframe's view shows each of them; rows add up to 1.
         """
         settings = self.settings
         mass = np.zeros((len(self.plan), len(kinds) + 1))
@@ -355,10 +323,6 @@ def voting_rows(index: Int[np.ndarray, "n 3"], products: int) -> tuple[Int[np.nd
     """Return the voxels whose names vote, one of q planes across the diagonal, and q: the voxels that each stands for.
 
     Which voxels they are depends on their places alone, so that a map in another order gives the same.
-
-    Args:
-        index: of the voxels.
-        products: multiplications that one voxel costs: names times length of a feature.
     """
     every = max(1, int(np.ceil(len(index) * products / _MOST_PRODUCTS)))
     chosen = np.empty(len(index), bool)
@@ -370,15 +334,10 @@ def voting_rows(index: Int[np.ndarray, "n 3"], products: int) -> tuple[Int[np.nd
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class InRooms(NearAnchors):
-    """Heat of an area as context: how likely each place is in a room of that kind, the same at every height.
+    """Heat of an area as context: how likely each place is in a room of that kind, the same at every height."""
 
-    Attributes:
-        kinds: how likely each place is each kind of room.
-        weights: how much the query means each of them.
-    """
-
-    kinds: RoomField
-    weights: Float[np.ndarray, " n"]
+    kinds: RoomField  # how likely each place is each kind of room
+    weights: Float[np.ndarray, " n"]  # how much the query means each of them
     regional: bool = field(default=True, init=False)
 
     def heat_and_anchors(
@@ -428,8 +387,7 @@ class ThingsInRooms:
     ) -> Float[np.ndarray, " i"] | None:
         """Return the mean, over the voxels of each instance, of ln of how many times as common such things are there.
 
-        Returns:
-            Nats in [-3, 1]; None where it is not known in which rooms such things stand.
+        Returns nats in [-3, 1]; None where it is not known in which rooms such things stand.
         """
         if names not in self._nats:
             self._nats[names] = self._of_cells(names)
@@ -452,10 +410,7 @@ def with_rooms(
 ) -> Float[np.ndarray, " i"]:
     """Return confidences after the evidence of rooms: their log-odds raised by it, less a cost.
 
-    Args:
-        confidence: of each instance, in [0, 1].
-        nats: evidence for each, times its weight.
-        cost: nats; most things stand in rooms that speak for them, which the confidence knows already.
+    ``confidence``: of each instance, in [0, 1]. ``nats``: evidence for each, times its weight.
     """
     odds = np.exp(nats - cost)
     return confidence * odds / np.maximum(1.0 - confidence + confidence * odds, 1e-12)

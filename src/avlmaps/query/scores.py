@@ -33,13 +33,7 @@ def _threads() -> int:
 
 
 def share(work: Callable[[int, int], Any], count: int, least: int = 1) -> None:
-    """Call ``work(start, stop)`` for ranges that cover ``range(count)``, on every core when it is worth it.
-
-    Args:
-        work: a function that releases the interpreter's lock for most of its time.
-        count: how many items there are.
-        least: fewer items than this are not worth a thread.
-    """
+    """Call ``work(start, stop)`` for ranges that cover ``range(count)``, on every core when it is worth it."""
     parts = max(1, min(_threads(), count // max(least, 1)))
     edges = [count * k // parts for k in range(parts + 1)]
     if parts == 1:
@@ -63,10 +57,7 @@ def feature_scores(
 ) -> Float32[np.ndarray, " m"]:
     """Return the product of features with one word; of several words, the length of the products with them.
 
-    Args:
-        feature: of a map; finite.
-        words: one or more.
-        rows: which features; None for all.
+    ``rows``: which features; None for all.
     """
     out = np.empty(len(feature) if rows is None else len(rows), np.float32)
     scaled = np.asarray(words, np.float32) * _BIAS
@@ -84,10 +75,8 @@ def feature_scores(
 def _widened(
     feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"] | None, start: int, stop: int
 ) -> Iterator[tuple[int, Float32[np.ndarray, "r d"]]]:
-    """Yield float16 rows as float32, times 2⁻¹¹², a few at a time; the next ones overwrite them.
-
-    NumPy converts one number after the other, six times slower.
-    """
+    # Yield float16 rows as float32, times 2⁻¹¹², a few at a time; the next ones overwrite them. NumPy converts one
+    # number after the other, six times slower.
     bits = np.asarray(feature, np.float16).view(np.int16)
     room = np.empty((min(_WIDENED, stop - start), bits.shape[1]), np.int32)
     for a in range(start, stop, _WIDENED):
@@ -136,11 +125,7 @@ def margins(
 ) -> tuple[Float32[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
     """Return score minus the best competing rival's, and where a third word may be that rival.
 
-    Args:
-        score: of the queried word.
-        closest: of ``two_closest``.
-        silent: which words do not compete.
-        least: what the word must beat in any case.
+    ``least``: what the word must beat in any case.
     """
     best, best_word, second, second_word = closest
     mute = np.append(silent, True)  # number −1 is no word

@@ -31,16 +31,12 @@ def _computed(key: object, work: Callable[[], T]) -> T:
 
 @dataclass(frozen=True, slots=True)
 class MapLists:
-    """The lists of one map.
+    """The lists of one map."""
 
-    Attributes:
-        avlmap: the map.
-        once: returns what work returns, perhaps remembered under a key; by default it is computed each time.
-        watch: is given the progress, as by ``AVLMap.things``.
-    """
-
-    avlmap: AVLMap
+    avlmap: AVLMap  # the map
+    # Returns what work returns, perhaps remembered under a key; by default it is computed each time.
     once: Callable[[object, Callable[[], Any]], Any] = field(default=_computed, repr=False)
+    # Is given the progress, as by ``AVLMap.things``.
     watch: Watch = field(default=lambda stage, done, total: None, repr=False)
 
     @property
@@ -53,8 +49,7 @@ class MapLists:
     ) -> list[ThingAnswer]:
         """Return the things, perhaps those of a day, most confident first; none of a map without a model of pixels.
 
-        Raises:
-            QueryError: ``least`` lies outside [0, 1], the pixel encoder does not know a name, or there is no such day.
+        ``QueryError``: ``least`` lies outside [0, 1], the pixel encoder does not know a name, or there is no such day.
         """
 
         def found() -> list[ThingAnswer]:
@@ -90,27 +85,18 @@ class MapLists:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """Which things are listed, in which order, and how many at once.
+    """Which things are listed, in which order, and how many at once."""
 
-    Attributes:
-        least: things of less confidence are left out, in [0, 1].
-        name: list these things only; by default the pixel encoder's vocabulary.
-        structure: list walls, floors and the like as well.
-        room: a room by its name, or all rooms of a kind.
-        near: what the things are near to: x,y,z of the recording frame, x,y of the level frame, or the name of a thing.
-            The nearest come first.
-        top: most things of a page; None for all.
-        page: which page, counted from 1.
-        at: of a map of several days, those that were there on that day: a date, or the number of a visit from 1.
-    """
-
-    least: float = 0.5
-    name: Sequence[str] = ()
-    structure: bool = False
-    room: str | None = None
+    least: float = 0.5  # things of less confidence are left out, in [0, 1]
+    name: Sequence[str] = ()  # list these things only; by default the pixel encoder's vocabulary
+    structure: bool = False  # list walls, floors and the like as well
+    room: str | None = None  # a room by its name, or all rooms of a kind
+    # What the things are near to: x,y,z of the recording frame, x,y of the level frame, or the name of a thing. The
+    # nearest come first.
     near: str | Sequence[float] | None = None
-    top: int | None = None
-    page: int = 1
+    top: int | None = None  # most things of a page; None for all
+    page: int = 1  # which page, counted from 1
+    # Of a map of several days, those that were there on that day: a date, or the number of a visit from 1.
     at: str | None = None
 
     @property
@@ -131,24 +117,17 @@ class ThingsPage(TypedDict):
 
 @dataclass(frozen=True, slots=True)
 class Selected:
-    """One thing that is meant.
+    """One thing that is meant."""
 
-    Attributes:
-        thing: as it is listed.
-        room: number of its room; negative without one.
-        away_m: from the place that it should be near, metres; None where none is named.
-    """
-
-    thing: ThingAnswer
-    room: int
-    away_m: float | None = None
+    thing: ThingAnswer  # as it is listed
+    room: int  # number of its room; negative without one
+    away_m: float | None = None  # from the place that it should be near, metres; None where none is named
 
 
 def page_of_things(lists: MapLists, wanted: Wanted) -> ThingsPage:
     """Return a page of the things that are meant; where nothing but names is selected, all of them, without a count.
 
-    Raises:
-        QueryError: there is no such room, name, day or page, or no such thing to be near to.
+    ``QueryError``: there is no such room, name, day or page, or no such thing to be near to.
     """
     if wanted.is_whole:
         return {"things": [ListedThing(**thing) for thing in lists.wanted(wanted)]}
@@ -177,8 +156,7 @@ def things_with_rooms(lists: MapLists, wanted: Wanted) -> list[Selected]:
 def selected(lists: MapLists, wanted: Wanted) -> tuple[list[Selected], NearAnswer | None]:
     """Return all things that are meant, and the thing that they are near to if one is named.
 
-    Raises:
-        QueryError: there is no such room, or no such thing to be near to.
+    ``QueryError``: there is no such room, or no such thing to be near to.
     """
     found, numbers = things_with_rooms(lists, wanted), None
     if wanted.room is not None:
@@ -200,8 +178,7 @@ def selected(lists: MapLists, wanted: Wanted) -> tuple[list[Selected], NearAnswe
 def page_of(rows: Sequence[Row], top: int, page: int, of: str) -> tuple[list[Row], int]:
     """Return a page of some rows, and how many pages there are.
 
-    Raises:
-        QueryError: there is no such page, or a page of nothing is wanted.
+    ``QueryError``: there is no such page, or a page of nothing is wanted.
     """
     if top < 1:
         raise QueryError(f"A page cannot hold {top} {of}; it holds at least 1.")
@@ -222,7 +199,7 @@ def _row(one: Selected, room: str | None) -> ListedThing:
 def _near(
     lists: MapLists, near: str | Sequence[float], at: str | None, rooms: set[int] | None
 ) -> tuple[Float[np.ndarray, " n"], NearAnswer | None]:
-    """Return the place that is meant, and the thing there if one is named; where the rooms hold one, that."""
+    # The place that is meant, and the thing there if one is named; where the rooms hold one, that.
     if is_place(near):
         return place_given(near), None
     name = str(near)
@@ -242,9 +219,7 @@ def _near(
 def map_answer(avlmap: AVLMap, note: Callable[[AvlmapsError], object] = lambda _: None) -> dict[str, Any]:
     """Return the description of a map that ``avlmaps info`` prints: counts, models, sounds with names, rules.
 
-    Args:
-        avlmap: the map.
-        note: is given the error where the sounds have no names since their model is not here.
+    ``note``: is given the error where the sounds have no names since their model is not here.
     """
     from avlmaps.maps.store.reader import describe
     from avlmaps.query.settings import rules_of

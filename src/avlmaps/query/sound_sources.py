@@ -59,39 +59,24 @@ def no_sources(stored: "AVLMap") -> str:
 
 @dataclass(frozen=True, slots=True)
 class SoundSource:
-    """A place that sounds came from.
+    """A place that sounds came from."""
 
-    Attributes:
-        name: what it sounds like.
-        confidence: that a sound of it is one, in [0, 1].
-        probability: that this is so and the source lies within ``RIGHT_M`` of the position: that a goal there is right.
-        position: likeliest place: the middle of its heights there, metres, recording frame.
-        within_50_m: radius on the plan that holds it with a probability of 0.5.
-        within_90_m: of 0.9.
-        area_50_m2: area of the smallest region of the plan that holds it with a probability of 0.5.
-        area_90_m2: of 0.9.
-        rooms: names of rooms and the probability that it is in each, likeliest first.
-        things: names, places and probabilities of things that it may be, likeliest first.
-        events: numbers of its sounds in the map.
-        moving: whether it moved while it sounded.
-        microphones: how many listened.
-        spread: the radii, with the probability that it lies within ``RIGHT_M``.
-    """
-
-    name: str
-    confidence: float
+    name: str  # what it sounds like
+    confidence: float  # that a sound of it is one, in [0, 1]
+    # That this is so and the source lies within ``RIGHT_M`` of the position: that a goal there is right.
     probability: float
-    position: tuple[float, float, float]
-    within_50_m: float
-    within_90_m: float
-    area_50_m2: float
-    area_90_m2: float
-    rooms: tuple[tuple[str, float], ...]
+    position: tuple[float, float, float]  # likeliest place: the middle of its heights there, metres, recording frame
+    within_50_m: float  # radius on the plan that holds it with a probability of 0.5
+    within_90_m: float  # of 0.9
+    area_50_m2: float  # area of the smallest region of the plan that holds it with a probability of 0.5
+    area_90_m2: float  # of 0.9
+    rooms: tuple[tuple[str, float], ...]  # names of rooms and the probability that it is in each, likeliest first
+    # Names, places and probabilities of things that it may be, likeliest first.
     things: tuple[tuple[str, tuple[float, float, float], float], ...]
-    events: tuple[int, ...]
-    moving: bool
-    microphones: int
-    spread: Spread
+    events: tuple[int, ...]  # numbers of its sounds in the map
+    moving: bool  # whether it moved while it sounded
+    microphones: int  # how many listened
+    spread: Spread  # the radii, with the probability that it lies within ``RIGHT_M``
 
     def to_json(self) -> "SourceAnswer":
         """Return the source as ``avlmaps sources --json`` prints it."""
@@ -117,41 +102,25 @@ class SoundSource:
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """Sounds of one source: their evidence together.
+    """Sounds of one source: their evidence together."""
 
-    Attributes:
-        events: numbers of the sounds.
-        density: on the plan.
-        share: (c,) probability of each candidate.
-    """
-
-    events: tuple[int, ...]
-    density: Density
-    share: Float[np.ndarray, " c"]
+    events: tuple[int, ...]  # numbers of the sounds
+    density: Density  # on the plan
+    share: Float[np.ndarray, " c"]  # (c,) probability of each candidate
 
 
 @dataclass(eq=False)
 class SourceMap:
-    """The evidence of a map, ready for queries.
+    """The evidence of a map, ready for queries."""
 
-    Attributes:
-        evidence: as the map stores it.
-        space: the map's voxels.
-        things: finds the things of names in the map.
-    """
-
-    evidence: SourceEvidence
-    space: Space
-    things: "Callable[[Sequence[str]], Sequence[Thing]]"
+    evidence: SourceEvidence  # as the map stores it
+    space: Space  # the map's voxels
+    things: "Callable[[Sequence[str]], Sequence[Thing]]"  # finds the things of names in the map
     _priors: dict[tuple[str, ...], Float[np.ndarray, " c"]] = field(default_factory=dict, init=False)
 
     @classmethod
     def of(cls, avlmap: "AVLMap", evidence: SourceEvidence | None = None) -> "SourceMap":
-        """Return the evidence of a map.
-
-        Raises:
-            QueryError: the map has none.
-        """
+        """Return the evidence of a map. ``QueryError``: the map has none."""
         evidence = avlmap.data.sources if evidence is None else evidence
         if evidence is None:
             raise QueryError(unknown_sources(avlmap))
@@ -217,10 +186,8 @@ class SourceMap:
     def sources(self, events: Sequence[int], kind: str, prior: bool = True) -> list[Joined]:
         """Return the sources of sounds of one kind: each sound joins the source that it fits best, or begins its own.
 
-        Args:
-            events: numbers of the sounds, the clearest first; one that is not located is left out.
-            kind: what they are.
-            prior: whether things that usually make such a sound count.
+        ``events``: numbers of the sounds, the clearest first; one that is not located is left out. ``prior``: whether
+        things that usually make such a sound count.
         """
         base = np.asarray(self.evidence.prior, np.float64)
         found: list[Joined] = []
@@ -261,14 +228,9 @@ def list_sources(
 ) -> list[SoundSource]:
     """Return the sources of a map's sounds, or of those of some names, most confident first.
 
-    Args:
-        avlmap: the map.
-        names: kinds of sound; by default each sound has its likeliest name.
-        prior: whether things that usually make such a sound count.
-        least: sources of a lower confidence are left out, in [0, 1].
-
-    Raises:
-        QueryError: the map does not know where sounds came from.
+    ``names``: kinds of sound; by default each sound has its likeliest name. ``prior``: whether things that usually make
+    such a sound count. ``least``: sources of a lower confidence are left out, in [0, 1]. ``QueryError``: the map does
+    not know where sounds came from.
     """
     places = _Places(avlmap)
     listed = list_joined(avlmap, names, prior, least=least)
@@ -279,8 +241,7 @@ def list_sources(
 def source_of(avlmap: "AVLMap", number: int) -> SoundSource:
     """Return the source of one sound by its likeliest name.
 
-    Raises:
-        QueryError: the map does not know where sounds came from.
+    ``QueryError``: the map does not know where sounds came from.
     """
     event, known = avlmap.sounds()[number], avlmap.source_map
     name, confidence = (event.names[0], event.confidences[0]) if event.names else ("", 0.0)
@@ -398,12 +359,9 @@ def with_heard(avlmap: "AVLMap", things: Sequence[Thing], *, are_all: bool = Tru
     The probability is that of the name of the sound times that the thing is its source. Of several sounds of one source
     the last gives the time.
 
-    Args:
-        avlmap: the map.
-        things: of it.
-        are_all: whether these are all that it lists; else a sound may have come from the others as well.
+    ``are_all``: whether these are all that it lists; else a sound may have come from the others as well.
     """
-    if not things or not avlmap.data.sources is not None:
+    if not things or avlmap.data.sources is None:
         return list(things)
     return _with_heard(avlmap, things, [] if are_all else _others(avlmap.things(), things))
 
@@ -411,13 +369,10 @@ def with_heard(avlmap: "AVLMap", things: Sequence[Thing], *, are_all: bool = Tru
 def with_heard_then(avlmap: "AVLMap", visit: int, things: Sequence[Thing], every: Sequence[Thing]) -> list[Thing]:
     """Return things that were there on a day with the sounds of that day; see ``with_heard``.
 
-    Args:
-        avlmap: the map, of several days.
-        visit: the number of the day, from 0.
-        things: that were there.
-        every: all that were there; a sound may have come from the others as well.
+    ``visit``: the number of the day, from 0. ``every``: all that were there; a sound may have come from the others as
+    well.
     """
-    if not things or not avlmap.data.sources is not None:
+    if not things or avlmap.data.sources is None:
         return list(things)
     listed = {(thing.name, thing.position) for thing in things}
     return _with_heard(avlmap, things, [one for one in every if (one.name, one.position) not in listed], visit)

@@ -78,7 +78,7 @@ def grown(label: Labels, over: Cells, reach: float) -> Labels:
 
     if not (label > 0).any():
         return label
-    away, (i, j) = cast("tuple[np.ndarray, np.ndarray]", distance_transform_edt(label <= 0, return_indices=True))
+    away, (i, j) = distance_transform_edt(label <= 0, return_indices=True)
     return np.where((label == 0) & over & (away <= reach + 1e-3), label[i, j], label)
 
 
@@ -192,12 +192,8 @@ class StoreyGrid:
     ) -> "StoreyGrid":  # fmt: skip
         """Sort the voxels of a storey into cells.
 
-        Args:
-            level: middles of its voxels, level frame, metres; at least one.
-            floor_m: level z of its floor.
-            sights: cameras over it.
-            voxel_size_m: side of a voxel.
-            heading_rad: of its walls; found if None.
+        ``level``: middles of its voxels, level frame, metres; at least one. ``floor_m``: level z of its floor.
+        ``heading_rad``: of its walls; found if None.
         """
         if heading_rad is None:
             height = level[:, 2] - floor_m

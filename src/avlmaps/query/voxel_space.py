@@ -26,9 +26,7 @@ def linked(index: Int[np.ndarray, "n 3"], reach: int) -> Int64[np.ndarray, " n"]
 
     Voxels over one another make runs, and runs of columns within reach are joined where they overlap.
 
-    Args:
-        index: sorted by x, then y, then z, without repeats.
-        reach: in voxels.
+    ``index``: sorted by x, then y, then z, without repeats.
     """
     if not len(index):
         return np.zeros(0, np.int64)
@@ -100,21 +98,13 @@ _MOST_BLOCKS = 64
 
 @dataclass(frozen=True, slots=True)
 class Blocks:
-    """Voxels in an order where those of one cube of space follow each other.
+    """Voxels in an order where those of one cube of space follow each other."""
 
-    Attributes:
-        order: (n,) rows of the map's voxels.
-        starts: (b + 1,) first place of each block in ``order``.
-        index: (3, n) int32, the voxels in that order, one row an axis.
-        low: (b, 3) least index of each block's voxels.
-        high: (b, 3) largest index of each block's voxels.
-    """
-
-    order: Int[np.ndarray, " n"]
-    starts: Int[np.ndarray, " b1"]
-    index: Int[np.ndarray, "3 n"]
-    low: Int[np.ndarray, "b 3"]
-    high: Int[np.ndarray, "b 3"]
+    order: Int[np.ndarray, " n"]  # (n,) rows of the map's voxels
+    starts: Int[np.ndarray, " b1"]  # (b + 1,) first place of each block in ``order``
+    index: Int[np.ndarray, "3 n"]  # (3, n) int32, the voxels in that order, one row an axis
+    low: Int[np.ndarray, "b 3"]  # (b, 3) least index of each block's voxels
+    high: Int[np.ndarray, "b 3"]  # (b, 3) largest index of each block's voxels
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -168,11 +158,7 @@ class Blocks:
         return Blocks(self.order[place], starts, index, self.low[which], self.high[which])
 
     def chosen(self, mask: Bool[np.ndarray, " n"]) -> "Blocks":
-        """Return the blocks of some of the voxels only, without sorting again; blocks that have none are left out.
-
-        Args:
-            mask: in the map's order.
-        """
+        """Return the blocks of some of the voxels only, without sorting again; blocks that have none are left out."""
         rows = np.flatnonzero(mask[self.order])
         block = np.searchsorted(self.starts, rows, side="right") - 1
         first = np.flatnonzero(np.r_[True, block[1:] != block[:-1]]) if len(rows) else np.zeros(0, np.int64)
@@ -192,7 +178,7 @@ class Space:
         grid: turns metres into voxels.
         index: (n, 3) occupied voxels, sorted.
         level_from_world: 3x3 rotation.
-        stored: the map, for its colours in pictures; None for a space without one.
+        data: the map, for its colours in pictures; None for a space without one.
     """
 
     def __init__(
@@ -233,7 +219,6 @@ class Space:
 
     @cached_property
     def _keys(self) -> tuple[Int[np.ndarray, "3"], Int[np.ndarray, "3"], Int[np.ndarray, " n"]]:
-        """The lowest index, the extent in voxels, and one number for each voxel, ascending as the voxels are sorted."""
         index = np.asarray(self.index, np.int64)
         low = index.min(axis=0) if len(index) else np.zeros(3, np.int64)
         span = index.max(axis=0) - low + 1 if len(index) else np.zeros(3, np.int64)

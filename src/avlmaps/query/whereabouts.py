@@ -58,12 +58,7 @@ def region_named(avlmap: "AVLMap", phrase: str) -> int | None:
 
 
 def own_names(avlmap: "AVLMap", sentence: str) -> tuple[tuple[str, bool], ...]:
-    """Return the names that are this map's own, and whether each is that of a room.
-
-    Args:
-        avlmap: the map.
-        sentence: the rooms are looked for only where it holds a word with a number behind.
-    """
+    """Return the names that are this map's own, and whether each is that of a room."""
     rooms = avlmap.numbered_rooms if _NUMBERED.search(sentence) else ()
     return (*avlmap.edited.own_names, *((name, True) for name in rooms))
 
@@ -75,30 +70,21 @@ _MOST_NAMED = 30
 
 @dataclass(frozen=True, eq=False)
 class Whereabouts:
-    """The floors and rooms of one map.
+    """The floors and rooms of one map."""
 
-    Attributes:
-        rooms: those with most views first.
-        names: of each room, all different: the kind of room, and a number where there are several of a kind.
-        avlmap: the map.
-        plan: its storeys; None for a map without a floor plan.
-        field: the kinds of room of each place; None for a map whose rooms are groups of views.
-        regions: the floor of each room; None likewise.
-    """
-
-    rooms: "tuple[Room, ...]"
+    rooms: "tuple[Room, ...]"  # those with most views first
+    # Of each room, all different: the kind of room, and a number where there are several of a kind.
     names: tuple[str, ...]
-    avlmap: "AVLMap"
-    plan: "FloorPlan | None"
-    field: "RoomField | None"
-    regions: "RoomRegions | None" = None
+    avlmap: "AVLMap"  # the map
+    plan: "FloorPlan | None"  # its storeys; None for a map without a floor plan
+    field: "RoomField | None"  # the kinds of room of each place; None for a map whose rooms are groups of views
+    regions: "RoomRegions | None" = None  # the floor of each room; None likewise
 
     @classmethod
     def of(cls, avlmap: "AVLMap") -> "Whereabouts":
         """Find the rooms of a map; none where it has no model of views.
 
-        Raises:
-            MapError: the map was built with another encoder than is installed.
+        ``MapError``: the map was built with another encoder than is installed.
         """
         from avlmaps.query.contents import numbered
 
@@ -122,11 +108,7 @@ class Whereabouts:
     def rooms_of(self, points: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return the number of the room of each point: the one whose region holds it, else the nearest of its storey.
 
-        Args:
-            points: metres, recording frame.
-
-        Returns:
-            Numbers into ``rooms``; ``NOWHERE`` for a map without rooms.
+        ``points``: metres, recording frame. Numbers into ``rooms``; ``NOWHERE`` for a map without rooms.
         """
         from scipy.spatial import KDTree
 
@@ -149,11 +131,7 @@ class Whereabouts:
         return [replace(thing, room=name) for thing, name in zip(things, named, strict=True)]
 
     def things_in(self, asked: str, things: "Sequence[Thing]") -> "list[Thing]":
-        """Return the things in a room by its name, or in all rooms of a kind.
-
-        Raises:
-            QueryError: there is no such room.
-        """
+        """Return the things in a room by its name, or in all rooms of a kind. ``QueryError``: there is no such room."""
         meant = {self.names[number] for number in self.numbers_of(asked)}
         return [thing for thing in self.with_rooms(things) if thing.room in meant]
 
@@ -169,9 +147,7 @@ class Whereabouts:
     def parts_of(self, kind: Callable[[str], bool], points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
         """Return which points lie in a room of a kind: in one of that name, or in the part of an open plan that is.
 
-        Args:
-            kind: whether a name of a room is meant.
-            points: metres, recording frame.
+        ``kind``: whether a name of a room is meant. ``points``: metres, recording frame.
         """
         points = np.asarray(points, np.float64).reshape(-1, 3)
         own = self.rooms_of(points)
@@ -192,8 +168,7 @@ class Whereabouts:
     def numbers_of(self, asked: str) -> list[int]:
         """Return the numbers of the rooms that a word names: one by its own name, or all of a kind.
 
-        Raises:
-            QueryError: there is no such room; the sentence lists those that there are.
+        ``QueryError``: there is no such room; the sentence lists those that there are.
         """
         word = " ".join(asked.casefold().split()).removeprefix("the ")
         own = self.one_named(asked)

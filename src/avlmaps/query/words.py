@@ -9,9 +9,9 @@ its voxels. Words which name the wanted thing, or a kind of it by the lexicon, d
 import hashlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -29,8 +29,7 @@ _UNIT = 0.02  # by as much a length may differ from one, as in features of pixel
 def encoded_words(encoder: PixelEncoder | ViewEncoder, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
     """Return a row for each word, zero for one that the encoder does not know.
 
-    Raises:
-        BackendError: the encoder failed, or gave other than finite rows, one for each word, of unit length or zero.
+    ``BackendError``: the encoder failed, or gave other than finite rows, one for each word, of unit length or zero.
     """
     what = f"encode_words of the encoder {encoder!r}"
     try:
@@ -57,13 +56,9 @@ def encoded_words(encoder: PixelEncoder | ViewEncoder, words: Sequence[str]) -> 
 
 
 def is_a(other: str, wanted: str) -> bool:
-    """Return whether what one phrase names is what another wants, by the lexicon.
+    """Return whether what one phrase names is what another wants: an office chair is a chair, and not the reverse.
 
     A name that an encoder carries a special thing under is one with it: a bag competes with no backpack.
-
-    Args:
-        other: ``office chair``.
-        wanted: ``chair``, ``chairs`` or ``seat``; a chair is not an office chair.
     """
     known = lexicon()
     if known.is_a(other, wanted, EntryKind.THING):
@@ -81,12 +76,7 @@ _WHO = {EntryKind.THING: "pixel", EntryKind.ROOM: "view"}
 
 
 def unknown_note(phrase: str, kind: EntryKind = EntryKind.THING) -> str:
-    """Return one sentence on why a phrase cannot be found: misspelt, a known word that is not learnt, or unknown.
-
-    Args:
-        phrase: one that the encoder takes for none of its names.
-        kind: what it was to name.
-    """
+    """Return one sentence on why a phrase cannot be found: misspelt, a known word that is not learnt, or unknown."""
     known, who = lexicon(), _WHO[kind]
     entry = known.find(phrase, kind) or known.head(phrase, kind)
     if entry is not None:
@@ -111,26 +101,23 @@ def _respelt(phrase: str, noun: str, kind: EntryKind) -> tuple[str, str]:
 
 
 _CHUNK = 16_384
+_HALF = 0.01  # features are rounded to float16, so that their squares add up to 1 within this
+_ROUNDING = 1e-5  # sums of floats in another order differ by less than this
+_MOST_PICKED = 0.5  # where more of the voxels may win, reading all features in turn is quicker than picking theirs
 # A name that a phrase means by at least this much is the thing itself and does not compete with it.
 CLEARLY_MEANT = 0.25
 
 
 @dataclass(frozen=True, slots=True)
 class EncodedWord:
-    """A word as an encoder takes it.
+    """A word as an encoder takes it."""
 
-    Attributes:
-        rows: what a voxel's feature is compared with: its score is the length of their products with it. One unit
-            vector for most encoders; for one with a closed set of names, the code of each name that is meant.
-        span: unit vectors of what is clearly meant; words that lie among them do not compete.
-        understood: what of the word the encoder can act on.
-        name_weights: for an encoder of names, how much the word means each; empty for others.
-    """
-
+    # What a voxel's feature is compared with: its score is the length of their products with it. One unit vector for
+    # most encoders; for one with a closed set of names, the code of each name that is meant.
     rows: Float32[np.ndarray, "m d"]
-    span: Float32[np.ndarray, "s d"]
-    understood: str
-    name_weights: Float32[np.ndarray, " k"]
+    span: Float32[np.ndarray, "s d"]  # unit vectors of what is clearly meant; words that lie among them do not compete
+    understood: str  # what of the word the encoder can act on
+    name_weights: Float32[np.ndarray, " k"]  # for an encoder of names, how much the word means each; empty for others
 
     @classmethod
     def of(cls, encoder: PixelEncoder, word: str) -> "EncodedWord":
@@ -156,21 +143,14 @@ class EncodedWord:
         return tuple(encoder.names[index] for index in np.flatnonzero(self.name_weights >= CLEARLY_MEANT))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Vocabulary:
-    """The words that compete for voxels with a queried one.
+    """The words that compete for voxels with a queried one."""
 
-    Attributes:
-        words: the vocabulary and, if the encoder has a feature for it, ``other`` as the last.
-        word_feature: unit vectors.
-        understood: what of each word the encoder acts on.
-        has_other: whether ``other`` is among them.
-    """
-
-    words: tuple[str, ...]
-    word_feature: Float32[np.ndarray, "v d"]
-    understood: tuple[str, ...]
-    has_other: bool
+    words: tuple[str, ...]  # the vocabulary and, if the encoder has a feature for it, ``other`` as the last
+    word_feature: Float32[np.ndarray, "v d"]  # unit vectors
+    understood: tuple[str, ...]  # what of each word the encoder acts on
+    has_other: bool  # whether ``other`` is among them
 
     @property
     def digest(self) -> list[Any]:
@@ -199,105 +179,115 @@ class Vocabulary:
             silent[-1] = same[-1]
         return silent
 
-    def rivals_at(self, feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> "ClosestWords":
-        """Return the two words closest to some voxels of a map."""
-        return ClosestWords.among(np.ascontiguousarray(feature[rows]), self)
+    def closest(self, feature: Float16[np.ndarray, "n d"]) -> "ClosestWords":
+        """Score features against the vocabulary."""
+        return self.with_closest(scores.two_closest(feature, self.word_feature))
 
-    def scores_at(
-        self, feature: Float16[np.ndarray, "n d"], encoded: "EncodedWord", rows: Int[np.ndarray, " m"]
-    ) -> Float32[np.ndarray, " m"]:
-        """Return the score of a word at some voxels of a map."""
-        return scores.feature_scores(feature, encoded.rows, rows)
-
-    def contenders(
-        self, encoder: PixelEncoder, encoded: "EncodedWord", silent: Bool[np.ndarray, " v"], share: float
-    ) -> Int[np.ndarray, " m"] | None:
-        """Return the voxels where a word may score a share of its best rival, as far as is known; None: any voxel."""
-        return None
+    def with_closest(self, closest: scores.Closest) -> "ClosestWords":
+        """Return the vocabulary with the two words closest to each voxel."""
+        return ClosestWords(self.words, self.word_feature, self.understood, self.has_other, *closest)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ClosestWords(Vocabulary):
     """A vocabulary, and its two words closest to each voxel, computed once a map and vocabulary.
 
-    With the best two stored, a query is one pass over the features even if the queried word is in the vocabulary.
-
-    Attributes:
-        best: highest score; −inf where there is no word at all.
-        best_word: whose that is, −1 for nobody.
-        second: next highest score.
-        second_word: whose that is.
+    With the best two, a query is one pass over the features even if the queried word is in the vocabulary. For an
+    encoder of names they also say, without its feature, of most voxels that a word cannot win there.
     """
 
-    best: Float32[np.ndarray, " n"]
-    best_word: Int[np.ndarray, " n"]
-    second: Float32[np.ndarray, " n"]
-    second_word: Int[np.ndarray, " n"]
+    best: Float32[np.ndarray, " n"]  # highest score; −inf where there is no word at all
+    best_word: Int[np.ndarray, " n"]  # whose that is, −1 for nobody
+    second: Float32[np.ndarray, " n"]  # next highest score
+    second_word: Int[np.ndarray, " n"]  # whose that is
 
     @classmethod
     def of(
         cls, feature: Float16[np.ndarray, "n d"], encoder: PixelEncoder, vocabulary: Sequence[str]
     ) -> "ClosestWords":
         """Score every voxel against a vocabulary; words of which the encoder understands nothing are left out."""
-        return cls.among(feature, Vocabulary.encoded(encoder, vocabulary))
+        return Vocabulary.encoded(encoder, vocabulary).closest(feature)
 
-    @classmethod
-    def among(cls, feature: Float16[np.ndarray, "n d"], rivals: Vocabulary) -> "ClosestWords":
-        """Score voxels against an encoded vocabulary."""
-        closest = scores.two_closest(feature, rivals.word_feature)
-        return cls(rivals.words, rivals.word_feature, rivals.understood, rivals.has_other, *closest)
+    def at(self, rows: Int[np.ndarray, " m"]) -> "ClosestWords":
+        """Return the words closest to some of the voxels."""
+        return self.with_closest((self.best[rows], self.best_word[rows], self.second[rows], self.second_word[rows]))
 
-    def taken(self, rows: Int[np.ndarray, " m"]) -> "ClosestWords":
-        """Return the same for some of the voxels."""
-        closest = self.best[rows], self.best_word[rows], self.second[rows], self.second_word[rows]
-        return ClosestWords(self.words, self.word_feature, self.understood, self.has_other, *closest)
+    def scores_at(
+        self, feature: Float16[np.ndarray, "n d"], encoded: EncodedWord, rows: Int[np.ndarray, " m"]
+    ) -> Float32[np.ndarray, " m"]:
+        """Return the score of a word at some voxels; that of a name which is one of the two closest is known."""
+        own: Int[np.ndarray, " o"] = np.flatnonzero((self.word_feature @ encoded.rows.T > 1.0 - 1e-6).any(axis=1))
+        if len(encoded.rows) != 1 or len(own) != 1:
+            return scores.feature_scores(feature, encoded.rows, rows)
+        first: Bool[np.ndarray, " m"] = self.best_word[rows] == own[0]
+        second: Bool[np.ndarray, " m"] = self.second_word[rows] == own[0]
+        score = np.where(first, self.best[rows], self.second[rows])
+        others = np.flatnonzero(~(first | second))
+        score[others] = scores.feature_scores(feature, encoded.rows, rows[others])
+        return score
+
+    def contenders(
+        self, encoder: NamedPixelEncoder, encoded: EncodedWord, silent: Bool[np.ndarray, " v"], share: float
+    ) -> Int[np.ndarray, " m"] | None:
+        """Return the voxels where a word may score a share of its best rival; None where that is unknown, or many.
+
+        The word means names W with weights w, and scores √(Σ w·s²) over their scores s. Where the closest word is
+        neither in W nor silent, it is the best rival, with score b. No name of W scores more than the second closest
+        word, c, and the squares of all scores add up to 1. So the word reaches a share of b only where
+        min(c²·Σw, (1 − b²)·max w) reaches the square of that; (1 − b² − c²)·max w where the second is neither.
+        """
+        meant = encoded.name_weights > 0.0
+        same = self.word_feature @ encoder.codes[meant].T > 1.0 - _HALF
+        if not same.any(axis=0).all():
+            return None  # a name that is not in the vocabulary may score anything
+        first = same.any(axis=1) | silent
+        weights = encoded.name_weights[meant]
+        least = (1.0 - _ROUNDING) * share**2
+        order, starts = self._by_word
+        told = [order[starts[word] : starts[word + 1]] for word in np.flatnonzero(first)]
+        closeness = min(least / max(float(weights.sum()), 1e-9), 1.0 - _ROUNDING)
+        others = np.flatnonzero(self._closeness >= closeness)
+        square = np.square(self.best[others])
+        left = 1.0 + _HALF - square
+        left -= np.where(first[self.second_word[others]], 0.0, np.square(self.second[others]))
+        possible = (left * weights.max(initial=0.0) >= least * square) & ~first[self.best_word[others]]
+        rows = np.concatenate([*told, others[possible]])
+        return np.sort(rows) if len(rows) <= _MOST_PICKED * len(self.best) else None
+
+    @cached_property
+    def _by_word(self) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " v1"]]:
+        counts = np.bincount(self.best_word, minlength=len(self.words))
+        return np.argsort(self.best_word, kind="stable"), np.append(0, np.cumsum(counts))
+
+    @cached_property
+    def _closeness(self) -> Float32[np.ndarray, " n"]:
+        # The square of the second score over that of the best; 0 where there is no feature and no word can win.
+        ratio = np.square(np.maximum(self.second, 1e-3) / np.maximum(self.best, 1e-3))
+        ratio[(self.best == 0.0) & (self.second == 0.0)] = 0.0
+        return ratio
 
 
 @dataclass(frozen=True, slots=True)
 class Scored:
-    """The voxels that may be a queried thing: no other voxel of the map can be.
+    """The voxels that may be a queried thing: no other voxel of the map can be."""
 
-    Attributes:
-        rows: their numbers in the map, ascending.
-        margin: by how much the word beats its best rival there.
-        score: of the word.
-    """
-
-    rows: Int[np.ndarray, " m"]
-    margin: Float32[np.ndarray, " m"]
-    score: Float32[np.ndarray, " m"]
+    rows: Int[np.ndarray, " m"]  # their numbers in the map, ascending
+    margin: Float32[np.ndarray, " m"]  # by how much the word beats its best rival there
+    score: Float32[np.ndarray, " m"]  # of the word
 
     def only(self, which: Bool[np.ndarray, " m"]) -> "Scored":
         """Return some of the voxels."""
         return take(self, which)
 
 
-def object_margins(
-    feature: Float16[np.ndarray, "n d"],
-    rivals: ClosestWords,
-    word_rows: Float32[np.ndarray, "m d"],
-    silent: Bool[np.ndarray, " v"],
-    least_score: float,
-) -> tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
-    """Return by how much the queried word beats its best rival at each voxel, and its score there.
+def margins_of(
+    score: Float32[np.ndarray, " m"], feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"],
+    rivals: ClosestWords, silent: Bool[np.ndarray, " v"], least_score: float,
+) -> Float32[np.ndarray, " m"]:  # fmt: skip
+    """Return by how much a word with these scores beats its best rival at each of some voxels.
 
-    The margin is positive where the voxel is the object.
-
-    ``silent`` are the rivals' words that do not compete; ``least_score`` is what the word must beat besides where
-    ``other`` has no feature.
+    ``silent`` words do not compete; ``least_score`` is what the word must beat where ``other`` has no feature.
     """
-    score = scores.feature_scores(feature, word_rows)
-    return _beaten(score, feature, np.arange(len(score)), rivals, silent, least_score), score
-
-
-def _beaten(
-    score: Float32[np.ndarray, " m"],
-    feature: Float16[np.ndarray, "n d"],
-    rows: Int[np.ndarray, " m"],
-    rivals: ClosestWords,
-    silent: Bool[np.ndarray, " v"],
-    least_score: float,
-) -> Float32[np.ndarray, " m"]:
     floor = float(np.float32(-np.inf if rivals.has_other else least_score))
     closest = rivals.best, rivals.best_word, rivals.second, rivals.second_word
     out, unsure = scores.margins(score, closest, silent, floor)
@@ -311,24 +301,23 @@ def _beaten(
     return out
 
 
+def competes_whole(encoder: PixelEncoder, words: Sequence[str]) -> bool:
+    """Return whether an encoder is one of names, all of which are among some words."""
+    return isinstance(encoder, NamedPixelEncoder) and {*encoder.names} <= {*words, "other"}
+
+
 def scorer_of(
-    feature: Float16[np.ndarray, "n d"],
-    encoder: PixelEncoder,
-    rivals: Vocabulary,
-    encoded: EncodedWord,
+    feature: Float16[np.ndarray, "n d"], encoder: PixelEncoder, rivals: Vocabulary, encoded: EncodedWord,
     settings: ObjectSettings,
-) -> Callable[[float], Scored]:
+) -> Callable[[float], Scored]:  # fmt: skip
     """Return a function that gives the voxels where a word scores at least a share of its best rival, maybe others.
 
-    Where the ``ClosestWords`` of all voxels are known, they are all voxels. Else the encoder is one of names: voxels
-    with little of the word are not compared with its rivals, and where the closest words are known before
-    (``KnownClosestWords``), they say of most voxels that the word cannot win.
+    For an encoder of any words, whose ``ClosestWords`` are always known, they are all voxels. Of an encoder of names,
+    voxels with little of the word are not compared with its rivals.
     """
     silent = rivals.not_competing(encoder, encoded, settings.same_word_cosine)
-    if isinstance(rivals, ClosestWords):
-        every = np.arange(len(feature))
-        everywhere = Scored(every, *object_margins(feature, rivals, encoded.rows, silent, settings.least_score))
-        return lambda share: everywhere
+    known = rivals if isinstance(rivals, ClosestWords) else None
+    named = encoder if isinstance(encoder, NamedPixelEncoder) and competes_whole(encoder, rivals.words) else None
 
     @cache
     def score_of_all() -> Float32[np.ndarray, " n"]:
@@ -336,14 +325,16 @@ def scorer_of(
 
     @cache
     def at_least(share: float) -> Scored:
-        rows = rivals.contenders(encoder, encoded, silent, share)
-        if rows is None:
-            rows = np.flatnonzero(score_of_all() > least_score_to_count(len(rivals.words), share))
+        rows = score = None
+        if known is not None and named is not None:
+            rows = known.contenders(named, encoded, silent, share)
+            score = None if rows is None else known.scores_at(feature, encoded, rows)
+        if rows is None or score is None:
+            least = -np.inf if named is None else least_score_to_count(len(rivals.words), share)
+            rows = np.flatnonzero(score_of_all() > least)
             score = score_of_all()[rows]
-        else:
-            score = rivals.scores_at(feature, encoded, rows)
-        near = rivals.rivals_at(feature, rows)
-        return Scored(rows, _beaten(score, feature, rows, near, silent, settings.least_score), score)
+        near = rivals.closest(np.ascontiguousarray(feature[rows])) if known is None else known.at(rows)
+        return Scored(rows, margins_of(score, feature, rows, near, silent, settings.least_score), score)
 
     return at_least
 
@@ -352,151 +343,7 @@ def least_score_to_count(names: int, share: float) -> float:
     """Return a score that every voxel exceeds which scores at least a share of its best rival, for a closed set.
 
     The squared scores of all names are probabilities. What is left by the word, p, and by the names that do not compete
-    because it clearly means them, at most p / ``CLEARLY_MEANT``, is divided among the rivals: the best of them has at
-    least (1 − p / ``CLEARLY_MEANT``) / names. Features are rounded to float16; a tenth is ample for that.
-
-    Args:
-        names: how many compete, the queried one counted.
-        share: of the best rival's score, at most 1.
+    because it clearly means them, at most p / ``CLEARLY_MEANT``, is divided among the rivals (``names`` counts the
+    word): the best of them has at least (1 − p / ``CLEARLY_MEANT``) / names. A tenth is ample for rounding to float16.
     """
     return 0.9 * share / math.sqrt(names + 1.0 / CLEARLY_MEANT)
-
-
-# Features are rounded to float16, so that their squares add up to 1 within this.
-_HALF = 0.01
-# Sums of floats in another order differ by less than this.
-_ROUNDING = 1e-5
-# If more of the voxels than this may win, reading all features in turn is quicker than picking theirs.
-_MOST_PICKED = 0.5
-
-
-@dataclass(frozen=True)
-class KnownClosestWords(Vocabulary):
-    """A vocabulary of all names of an encoder, and its two words closest to the voxels where they are known.
-
-    Attributes:
-        best: highest score.
-        best_word: whose that is.
-        second: next highest score.
-        second_word: whose that is.
-        known: which voxels have these.
-    """
-
-    best: Float32[np.ndarray, " n"]
-    best_word: Int[np.ndarray, " n"]
-    second: Float32[np.ndarray, " n"]
-    second_word: Int[np.ndarray, " n"]
-    known: Bool[np.ndarray, " n"] = field(repr=False)
-
-    @classmethod
-    def of(cls, vocabulary: Vocabulary, count: int) -> Self:
-        """Return a vocabulary of which nothing is known yet, for a map of ``count`` voxels."""
-        word = scores.word_type(len(vocabulary.words))
-        return cls(
-            vocabulary.words, vocabulary.word_feature, vocabulary.understood, vocabulary.has_other,
-            np.empty(count, np.float32), np.empty(count, word), np.empty(count, np.float32), np.empty(count, word),
-            np.zeros(count, np.bool_),
-        )  # fmt: skip
-
-    @classmethod
-    def known_everywhere(cls, vocabulary: Vocabulary, closest: scores.Closest) -> Self:
-        """Return a vocabulary of which the two words closest to every voxel are known."""
-        told = vocabulary.words, vocabulary.word_feature, vocabulary.understood, vocabulary.has_other
-        return cls(*told, *closest, np.ones(len(closest[0]), np.bool_))
-
-    def rivals_at(self, feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> ClosestWords:
-        """Return the two words closest to some voxels, computing those that are not known."""
-        missing = rows[~self.known[rows]]
-        if len(missing):
-            closest = scores.two_closest(np.ascontiguousarray(feature[missing]), self.word_feature)
-            for kept, found in zip(self._closest, closest, strict=True):
-                kept[missing] = found
-            self.known[missing] = True
-        return ClosestWords(*self._told, *(kept[rows] for kept in self._closest))
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether they are known at every voxel."""
-        return bool(self.known.all())
-
-    def whole(self, feature: Float16[np.ndarray, "n d"]) -> ClosestWords:
-        """Return the two words closest to every voxel."""
-        if not self.is_whole:
-            for kept, found in zip(self._closest, scores.two_closest(feature, self.word_feature), strict=True):
-                kept[:] = found
-            self.known[:] = True
-        return ClosestWords(*self._told, *self._closest)
-
-    def scores_at(
-        self, feature: Float16[np.ndarray, "n d"], encoded: EncodedWord, rows: Int[np.ndarray, " m"]
-    ) -> Float32[np.ndarray, " m"]:
-        """Return the score of a word at some voxels; that of a name which is one of the two closest is known."""
-        own: Int[np.ndarray, " o"] = np.flatnonzero((self.word_feature @ encoded.rows.T > 1.0 - 1e-6).any(axis=1))
-        if len(encoded.rows) != 1 or len(own) != 1:
-            return scores.feature_scores(feature, encoded.rows, rows)
-        first: Bool[np.ndarray, " m"] = self.best_word[rows] == own[0]
-        second: Bool[np.ndarray, " m"] = self.second_word[rows] == own[0]
-        score = np.where(first, self.best[rows], self.second[rows])
-        others = np.flatnonzero(~(first | second) | ~self.known[rows])
-        score[others] = scores.feature_scores(feature, encoded.rows, rows[others])
-        return score
-
-    def contenders(
-        self, encoder: PixelEncoder, encoded: EncodedWord, silent: Bool[np.ndarray, " v"], share: float
-    ) -> Int[np.ndarray, " m"] | None:
-        """Return the voxels where a word may score a share of its best rival; None where they are unknown, or many.
-
-        The word means names W with weights w, and scores √(Σ w·s²) over their scores s. Where the closest word is
-        neither in W nor silent, it is the best rival, with score b. No name of W scores more than the second closest
-        word, c, and the squares of all scores add up to 1. So the word reaches a share of b only where
-        min(c²·Σw, (1 − b²)·max w) reaches the square of that; (1 − b² − c²)·max w where the second is neither.
-        """
-        if not isinstance(encoder, NamedPixelEncoder) or not self.known.all():
-            return None
-        meant = encoded.name_weights > 0.0
-        same = self.word_feature @ encoder.codes[meant].T > 1.0 - _HALF
-        if not same.any(axis=0).all():
-            return None  # a name that is not in the vocabulary may score anything
-        first = same.any(axis=1) | silent
-        weights = encoded.name_weights[meant]
-        least = (1.0 - _ROUNDING) * share**2
-        order, starts = self._by_word
-        told = [order[starts[word] : starts[word + 1]] for word in np.flatnonzero(first)]
-        others = self._closer_than(least / max(float(weights.sum()), 1e-9))
-        square = np.square(self.best[others])
-        left = 1.0 + _HALF - square
-        left -= np.where(first[self.second_word[others]], 0.0, np.square(self.second[others]))
-        possible = (left * weights.max(initial=0.0) >= least * square) & ~first[self.best_word[others]]
-        rows = np.concatenate([*told, others[possible]])
-        return np.sort(rows) if len(rows) <= _MOST_PICKED * len(self.known) else None
-
-    @property
-    def _told(self):
-        return self.words, self.word_feature, self.understood, self.has_other
-
-    @property
-    def _closest(self):
-        return self.best, self.best_word, self.second, self.second_word
-
-    @cached_property
-    def _by_word(self) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " v1"]]:
-        """The voxels in the order of their closest words, and where those of each begin."""
-        counts = np.bincount(self.best_word, minlength=len(self.words))
-        return np.argsort(self.best_word, kind="stable"), np.append(0, np.cumsum(counts))
-
-    @cached_property
-    def _closeness(self) -> Float32[np.ndarray, " n"]:
-        """The square of the second score over that of the best; 0 where there is no feature and no word can win."""
-        ratio = np.square(np.maximum(self.second, 1e-3) / np.maximum(self.best, 1e-3))
-        ratio[(self.best == 0.0) & (self.second == 0.0)] = 0.0
-        return ratio
-
-    def _closer_than(self, least: float) -> Int[np.ndarray, " m"]:
-        """Return the voxels whose two closest words score nearly alike."""
-        if least >= 1.0 - _ROUNDING:
-            return self._ties
-        return np.flatnonzero(self._closeness >= least)
-
-    @cached_property
-    def _ties(self) -> Int[np.ndarray, " m"]:
-        return np.flatnonzero(self._closeness >= 1.0 - _ROUNDING)

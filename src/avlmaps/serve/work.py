@@ -19,8 +19,8 @@ from avlmaps.navigate.bodies import WALKER
 from avlmaps.navigate.paths import PathAnswer, PathFinder, goals_near
 from avlmaps.query.answer import Answer
 from avlmaps.query.editor import edit_text
+from avlmaps.query.modalities.image import Photo
 from avlmaps.query.places import PlaceAnswer, column_point, describe_place, last_seen, place_of
-from avlmaps.query.queryable import Photo
 from avlmaps.query.schema import (
     ChangesAnswer,
     ContentsAnswer,

@@ -29,19 +29,12 @@ _UNKNOWN_TEMPERATURE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class ViewShares:
-    """How a queried name competes with others over some views.
+    """How a queried name competes with others over some views."""
 
-    Attributes:
-        kinds: names that compete, the queried one among them unless the encoder has names of its own.
-        share: how likely each view shows each of them; rows add up to 1.
-        weights: how much the query means each of them.
-        raw: score of the query by itself: its probability, or its cosine.
-    """
-
-    kinds: tuple[str, ...]
-    share: Float[np.ndarray, "k n"]
-    weights: Float[np.ndarray, " n"]
-    raw: Float[np.ndarray, " k"]
+    kinds: tuple[str, ...]  # names that compete, the queried one among them unless the encoder has names of its own
+    share: Float[np.ndarray, "k n"]  # how likely each view shows each of them; rows add up to 1
+    weights: Float[np.ndarray, " n"]  # how much the query means each of them
+    raw: Float[np.ndarray, " k"]  # score of the query by itself: its probability, or its cosine
 
 
 def area_scores(
@@ -121,10 +114,7 @@ def pool_posteriors(
     less confident than views that agree should be; so, where the weights add up to two views or more, it is squared and
     rescaled, the product of two independent views that say the same. A lone view stays as it is.
 
-    Args:
-        share: distributions over names.
-        places: what each view looked at, metres.
-        pool_m: over 0.
+    ``places``: what each view looked at, metres. ``pool_m``: over 0.
     """
     from scipy.sparse import csr_array
     from scipy.spatial import KDTree
@@ -186,13 +176,8 @@ def _temperature(encoder: ViewEncoder, settings: AreaSettings) -> float:
 def modes(points: Float[np.ndarray, "a 2"], score: Float[np.ndarray, " a"], link_m: float) -> Int[np.ndarray, " a"]:
     """Group anchors round the local maxima of their score: each follows its best neighbour uphill (quick shift).
 
-    Args:
-        points: horizontal, metres.
-        score: one for each.
-        link_m: how far a neighbour may be.
-
-    Returns:
-        The number of the group of each anchor, the best group first.
+    ``points``: horizontal, metres. ``score``: one for each. ``link_m``: how far a neighbour may be. Returns the number
+    of the group of each anchor, the best group first.
     """
     from scipy.spatial import KDTree
 

@@ -1,5 +1,6 @@
 """Where a picture was taken: heat around the camera that ``locate`` finds."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from avlmaps.core.question import Part
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.settings import FOUND_AT, HeatSettings
 from avlmaps.query.voxel_space import Space
+from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
     from avlmaps.query.locate import Located
@@ -21,12 +23,20 @@ if TYPE_CHECKING:
 _LEAST_CERTAINTY, _MOST_OF_A_GUESS = 0.01, 0.49
 
 
-def read_picture(path: Path) -> UInt8[np.ndarray, "h w 3"]:
-    """Read a picture as RGB.
+@dataclass(frozen=True, slots=True, eq=False)
+class Photo:
+    """A picture that came without a file of its own."""
 
-    Raises:
-        QueryError: it is missing or no picture.
-    """
+    rgb: UInt8[np.ndarray, "h w 3"]
+    focal_35mm: float | None = None  # the focal length for 35 mm film in its EXIF, mm; None where it has none
+
+
+Attachment = UInt8[np.ndarray, "h w 3"] | Photo | Sound
+"""A picture or a sound that comes with a question, instead of a file."""
+
+
+def read_picture(path: Path) -> UInt8[np.ndarray, "h w 3"]:
+    """Read a picture as RGB. ``QueryError``: it is missing or no picture."""
     import cv2
 
     if not path.is_file():

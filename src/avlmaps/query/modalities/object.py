@@ -37,17 +37,11 @@ NOTHING = frozenset({"", "thing", "things", "something", "object", "objects", "a
 
 @dataclass(frozen=True, slots=True)
 class ColourPhrase:
-    """The colour in a phrase, and the phrase without it.
+    """The colour in a phrase, and the phrase without it."""
 
-    Attributes:
-        text: the words of colour.
-        feature: of the colour.
-        thing: the rest of the phrase, ``""`` where the query names only a colour.
-    """
-
-    text: str
-    feature: Float32[np.ndarray, " d"]
-    thing: str
+    text: str  # the words of colour
+    feature: Float32[np.ndarray, " d"]  # of the colour
+    thing: str  # the rest of the phrase, ``""`` where the query names only a colour
 
 
 @cache
@@ -98,8 +92,7 @@ def object_factor(
 
     With the voxels' colours, an encoder that knows things but no colours is helped out with those.
 
-    Raises:
-        QueryError: the encoder understands nothing of the word.
+    ``QueryError``: the encoder understands nothing of the word.
     """
     encoder = voxels.encoder
     compound = " " in part.query.strip() and lexicon().find(part.query, EntryKind.THING) is not None  # a white board
@@ -125,23 +118,14 @@ def object_factor(
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """A search for the instances of a word.
+    """A search for the instances of a word."""
 
-    Attributes:
-        voxels: of the map.
-        part: of the query.
-        heat: how fast it falls.
-        word: as the encoder takes it.
-        colour: what the part says of colours beside it; None for nothing.
-        searched: its confident instances, where they were found before.
-    """
-
-    voxels: FeatureVoxels
-    part: Part
-    heat: HeatSettings
-    word: EncodedWord
-    colour: ColourPhrase | None
-    searched: Segmentation | None = None
+    voxels: FeatureVoxels  # of the map
+    part: Part  # of the query
+    heat: HeatSettings  # how fast it falls
+    word: EncodedWord  # as the encoder takes it
+    colour: ColourPhrase | None  # what the part says of colours beside it; None for nothing
+    searched: Segmentation | None = None  # its confident instances, where they were found before
 
     def factor(self) -> NearThings:
         """Return the heat of the confident instances; where there are none, of the best guesses."""

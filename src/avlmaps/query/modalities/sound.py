@@ -65,11 +65,7 @@ def sound_factor(
 
 
 def read_clip(path: Path) -> Sound:
-    """Read a clip to ask with.
-
-    Raises:
-        QueryError: it is missing, unreadable or silent.
-    """
+    """Read a clip to ask with. ``QueryError``: it is missing, unreadable or silent."""
     from avlmaps.recordings.audio import AudioTrack
 
     if not path.is_file():
@@ -105,13 +101,11 @@ class SourceAnchors(NearAnchors):
     What is sought is right where the sound is one and its source lies so near; as context the sound alone counts.
 
     Attributes:
-        spreads: for each source, how well its place is known.
         part: says that the place is the source's.
-        waits: whether such a sound was heard whose place is not found yet, in a map that grows.
     """
 
-    spreads: tuple[Spread, ...]
-    waits: bool = False
+    spreads: tuple[Spread, ...]  # for each source, how well its place is known
+    waits: bool = False  # whether such a sound was heard whose place is not found yet, in a map that grows
     found: bool = field(init=False)
     note: str = field(init=False)
 
