@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from avlmaps.core.extras import install_command
 from avlmaps.core.motion import Action, Moved
 from avlmaps.core.question import Part
 from avlmaps.query.factors import NearThings
@@ -230,17 +229,6 @@ def test_a_query_says_which_options_have_no_effect(answer, built: Path, tmp_path
     assert not plot.exists()
     said = answer("query", built, "the red thing", "--plot", plot)
     assert plot.exists() and not [note for note in said.get("notes", ()) if "effect" in note]
-
-
-def test_a_chat_model_without_its_extra_says_how_to_get_it(run, built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import sys
-
-    monkeypatch.setitem(sys.modules, "openai", None)
-    monkeypatch.setenv("OPENAI_API_KEY", "none")
-    words = ("--scene", "house:7", "--language", "chat", "--chat-model", "m", "--chat-url", "http://localhost:9/v1")
-    status, _, err = run("go", built, "go to the chair", *words)
-    assert status == 1
-    assert install_command("chat") in err
 
 
 def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(
