@@ -25,11 +25,7 @@ from avlmaps.recordings.types import Recording
 
 
 def doubts_of(recording: Recording, allowed: Sequence[str]) -> tuple[str, ...]:
-    """Return what is doubtful about a recording, one sentence each, and say it.
-
-    Raises:
-        RecordingError: the recording cannot be right, or a reason has no such name.
-    """
+    """Return what is doubtful about a recording, one sentence each, and say it."""
     known = [reason.value for reason in Reason]
     for name in allowed:
         if name not in known:
@@ -58,9 +54,6 @@ def judge(recording: Recording, useless: Sequence[str] | None = None, *, closely
         recording: to check.
         useless: what ``useless_channels`` says of its sound, where that was read before.
         closely: whether rare mistakes are looked for as well, and what would not show is said.
-
-    Raises:
-        RecordingError: it has no frame that can be read.
     """
     verdict = examine_recording(recording) if closely else check_recording(recording)
     if verdict.refused(()) is not None:  # with such poses nothing is level
@@ -83,11 +76,7 @@ def doubts_of_walk(walk: WalkedTrack, held: Recording) -> tuple[str, ...]:
 
 
 def doubts_of_channels(track: AudioTrack, walk: Trajectory, name: str) -> tuple[str, ...]:
-    """Return what is doubtful about the channels of an array, as a build finds it: their wiring, and those of no use.
-
-    Raises:
-        AudioError: the track cannot be read.
-    """
+    """Return what is doubtful about the channels of an array: their wiring, and those of no use."""
     useless = useless_channels(track, name)
     return (*map(str, _of_microphones(track, walk, useless)[0]), *useless)
 

@@ -143,11 +143,6 @@ class RayPool:
             ) from None
 
     def _join(self, host: str, port: int) -> None:
-        """Join the cluster of an address; Ray itself would try for a quarter of an hour where something else answers.
-
-        Raises:
-            MapError: nothing answers in time, or something else than Ray.
-        """
         try:
             socket.create_connection((host, port), self._wait_s).close()
         except OSError as fault:

@@ -88,9 +88,6 @@ def surfaces(
         about: of the map.
         sensor: the depth camera.
         counts: of the last time, of the same map with fewer frames.
-
-    Raises:
-        MapError: there is none.
     """
     begin, grid, name, fusion = perf_counter(), total.grid, about.recording.name, about.settings.fusion
     if len(total) == 0:

@@ -70,11 +70,7 @@ def save_state(file: Path, key: str, state: MapState) -> None:
 
 
 def load_state(file: Path) -> MapState:
-    """Read a state; its large arrays stay on the disk until they are used.
-
-    Raises:
-        MapError: there is none, or it is damaged.
-    """
+    """Read a state; its large arrays stay on the disk until they are used."""
     arrays, note = read_arrays(file)
     parts: list[Any] = [as_kind(kind, arrays, file, f"{name}.") for name, kind in _KINDS.items()]
     return MapState(*parts, arrays["stamp_s"], arrays["pose"], decode_json(note.encode(), _Note).bad)

@@ -62,12 +62,7 @@ def open_with_device(reopen: Callable[[], Recording], path: Path) -> Recording:
 
 
 def take_device(recording: Recording, path: Path | str) -> None:
-    """Begin with the offset of the device that says directions as the map of an earlier recording has it.
-
-    Raises:
-        RecordingError: the recording has no directions.
-        MapError: the map knows of no such device.
-    """
+    """Begin with the offset of the device that says directions as the map of an earlier recording has it."""
     track = recording.audio
     if track is None or track.directions is None:
         raise RecordingError(f"{recording.path} has no directions that a device said, so that no offset is of use.")
@@ -75,11 +70,7 @@ def take_device(recording: Recording, path: Path | str) -> None:
 
 
 def device_of(path: Path | str) -> tuple[float, float]:
-    """Return the offset of a map's device that says directions, and the standard deviation of that.
-
-    Raises:
-        MapError: the map knows of no such device.
-    """
+    """Return the offset of a map's device that says directions, and the standard deviation of that."""
     found = read(path).sources
     if found is None or not len(found.device):
         raise MapError(f"{path} knows of no device that says directions; name a map of a recording with one.")
@@ -123,11 +114,7 @@ class Hearing:
         return self.whole if self.whole is not None or self._sounds is None else self._sounds.track
 
     def place_microphones(self, microphones: Microphones) -> None:
-        """Say where the microphones of the channels are, before the first piece of sound.
-
-        Raises:
-            AudioError: sound came before.
-        """
+        """Say where the microphones of the channels are, before the first piece of sound."""
         if self._sounds is not None:
             raise AudioError("Sound came before its microphones were described; describe them before the first piece.")
         self.sources.microphones = microphones
@@ -136,9 +123,6 @@ class Hearing:
         """Add a piece of sound; see ``GrowingTrack.add``.
 
         Several channels become one, their mean, where nobody said where their microphones are, as in a build.
-
-        Raises:
-            AudioError: it is no sound, has another rate or other channels, repeats what came, or is of another clock.
         """
         if isinstance(chunk, ChannelSound):
             require_fit(self.sources.microphones, len(chunk.samples))
@@ -152,11 +136,7 @@ class Hearing:
         self._sounds.add(chunk, stamp_s)
 
     def add_directions(self, said: DirectionTrack) -> None:
-        """Add what a device said of where sounds come from, in the order of time.
-
-        Raises:
-            RecordingError: it is not later than what came.
-        """
+        """Add what a device said of where sounds come from, in the order of time."""
         self.sources.add_directions(said)
 
     def forget(self) -> None:
@@ -165,12 +145,7 @@ class Hearing:
         self.sources.forget()
 
     def sounds(self, walk: WalkedTrack, *, final: bool) -> HeardSounds:
-        """Return the sounds that are over, or all of them as a build finds them.
-
-        Raises:
-            AudioError: the samples cannot be read.
-            BackendError: the encoder's features are not what its card says.
-        """
+        """Return the sounds that are over, or all of them as a build finds them."""
         track, has_encoder = self.track, Kind.SOUNDS in self._encoders
         dim = self._encoders.card(Kind.SOUNDS).dim if has_encoder else 0
         if track is None or not has_encoder or not len(walk.stamps_s):

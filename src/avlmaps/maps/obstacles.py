@@ -252,10 +252,6 @@ def find_obstacles(
 def _cells(
     level: Float[np.ndarray, "n 3"], level_from_world: Float[np.ndarray, "3 3"], voxel_size_m: float, cell_size_m: float
 ) -> Int[np.ndarray, "p n 2"]:
-    """Return the cells of eight points in each voxel: one that is turned reaches beyond the cell of its middle.
-
-    Where voxels are cells and none is turned, all eight lie in one cell, which is given once.
-    """
     if cell_size_m == voxel_size_m and np.array_equal(level_from_world, np.eye(3)):
         return np.floor(level[None, :, :2] / cell_size_m).astype(np.int64)
     offsets = (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5) * (0.5 * voxel_size_m) @ level_from_world.T
@@ -270,10 +266,6 @@ def _strides(
     seen: Int[np.ndarray, "p n 2"],
     flat_only: bool = False,
 ) -> Float[np.ndarray, "m 2"]:
-    """Return places along a walk on a floor, closer to each other than a cell, in units of cells.
-
-    With ``flat_only`` where the camera is higher or lower than usual by more than 0.12 m is left out: it was on stairs.
-    """
     if walked is None or not len(walked):
         return np.zeros((0, 2))
     level = np.asarray(walked, np.float64) @ level_from_world.T

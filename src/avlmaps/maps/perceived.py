@@ -17,11 +17,7 @@ _UNIT = 0.02
 
 
 def encode_pixels(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
-    """Return the features of each frame.
-
-    Raises:
-        BackendError: the encoder fails, or gives something else than its protocol says.
-    """
+    """Return the features of each frame."""
     if not frames:
         return []
     who, names = f"The pixel encoder {encoder.card.id}", ", ".join(frame.name for frame in frames)
@@ -46,11 +42,7 @@ def perceiving(who: str, what: str) -> Generator[None]:
 
 
 def as_grid(features: Any, dim: int | None, who: str, frame: Frame) -> np.ndarray:
-    """Return features as an array of the right form.
-
-    Raises:
-        BackendError: they have another form.
-    """
+    """Return features as an array of the right form."""
     wanted = f"float32 of (rows, columns, {'d' if dim is None else dim})"
     try:
         array = np.asarray(unmasked(features))
@@ -70,11 +62,7 @@ def as_grid(features: Any, dim: int | None, who: str, frame: Frame) -> np.ndarra
 
 
 def given_features(features: Any, dim: int | None, frame: Frame) -> np.ndarray:
-    """Return a copy of the features that a program gives with a frame.
-
-    Raises:
-        BackendError: they have another form, are not finite, or not of unit length or zero.
-    """
+    """Return a copy of the features that a program gives with a frame."""
     who = "The features that were given are"
     grid = as_grid(features, dim, who, frame)
     require_unit(grid, who, frame)
@@ -98,11 +86,7 @@ def require_unit(features: np.ndarray, who: str, frame: Frame) -> None:
 
 
 def as_row(found: Any, dim: int, who: str, frame: Frame) -> Float32[np.ndarray, " d"]:
-    """Return the one feature of a picture.
-
-    Raises:
-        BackendError: it has another form, or is not finite.
-    """
+    """Return the one feature of a picture."""
     array = np.asarray(unmasked(found))
     row = array.reshape(-1) if array.ndim in (1, 2) else array
     if array.dtype.kind != "f" or row.shape != (dim,) or not np.isfinite(row).all():

@@ -59,12 +59,7 @@ class BuildPlan:
 
 
 def make_plan(recording: Recording, path: Path, encoders: Encoders, settings: BuildSettings) -> BuildPlan:
-    """Gather the ingredients and refuse what cannot be built.
-
-    Raises:
-        MapError: the recording has no frames, or the path is not a place for a map.
-        BackendError: a model is missing.
-    """
+    """Gather the ingredients and refuse what cannot be built."""
     if len(recording) == 0:
         raise MapError(f"{recording.path} has no frames with a pose; there is nothing to build a map from.")
     if not is_map_or_free(path):
@@ -113,9 +108,6 @@ def claim(plan: BuildPlan, resume: bool, overwrite: bool) -> MapInfo | None:
         plan: of the build.
         resume: keep what a stopped build had finished.
         overwrite: whether a finished map may be replaced.
-
-    Raises:
-        MapError: there is a finished map from something else, or a damaged one, and ``overwrite`` is not set.
     """
     there = None if overwrite else read_info(plan.path)
     if there is not None:
@@ -141,9 +133,6 @@ def require_unchanged(plan: BuildPlan, stamp: str) -> None:
     """Refuse to continue with a recording whose files were written since the build began.
 
     What was made of it is removed, since nobody knows which frames are old and which are new.
-
-    Raises:
-        MapError: the recording has changed.
     """
     if plan.recording.change_stamp() == stamp:
         return

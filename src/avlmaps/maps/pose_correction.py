@@ -42,9 +42,6 @@ class PoseCorrection:
             poses: (k, 4, 4) world_from_camera then, of the depth camera.
             known_s: stamps of the frames.
             known: the poses that they have now.
-
-        Raises:
-            MapError: there are none, they are no poses, or they are not of these frames.
         """
         stamps, given = _checked(stamps_s, poses)
         there = Trajectory(known_s, known)

@@ -260,11 +260,7 @@ def denoise(sound: Sound, profile: NoiseProfile, reduction_db: float = 12.0) -> 
 
 
 def denoise_blocks(blocks: Iterable[Sound], profile: NoiseProfile, reduction_db: float = 12.0) -> Iterator[Sound]:
-    """Take the background out of a long track block by block; how it is cut into blocks changes nothing.
-
-    Raises:
-        ValueError: a block has another rate than the profile.
-    """
+    """Take the background out of a long track block by block; how it is cut into blocks changes nothing."""
     size, hop = _sizes(profile.rate_hz)
     reach = _SMOOTH_FRAMES // 2  # frames of context that smoothing needs on either side
     late = size - hop  # the first output lies before the track

@@ -51,11 +51,6 @@ def detect_events(
 
     Returns:
         The sounds in the order of their onset; ``clips`` are files in ``clips_folder``.
-
-    Raises:
-        AudioError: the track cannot be read.
-        BackendError: the encoder's features are not what its card says, or it has none for each step and ``cut`` is
-            ``changes``.
     """
     clips_folder.mkdir(parents=True, exist_ok=True)
     if cuts_by_changes(encoder, settings):
@@ -72,11 +67,7 @@ def detect_events(
 
 
 def cuts_by_changes(encoder: SoundEncoder, settings: HearingSettings) -> bool:
-    """Return whether the track is divided at its change points, and not by its energy.
-
-    Raises:
-        BackendError: the settings want change points, and the encoder has no feature for each step.
-    """
+    """Return whether the track is divided at its change points, and not by its energy."""
     if isinstance(encoder, FrameSoundEncoder):
         return settings.cut != "energy"
     if settings.cut == "changes":
@@ -106,11 +97,7 @@ def feature_of(
     encoder: SoundEncoder,
     settings: HearingSettings,
 ) -> Float32[np.ndarray, "windows d"]:
-    """Return the features of one of the sounds that were found in a track, without the background.
-
-    Raises:
-        BackendError: they are not what the encoder's card says.
-    """
+    """Return the features of one of the sounds that were found in a track, without the background."""
     return _encoded(encoder, _cleaned(sound, track, found, index, settings))
 
 
@@ -242,9 +229,6 @@ class GrowingSounds:
         Args:
             encoder: gives sounds their features; without one the track is stored, and no sound is listed.
             settings: how.
-
-        Raises:
-            BackendError: the settings want change points, which the encoder does not give.
         """
         self._encoder, self._settings = encoder, settings
         self._by_changes = encoder is not None and cuts_by_changes(encoder, settings)
@@ -282,10 +266,6 @@ class GrowingSounds:
 
         Args:
             walk: where the robot was.
-
-        Raises:
-            AudioError: the samples cannot be read.
-            BackendError: the encoder's features are not what its card says.
         """
         with self._lock:
             track, powers = self.track, [*self._powers, self._stream.end()]

@@ -60,9 +60,6 @@ def segment(track: AudioTrack, settings: SegmentationSettings = _USUAL) -> list[
 
     Returns:
         Segments in the order of time, disjoint and within the track; none for a silent track.
-
-    Raises:
-        AudioError: the track cannot be read.
     """
     if settings.method == "silence":
         return _padded(list(_loud_runs(track, settings)), settings, 1.0 / track.rate_hz, track)
@@ -206,12 +203,7 @@ _USUAL_CHANGES = SoundChangeSettings()
 
 
 def frames_of_track(track: AudioTrack, encoder: FrameSoundEncoder) -> Float32[np.ndarray, "frames d"]:
-    """Return the feature of every step of a track, which is read a block at a time.
-
-    Raises:
-        AudioError: the track cannot be read.
-        BackendError: the encoder gives another number of features than its step promises, or none that are finite.
-    """
+    """Return the feature of every step of a track, which is read a block at a time."""
     hop_s = encoder.hop_s
     count = int(np.ceil(round(track.duration_s / hop_s, 6)))
     core, context = max(1, round(_ENCODED_S / hop_s)), round(_CONTEXT_S / hop_s)
@@ -275,10 +267,6 @@ def split_at_changes(
 def _gains(
     features: Float32[np.ndarray, "frames d"], ends: Int[np.ndarray, " e"], longest: int
 ) -> Float[np.ndarray, "e longest"]:
-    """Return the gain of a stretch from each start to each end: n·|mean|²; the last column starts one frame before.
-
-    Sums of squares are the same however a sequence is divided, so that what is saved is all that counts.
-    """
     first = max(0, int(ends[0]) - longest)
     sums = np.zeros((int(ends[-1]) - first + 1, features.shape[1]))
     np.cumsum(features[first : ends[-1]], axis=0, out=sums[1:])

@@ -179,11 +179,6 @@ class VoxelAccumulator:
 
         Returns:
             How many pixels were added.
-
-        Raises:
-            ValueError: the features have another shape.
-            RecordingError: the pose is not finite or too far away for the grid.
-            BackendError: features are NaN or infinite. The finite ones have been added by then.
         """
         cells, (feature_rows, feature_columns) = self._cells(features)
         lookup = self._lookup_for(frame.rig, feature_rows, feature_columns)
@@ -212,11 +207,7 @@ class VoxelAccumulator:
         return points
 
     def merge(self, part: VoxelSums) -> None:
-        """Add the sums of another part of the same recording, in any order; a memory-mapped part is streamed.
-
-        Raises:
-            MapError: its features have another length.
-        """
+        """Add the sums of another part of the same recording, in any order; a memory-mapped part is streamed."""
         self._table.add(part)
 
     def views_at(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:

@@ -94,11 +94,7 @@ class MovedSubmaps:
     """
 
     def __init__(self, submaps: Submaps, pose: Float64[np.ndarray, "f 4 4"], grid: GridSpec) -> None:
-        """Add up what is no feature.
-
-        Raises:
-            MapError: the poses lie too far from the world's origin for voxels.
-        """
+        """Add up what is no feature."""
         self._submaps, self._table = submaps, VoxelTable(0)
         moved = (pose @ inverse(np.asarray(submaps.fused_pose)))[:, :3]
         moved[:, :, 3] /= grid.voxel_size_m

@@ -130,11 +130,7 @@ class VoxelTable:
             self.slots = hash_of(self.index[: self.count], 1 << (4 * needed - 1).bit_length())
 
     def add(self, part: VoxelSums) -> None:
-        """Add the sums of a part, block by block, so that a memory-mapped part is never whole in memory.
-
-        Raises:
-            MapError: its features have another length.
-        """
+        """Add the sums of a part, block by block, so that a memory-mapped part is never whole in memory."""
         if part.feature_sum.shape[1] != self.dim:
             raise MapError(
                 f"The part's features have {part.feature_sum.shape[1]} numbers and this map's {self.dim}; "

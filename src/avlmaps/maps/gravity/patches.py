@@ -153,12 +153,6 @@ def _blocks(frame: Frame) -> tuple[Pinhole, Float[np.ndarray, "h w"]]:
 def _planes(
     inverse_depth: Float[np.ndarray, "h w"], x: Float[np.ndarray, " w"], y: Float[np.ndarray, " h"]
 ) -> tuple[Float[np.ndarray, "hs ws"], Float[np.ndarray, "hs ws 3"]]:
-    """Fit a plane to each three by three blocks, least squares.
-
-    Returns:
-        The inverse depth of each plane on the ray of its middle block, 1/m (NaN where a block is missing), and its
-        unit normal in the camera's frame, which points away from the camera.
-    """
     h, w = inverse_depth.shape
     if h < 3 or w < 3:
         return np.zeros((0, 0)), np.zeros((0, 0, 3))

@@ -48,9 +48,6 @@ def find_up(frames: Iterable[Frame], rng: np.random.Generator) -> Up:
     Args:
         frames: spread over the recording, some ten or more; one after the other is held in memory.
         rng: draws the normals.
-
-    Raises:
-        RecordingError: too little surface within 4 m to find up.
     """
     normals: list[Float[np.ndarray, "n 3"]] = []
     rotations: list[Float[np.ndarray, "3 3"]] = []
@@ -107,10 +104,6 @@ def _most_shared(
 
 
 def _refined(direction: Float[np.ndarray, "3"], normals: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"]:
-    """Return the direction that the normals near it run along and those across it, of walls, run across most exactly.
-
-    It is the first eigenvector of the difference of both groups' scatter, taken again with a narrowing cone.
-    """
     for cone_rad in (NEAR_RAD, NEAR_RAD, REFINED_RAD, REFINED_RAD, REFINED_RAD):
         along = np.abs(normals @ direction)
         level, upright = normals[along > np.cos(cone_rad)], normals[along < np.sin(cone_rad)]

@@ -51,11 +51,7 @@ class DescribedKeyframe:
 def describe_keyframe(
     frame: Frame, encoders: Encoders, settings: KeyframeSettings = DEFAULT_KEYFRAMES
 ) -> DescribedKeyframe:
-    """Run encoders on one frame; its place is described later.
-
-    Raises:
-        BackendError: an encoder fails, or gives something else than its protocol says.
-    """
+    """Run encoders on one frame; its place is described later."""
     with perceiving("An encoder of keyframes", frame.name):
         local = encoders.local.encode(frame.rgb.copy()) if Kind.LOCAL in encoders else _no_features()
         local = replace(local, descriptors=local.descriptors.astype(np.float16).astype(np.float32))  # as it is stored
@@ -223,11 +219,7 @@ class KeyframeAlbum:
         return len(self._seen)
 
     def add(self, frame: Frame) -> None:
-        """Describe a frame.
-
-        Raises:
-            BackendError: an encoder fails, or gives something else than its protocol says; the frame is left out.
-        """
+        """Describe a frame."""
         seen = describe_keyframe(frame, self._encoders, self._settings)
         if Kind.PLACE in self._encoders and Kind.LOCAL in self._encoders:
             with perceiving("The place encoder", frame.name):
@@ -259,9 +251,6 @@ class KeyframeAlbum:
         Args:
             rng: for what the place encoder learns.
             final: learn places again; else only where enough has come since.
-
-        Raises:
-            BackendError: the place encoder fails, or gives something else than its protocol says.
         """
         known = final and self._learnt_from != len(self._seen)
         if self._stacked is not None and not known:

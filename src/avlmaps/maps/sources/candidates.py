@@ -108,10 +108,6 @@ def _means(point: Float[np.ndarray, "n 3"], cell: Int[np.ndarray, "n 3"]) -> Flo
 def _columns(
     floor: Float[np.ndarray, "n 3"], ear_m: Float[np.ndarray, "e 3"]
 ) -> tuple[Float[np.ndarray, "k 2"], Float[np.ndarray, " k"]]:
-    """Return the middle of each column of air over the floor, and how high the lowest surface in it lies.
-
-    Where the robot was there is floor, though its camera may not have seen it.
-    """
     cell = np.floor(floor[:, :2] / _AIR_CELL_M).astype(np.int64)
     _, first, which = np.unique(_keys(cell), return_index=True, return_inverse=True)
     column, lowest = cell[first], np.full(len(first), np.inf)

@@ -202,9 +202,6 @@ def loudest_of_sound(
     """Return the frames of a sound that say most of those at which the robot's place is known; perhaps none.
 
     At most ``longest_s`` of the sound are read, and ``most`` frames chosen; ``smoothing`` of their curves is in steps.
-
-    Raises:
-        AudioError: the track cannot be read.
     """
     onset_s, offset_s = span_s
     begin_s = max(onset_s - _BEFORE_S, track.start_s)
@@ -343,9 +340,6 @@ def signs_along(
     """Return the sign of each channel by some sounds along a walk; 1 for all of two channels, or of very many.
 
     The candidates ``place_m`` are in the frame of the walk's poses; the spans are onset and offset of sounds.
-
-    Raises:
-        AudioError: the track cannot be read.
     """
     plain = np.ones(len(microphones))
     if not 3 <= len(microphones) <= MOST_MICROPHONES:  # the delay of a single pair fits somewhere either way

@@ -67,9 +67,6 @@ def evidence_of(
 
     The walk's poses are of the level frame, the span is onset and offset; ``signs`` has -1 for a channel that is wired
     the other way round.
-
-    Raises:
-        AudioError: the track cannot be read.
     """
     onset_s, offset_s = span_s[0], min(span_s[1], span_s[0] + _LONGEST_S)
     begin_s = max(onset_s - BEFORE_S, track.start_s)
@@ -222,9 +219,6 @@ def find_sources(
         spans_s: onset and offset of each sound, the recording's time.
         voxel_m: middles of the map's voxels, world.
         up_in_world: unit vector.
-
-    Raises:
-        AudioError: the track cannot be read.
     """
     found = find_among(track, walk, spans_s, voxel_m, up_in_world, signs_by_s=spans_s)
     return None if found is None else found.evidence
@@ -245,9 +239,6 @@ def find_among(
 
     The signs of the channels are found by the sounds of ``signs_by_s``, unless ``signs`` gives them. ``others`` is what
     other sounds of the drive say of the device (``FoundSources.of_device``).
-
-    Raises:
-        AudioError: the track cannot be read.
     """
     microphones, directions = track.microphones, track.directions
     if (microphones is None and directions is None) or not len(spans_s) or not len(voxel_m):
@@ -358,11 +349,7 @@ class GrowingSources:
         self.forget()
 
     def add_directions(self, said: DirectionTrack) -> None:
-        """Take directions that are later than those before. Another thread may do it.
-
-        Raises:
-            RecordingError: they are not.
-        """
+        """Take directions that are later than those before. Another thread may do it."""
         if not len(said):
             return
         with self._lock:
@@ -497,11 +484,7 @@ class GrowingSources:
 
 
 def require_fit(microphones: Microphones | None, channels: int) -> None:
-    """Refuse a piece of sound whose channels are not those of the microphones.
-
-    Raises:
-        AudioError: there are more or fewer.
-    """
+    """Refuse a piece of sound whose channels are not those of the microphones."""
     if microphones is not None and channels != len(microphones):
         raise AudioError(
             f"A piece of sound has {channels} channel(s), but {len(microphones)} microphone(s) are described; give one "

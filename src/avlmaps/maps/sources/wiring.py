@@ -65,11 +65,7 @@ class Wiring:
 
 
 def check_wiring(track: AudioTrack, walk: Trajectory, spans_s: Sequence[tuple[float, float]]) -> Wiring | None:
-    """Compare delays between channels, sound by sound along a drive, with the geometry; None for too few sounds.
-
-    Raises:
-        AudioError: the track cannot be read.
-    """
+    """Compare delays between channels, sound by sound along a drive, with the geometry; None for too few sounds."""
     array = track.microphones
     if array is None or not 2 <= len(array) <= MOST_MICROPHONES:
         return None

@@ -309,11 +309,6 @@ def _manifest(path: Path) -> bytes:
 
 
 def _info(path: Path, content: bytes) -> MapInfo:
-    """Return what ``map.json`` says, of this schema or the one before.
-
-    Raises:
-        MapError: it is no such JSON, of no map, or of another schema.
-    """
     where = path / MANIFEST
     try:
         ident: _Ident = decode_json(content, _Ident)

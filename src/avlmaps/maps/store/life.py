@@ -114,11 +114,7 @@ def life_arrays(life: Life) -> dict[str, np.ndarray]:
 
 
 def read_life(arrays: Mapping[str, np.ndarray], where: str, visits: int | None = None) -> Life:
-    """Return what ``life_arrays`` gave; ``visits`` is how many the map has, where that is known.
-
-    Raises:
-        MapError: they are not of this form, or contradict each other.
-    """
+    """Return what ``life_arrays`` gave; ``visits`` is how many the map has, where that is known."""
     try:
         stays = msgspec.json.decode(np.asarray(arrays["stays"], np.uint8).tobytes(), type=tuple[Stay, ...])
         life = Life(stays, np.asarray(arrays["offsets"], np.int64), np.asarray(arrays["index"], np.int32))

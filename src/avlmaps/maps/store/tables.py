@@ -72,11 +72,7 @@ def refuse_links(folder: Path) -> None:
 
 
 def write_arrays(path: Path, arrays: Mapping[str, np.ndarray], note: str = "") -> None:
-    """Write arrays, and a note, as one file; its folder must be there.
-
-    Raises:
-        OSError: it cannot be written; what was there before is.
-    """
+    """Write arrays, and a note, as one file; its folder must be there."""
     from safetensors import SafetensorError
     from safetensors.numpy import save_file  # pyright: ignore[reportUnknownVariableType]
 
@@ -95,11 +91,7 @@ def write_arrays(path: Path, arrays: Mapping[str, np.ndarray], note: str = "") -
 
 
 def read_arrays(path: Path) -> tuple[dict[str, np.ndarray], str]:
-    """Return the arrays of a file by name, the large ones memory-mapped, and its note.
-
-    Raises:
-        MapError: it is missing, damaged, or cannot be read.
-    """
+    """Return the arrays of a file by name, the large ones memory-mapped, and its note."""
     from safetensors import SafetensorError, safe_open
 
     try:
@@ -150,11 +142,7 @@ def fields_of(whole: object, prefix: str = "") -> dict[str, np.ndarray]:
 
 
 def as_kind(kind: type[T], arrays: Mapping[str, np.ndarray], where: Path, prefix: str = "", **others: Any) -> T:
-    """Return the dataclass of these arrays; one that has a default may be missing.
-
-    Raises:
-        MapError: one is missing, or their types and sizes are not those that the dataclass declares.
-    """
+    """Return the dataclass of these arrays; one that has a default may be missing."""
     of: Any = kind
     fields: dict[str, Any] = {field.name: field for field in dataclasses.fields(of)}
     found, sizes = dict[str, np.ndarray](), dict[str, int]()
@@ -228,9 +216,6 @@ def lock_folder(folder: Path, name: str = LOCK) -> Generator[None]:
     Args:
         folder: the map's.
         name: ``LOCK`` of a build, ``EDITING`` of its edits, which need not wait for a build.
-
-    Raises:
-        MapError: another process holds it, the folder cannot be written, or holds a link to another folder.
     """
     refuse_links(folder)
     with explain_write_errors(folder, _UNWRITTEN[name]):
