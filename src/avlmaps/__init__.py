@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     )
     from avlmaps.core.question import Modality, Part, Question, Role
     from avlmaps.live.live_map import LiveMap
-    from avlmaps.live.settings import LiveSettings
+    from avlmaps.live.status import LiveSettings
     from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
     from avlmaps.navigate.bodies import BodyShape
     from avlmaps.navigate.skills import Robot
@@ -66,7 +66,7 @@ _HOMES = {
         "RecordingError",
         "core.question": "Modality Part Question Role",
         "live.live_map": "LiveMap",
-        "live.settings": "LiveSettings",
+        "live.status": "LiveSettings",
         "maps.settings": "BuildSettings FrameSettings FusionSettings",
         "navigate.bodies": "BodyShape",
         "navigate.skills": "Robot",

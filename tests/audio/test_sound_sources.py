@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.maps.sources.candidates import CELL_M, Walls, candidates_of
+from avlmaps.maps.sources.candidates import CELL_M, CandidateGrid, Density, Spread, Walls, candidates_of, log_same_place
 from avlmaps.maps.sources.correlation import SPEED_M_S, SourceSettings, correlate, levels_db, steer, unknown_offset
-from avlmaps.maps.sources.density import CandidateGrid, Density, Spread, log_same_place
 from avlmaps.maps.sources.find import carry_evidence
 from avlmaps.maps.types import SourceEvidence
 

@@ -11,7 +11,7 @@ import pytest
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AvlmapsError, MapError
 from avlmaps.core.numbers import as_number, as_whole
-from avlmaps.live.settings import LiveSettings
+from avlmaps.live.status import LiveSettings
 from avlmaps.maps.audio.settings import HearingSettings, SegmentationSettings
 from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.maps.settings import BuildSettings, FrameSettings

@@ -11,8 +11,7 @@ import pytest
 from avlmaps.maps.build import build_map
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.folder import read, write
-from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.store.reader import encoders_of_map
+from avlmaps.maps.store.map_data import MapData, encoders_of_map
 from avlmaps.maps.types import Keyframes, Voxels
 from avlmaps.perception.embedded.pixels import features_of
 from avlmaps.recordings.open import open_recording

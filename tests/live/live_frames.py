@@ -9,7 +9,7 @@ import numpy as np
 
 import avlmaps
 from avlmaps.live.live_map import LiveMap
-from avlmaps.live.settings import LiveSettings
+from avlmaps.live.status import LiveSettings
 
 ENCODERS = avlmaps.Encoders.named("colours")
 CAMERA = avlmaps.Pinhole(80.0, 80.0, 40.0, 30.0, 80, 60)

@@ -8,9 +8,8 @@ import numpy as np
 from live_frames import ENCODERS, EVERY, UP, add, frame, wait_for
 
 import avlmaps
-from avlmaps.live.gates import Gates
-from avlmaps.live.live_map import LiveMap
-from avlmaps.live.settings import LiveSettings
+from avlmaps.live.live_map import Gates, LiveMap
+from avlmaps.live.status import LiveSettings
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.settings import BuildSettings, GravitySettings
 

@@ -20,8 +20,7 @@ from avlmaps.core.errors import AudioError, BackendError, MapError, RecordingErr
 from avlmaps.live import live_map
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import tell_doubts
-from avlmaps.live.settings import LiveSettings
-from avlmaps.live.status import Tally
+from avlmaps.live.status import LiveSettings, Tally
 from avlmaps.maps.build import build_map
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.settings import BuildSettings, FrameSettings, GravitySettings
@@ -402,7 +401,7 @@ import os, sys
 sys.path[:0] = {path!r}
 from live_frames import ENCODERS, UP, add, frame
 from avlmaps.live.live_map import LiveMap
-from avlmaps.live.settings import LiveSettings
+from avlmaps.live.status import LiveSettings
 from avlmaps.live.status import Tally
 chosen = LiveSettings(first_frames=2, snapshot_s=0.0, save_s=0.0, new_share=0.0)
 for folder in sys.argv[1:]:

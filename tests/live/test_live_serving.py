@@ -14,7 +14,7 @@ from starlette.testclient import TestClient
 
 from avlmaps.cli.live import LiveFeed, live_source
 from avlmaps.live.live_map import LiveMap
-from avlmaps.live.settings import LiveSettings
+from avlmaps.live.status import LiveSettings
 from avlmaps.maps.store.folder import read
 from avlmaps.serve.app import create_app
 from avlmaps.serve.service import Service

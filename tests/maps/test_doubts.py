@@ -15,9 +15,9 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.timeline import Trajectory
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import end_drive, replay
-from avlmaps.live.settings import LiveSettings
+from avlmaps.live.status import LiveSettings
 from avlmaps.maps.build import build_map
-from avlmaps.maps.check import doubts_of_channels, judge
+from avlmaps.maps.estimate import doubts_of_channels, judge
 from avlmaps.maps.finish import carving_doubts
 from avlmaps.maps.store.folder import read
 from avlmaps.maps.store.manifest import Removed

@@ -13,8 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.maps.gravity.floor import USUAL_HEIGHT_M, Expected, FoundFloor, FoundGround, find_ground, ground_of_sights
-from avlmaps.maps.gravity.patches import Sight, sight_of
+from avlmaps.maps.gravity.floor import (
+    USUAL_HEIGHT_M,
+    Expected,
+    FoundFloor,
+    FoundGround,
+    Sight,
+    find_ground,
+    ground_of_sights,
+    sight_of,
+)
 from avlmaps.recordings.types import Frame
 from helpers.filmed_rooms import (
     UP,

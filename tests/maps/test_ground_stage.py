@@ -15,8 +15,7 @@ from avlmaps.maps.estimate import estimate_ground, ground_notices
 from avlmaps.maps.settings import DEFAULTS, BuildSettings, GravitySettings
 from avlmaps.maps.store.folder import read
 from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, UpInfo
-from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.store.reader import describe
+from avlmaps.maps.store.map_data import MapData, describe
 from avlmaps.recordings.types import BaseHeight, Frame, Recording
 from helpers.filmed_rooms import RIG, UP, film, office
 

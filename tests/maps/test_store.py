@@ -26,7 +26,7 @@ from avlmaps.maps.build import build_map
 from avlmaps.maps.store import folder, tables
 from avlmaps.maps.store.edits import read_edits
 from avlmaps.maps.store.folder import damaged_files, has_unfinished_build, read, write
-from avlmaps.maps.store.reader import encoders_of_map, require_model
+from avlmaps.maps.store.map_data import encoders_of_map, require_model
 from avlmaps.maps.store.tables import EDITING, LOCK, is_locked, lock_folder, read_arrays, write_arrays
 from avlmaps.maps.types import Keyframes, Voxels
 

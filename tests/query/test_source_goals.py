@@ -13,7 +13,7 @@ from avlmaps.core.question import HeardAt, Modality, Part, Role
 from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.sentence import Attachments
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.sources.density import Spread
+from avlmaps.maps.sources.candidates import Spread
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.answer import PartAnswer, absent_text, found_text
 from avlmaps.query.avlmap import AVLMap

@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 from avlmaps.cli.things import Things
 from avlmaps.core.errors import QueryError
-from avlmaps.maps.sources.density import Spread
+from avlmaps.maps.sources.candidates import Spread
 from avlmaps.maps.store.life import Life, Stay
 from avlmaps.maps.store.manifest import Visit
 from avlmaps.query.avlmap import AVLMap

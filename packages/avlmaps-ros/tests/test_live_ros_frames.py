@@ -17,7 +17,7 @@ from live_frames import ENCODERS, UP, frame
 
 from avlmaps.core.errors import BackendError, RecordingError
 from avlmaps.live.live_map import LiveMap
-from avlmaps.live.settings import LiveSettings
+from avlmaps.live.status import LiveSettings
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.channels import ChannelSound
 from avlmaps.recordings.formats.ros_messages import RosTopics

@@ -88,7 +88,7 @@ def describe_path(
 
 
 def _consistency(recording: "Recording") -> dict[str, Any] | None:
-    from avlmaps.maps.check import judge
+    from avlmaps.maps.estimate import judge
 
     try:
         verdict = judge(recording, closely=True)

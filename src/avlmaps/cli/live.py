@@ -73,7 +73,7 @@ class Live(Building):
 def _live(verb: Live) -> dict[str, Any]:
     from avlmaps.live.live_map import SPARSE, LiveMap
     from avlmaps.live.replay import end_drive
-    from avlmaps.live.settings import LiveSettings
+    from avlmaps.live.status import LiveSettings
     from avlmaps.maps.settings import BuildSettings
 
     begin_s = perf_counter()
@@ -183,7 +183,7 @@ def _recording(verb: Live) -> _Source:
 
 def _robot(verb: Live) -> _Source:
     """Return what gives the frames of a running robot; z is up in ROS's world (REP 103), and its stamps are dates."""
-    from avlmaps.live.sources import join_source
+    from avlmaps.live.replay import join_source
 
     if verb.recording is not None or verb.as_fast_as_possible or verb.rate != 1.0 or verb.format != "auto":
         raise UsageError(

@@ -1,17 +1,51 @@
-"""A recording that is played into a live map, at its own pace or as fast as the map takes it."""
+"""A recording that is played into a live map, at its own pace or as fast as the map takes it; other sources."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Protocol
 
-from avlmaps.core.errors import RecordingError
+from avlmaps.core.errors import BackendError, RecordingError
+from avlmaps.core.extras import how_to_get
 from avlmaps.core.progress import progress, say
+from avlmaps.core.registry import brought, entry_points
 from avlmaps.live.growing_folder import growing_frames, is_being_written
 from avlmaps.live.live_map import LiveMap
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import read_channels
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame, Recording
+
+ENTRY_POINT_GROUP = "avlmaps.live_sources"
+
+
+class LiveSource(Protocol):
+    """What gives a live map frames and sound; z is up in its world, and its stamps are dates."""
+
+    def play(self, live: "LiveMap", give_up_s: float, over: Callable[[], bool]) -> None:
+        """Give a live map frames until it is over, or none came for some seconds.
+
+        Raises:
+            RecordingError: no frame came at all.
+        """
+        ...
+
+
+def join_source(kind: str, topics: Mapping[str, str]) -> LiveSource:
+    """Join a source.
+
+    Args:
+        kind: ``ros2``.
+        topics: names by what they are for; the others are found.
+
+    Raises:
+        RecordingError: a topic is for nothing that is known.
+        BackendError: the package that brings it, or what that needs, is not installed.
+    """
+    for entry in entry_points(ENTRY_POINT_GROUP):
+        if entry.name == kind:
+            return brought(entry, "the source")(topics)
+    raise BackendError(f"The source {kind} needs a package of its own; get it with: {how_to_get('sources', kind)}")
 
 
 def replay(

@@ -16,8 +16,7 @@ from avlmaps.core.machine import run_ahead
 from avlmaps.core.progress import progress, silence_progress
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
-from avlmaps.maps.check import doubts_of
-from avlmaps.maps.estimate import Start
+from avlmaps.maps.estimate import Start, doubts_of
 from avlmaps.maps.frame_sums import bad_frames, load_state, save_state
 from avlmaps.maps.gravity.floor import GroundedRecording
 from avlmaps.maps.mapper import Mapper

@@ -26,8 +26,7 @@ from avlmaps.maps.hearing import locate_sources
 from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.manifest import MapBounds, Removed, Timings, UpInfo
-from avlmaps.maps.store.map_data import Finds, MapData, find_nothing
-from avlmaps.maps.store.reader import encoders_of_map
+from avlmaps.maps.store.map_data import Finds, MapData, encoders_of_map, find_nothing
 from avlmaps.maps.store.tables import lock_folder
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps
 from avlmaps.recordings.types import Recording

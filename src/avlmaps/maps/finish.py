@@ -22,7 +22,7 @@ from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts, clean
 from avlmaps.maps.plan import strip_folder
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store import manifest
-from avlmaps.maps.store.reader import GIVEN_FEATURES
+from avlmaps.maps.store.map_data import GIVEN_FEATURES
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.recordings.types import Recording
 

@@ -19,7 +19,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.audio.events import GrowingSounds, WalkedTrack, collect, detect_events
 from avlmaps.maps.audio.settings import HearingSettings
-from avlmaps.maps.check import doubts_of_channels
+from avlmaps.maps.estimate import doubts_of_channels
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.sources.find import GrowingSources, require_fit
 from avlmaps.maps.store.folder import read

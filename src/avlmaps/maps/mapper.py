@@ -20,8 +20,7 @@ from avlmaps.core.progress import silence_progress
 from avlmaps.core.registry import Kind
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.audio.events import WalkedTrack
-from avlmaps.maps.check import doubts_of_walk
-from avlmaps.maps.estimate import Start, estimate_ground, estimate_up
+from avlmaps.maps.estimate import Start, doubts_of_walk, estimate_ground, estimate_up
 from avlmaps.maps.finish import (
     About,
     Merged,

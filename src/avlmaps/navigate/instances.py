@@ -15,7 +15,7 @@ from avlmaps.query.goals import ALIKE, Goal
 from avlmaps.query.heatmap import Heatmap
 
 if TYPE_CHECKING:
-    from avlmaps.maps.sources.density import Spread
+    from avlmaps.maps.sources.candidates import Spread
 
 _MOST_GOALS = 30
 

@@ -105,13 +105,13 @@ class AVLMap:
     @cached_property
     def encoders(self) -> "Encoders":
         """The models that it is asked with; those that it names need not be known here until they are used."""
-        from avlmaps.maps.store.reader import encoders_of_map
+        from avlmaps.maps.store.map_data import encoders_of_map
 
         return self._encoders or encoders_of_map(self.data.info)
 
     def require_model(self, kind: Kind) -> None:
         """Raise ``MapError`` unless its encoder of a kind is the one that made its features."""
-        from avlmaps.maps.store.reader import require_model
+        from avlmaps.maps.store.map_data import require_model
 
         require_model(self.data.info, self.encoders, kind, self.path)
 

@@ -18,7 +18,7 @@ from avlmaps.query.scores import share
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
-    from avlmaps.maps.sources.density import Spread
+    from avlmaps.maps.sources.candidates import Spread
 
 # Scores are products of float32 vectors of unit length. Their last digits depend on the order of summation, which
 # depends on the processor and on how many vectors are multiplied at once; a difference below this means nothing.

@@ -31,7 +31,7 @@ from avlmaps.core.question import Modality
 from avlmaps.query.factors import Factor, NearAnchors, NearThings, lead_of
 
 if TYPE_CHECKING:
-    from avlmaps.maps.sources.density import Spread
+    from avlmaps.maps.sources.candidates import Spread
     from avlmaps.query.schema import GoalAnswer
 
 # Log-odds beyond these are no better known: a confidence of 0.98 and one of 0.998 are alike.

@@ -221,7 +221,7 @@ def map_answer(avlmap: AVLMap, note: Callable[[AvlmapsError], object] = lambda _
 
     ``note``: is given the error where the sounds have no names since their model is not here.
     """
-    from avlmaps.maps.store.reader import describe
+    from avlmaps.maps.store.map_data import describe
     from avlmaps.query.settings import rules_of
 
     described = describe(avlmap.path, avlmap.data)

@@ -15,8 +15,8 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.maps.sources.candidates import CandidateGrid, Density, Spread, log_same_place
 from avlmaps.maps.sources.correlation import SourceSettings
-from avlmaps.maps.sources.density import CandidateGrid, Density, Spread, log_same_place
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.contents import Thing
 from avlmaps.query.voxel_space import Space

@@ -17,7 +17,7 @@ from avlmaps.query.naming import VoxelNamer
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from avlmaps.maps.sources.density import CandidateGrid
+    from avlmaps.maps.sources.candidates import CandidateGrid
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Room, SoundEvent, Thing
     from avlmaps.view.layout import Layout

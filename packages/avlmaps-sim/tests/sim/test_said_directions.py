@@ -9,7 +9,7 @@ import pytest
 from avlmaps.core.errors import RecordingError
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import replay
-from avlmaps.live.settings import LiveSettings
+from avlmaps.live.status import LiveSettings
 from avlmaps.maps.build import build_map
 from avlmaps.maps.hearing import take_device
 from avlmaps.maps.store.folder import read

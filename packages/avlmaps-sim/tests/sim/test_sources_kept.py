@@ -13,10 +13,10 @@ from avlmaps.core.poses import apply
 from avlmaps.days.merge import joined_sources, merge_maps
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import replay
-from avlmaps.live.settings import LiveSettings
+from avlmaps.live.status import LiveSettings
 from avlmaps.maps.corrected import correct_map
+from avlmaps.maps.sources.candidates import CandidateGrid, Density
 from avlmaps.maps.sources.correlation import SourceSettings
-from avlmaps.maps.sources.density import CandidateGrid, Density
 from avlmaps.maps.store.folder import write
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.avlmap import AVLMap

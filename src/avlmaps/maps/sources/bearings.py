@@ -15,9 +15,8 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.candidates import Candidates, Legs, Walls
+from avlmaps.maps.sources.candidates import CandidateGrid, Candidates, Legs, Walls
 from avlmaps.maps.sources.correlation import SourceSettings
-from avlmaps.maps.sources.density import CandidateGrid
 from avlmaps.recordings.directions import DirectionTrack
 
 _BINS = 120  # of 3 degrees: residuals of angles, and offsets

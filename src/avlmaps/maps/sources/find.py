@@ -17,7 +17,15 @@ from avlmaps.core.poses import apply, from_rotation, rotation_to_level
 from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.bearings import BearingEvidence, Bearings, evidence_of_bearings, expected_alone
-from avlmaps.maps.sources.candidates import Candidates, Legs, Walls, candidates_of
+from avlmaps.maps.sources.candidates import (
+    CandidateGrid,
+    Candidates,
+    Density,
+    Legs,
+    Walls,
+    candidates_of,
+    log_same_place,
+)
 from avlmaps.maps.sources.correlation import (
     Correlations,
     SourceSettings,
@@ -27,7 +35,6 @@ from avlmaps.maps.sources.correlation import (
     signs_along,
     unknown_offset,
 )
-from avlmaps.maps.sources.density import CandidateGrid, Density, log_same_place
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import read_channels

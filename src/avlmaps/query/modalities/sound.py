@@ -11,7 +11,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import AudioError, QueryError
 from avlmaps.core.question import Part, Role
-from avlmaps.maps.sources.density import RIGHT_M, Spread
+from avlmaps.maps.sources.candidates import RIGHT_M, Spread
 from avlmaps.maps.types import HeardSounds
 from avlmaps.query.factors import NearAnchors, stretch_scores
 from avlmaps.query.settings import FOUND_AT, HeatSettings, SoundSettings

@@ -5,7 +5,7 @@ from math import radians
 from typing import Any
 
 from avlmaps.core.motion import wrap_angle
-from avlmaps.live.patience import Once
+from avlmaps.live.growing_folder import Once
 from avlmaps.recordings.formats.ros_messages import stamp_of
 from avlmaps.recordings.formats.ros_sound import BEYOND_A_TURN_RAD, angle_of
 

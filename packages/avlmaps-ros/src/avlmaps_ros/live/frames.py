@@ -14,7 +14,7 @@ import numpy as np
 from avlmaps.core.arrays import Float32, Float64, UInt8
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.live.patience import Once
+from avlmaps.live.growing_folder import Once
 from avlmaps.recordings.formats.ros_messages import (
     PAIRING_TOLERANCE_S,
     camera_of,

@@ -7,7 +7,7 @@ import numpy as np
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.wording import option
-from avlmaps.live.patience import Once
+from avlmaps.live.growing_folder import Once
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.channels import ChannelSound
 from avlmaps.recordings.formats.ros_messages import stamp_of

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 from avlmaps.core.errors import AudioError, BackendError, RecordingError
 from avlmaps.core.progress import say
 from avlmaps.core.wording import option
+from avlmaps.live.growing_folder import Once, Patience
 from avlmaps.live.live_map import LiveMap
-from avlmaps.live.patience import Once, Patience
 from avlmaps.live.replay import tell_doubts
 from avlmaps.recordings.formats.ros_messages import RosTopics, stamp_of
 from avlmaps.recordings.formats.ros_sound import Pcm

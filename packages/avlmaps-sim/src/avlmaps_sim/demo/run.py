@@ -61,7 +61,7 @@ def run_demo(
         MapError: the folder holds something that is not a demonstration.
     """
     from avlmaps.maps.build import build_map
-    from avlmaps.maps.store.reader import describe
+    from avlmaps.maps.store.map_data import describe
     from avlmaps.query.avlmap import AVLMap, with_findings
     from avlmaps_sim.demo.drive import drive
     from avlmaps_sim.demo.evidence import Evidence

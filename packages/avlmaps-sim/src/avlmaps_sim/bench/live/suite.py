@@ -21,8 +21,7 @@ from avlmaps.core.progress import say
 from avlmaps.core.wording import option
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import Ears
-from avlmaps.live.settings import LiveSettings
-from avlmaps.live.status import LiveStatus
+from avlmaps.live.status import LiveSettings, LiveStatus
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.perception.encoders import Encoders

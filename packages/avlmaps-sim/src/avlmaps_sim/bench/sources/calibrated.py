@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.calibrate import ArrayCalibration, calibrate
+from avlmaps.maps.sources.candidates import CandidateGrid, Density
 from avlmaps.maps.sources.correlation import SourceSettings
-from avlmaps.maps.sources.density import CandidateGrid, Density
 from avlmaps.maps.sources.find import find_sources
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import ChannelSound, with_microphones, write_channels
