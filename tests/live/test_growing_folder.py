@@ -12,7 +12,7 @@ from live_frames import ENCODERS, UP, frame
 import avlmaps
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.timeline import Trajectory
-from avlmaps.live import patience
+from avlmaps.live import growing_folder
 from avlmaps.live.growing_folder import growing_frames, is_being_written
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import follow
@@ -61,7 +61,7 @@ def test_poses_at_their_own_rate_replace_those_of_frames_behind_a_follower(tmp_p
 def test_a_writer_that_stalls_or_stops_is_said_and_what_came_is_mapped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(patience, "STALLED_S", 0.1)
+    monkeypatch.setattr(growing_folder, "STALLED_S", 0.1)
     writer = avlmaps.RecordingWriter(tmp_path / "rec", frame(0).rig, np.array(UP))
     writer.__enter__()
     for number in range(4):

@@ -310,7 +310,7 @@ def test_a_sound_has_its_name_before_its_source_is_found(tmp_path: Path, monkeyp
     def snapshot_with(is_so: Callable[[MapData], bool]) -> AVLMap:
         until_s = time.monotonic() + 20.0
         while time.monotonic() < until_s:
-            if live.generation and is_so(live.map):
+            if live.generation and is_so(live.map.data):
                 return live.map
             time.sleep(0.01)
         raise AssertionError("no such snapshot was published")
@@ -333,7 +333,7 @@ def test_a_sound_has_its_name_before_its_source_is_found(tmp_path: Path, monkeyp
         with pytest.raises(avlmaps.QueryError, match="1 wait; ask again in a moment"):
             named.sources()
         may_locate.set()
-        located = snapshot_with(lambda stored: len(stored.sounds) == 1 and not stored.data.sources_wait)
+        located = snapshot_with(lambda stored: len(stored.sounds) == 1 and not stored.sources_wait)
         assert len(located.sources()) == 1 and not located.ask("where does the last sound come from?").notes
     sources = live.map.data.sources
     assert sources is not None and len(sources) == 1 and sources.heard.any()

@@ -3,7 +3,7 @@
 import pytest
 
 from avlmaps.core.errors import BackendError
-from avlmaps.live import sources
+from avlmaps.live import replay as sources
 from avlmaps.navigate import real_robots
 
 
