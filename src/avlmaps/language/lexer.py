@@ -282,11 +282,6 @@ def is_unit(tokens: Sequence[Token], at: int) -> bool:
     return at < len(tokens) and any(_unit(list(tokens), at, units) for units in (LENGTHS, _ANGLES, _TIMES))
 
 
-def is_measure(tokens: list[Token], at: int) -> bool:
-    """Return whether a distance, an angle or a time begins at a token."""
-    return any(read(tokens, at) for read in (length_at, angle_at, duration_at))
-
-
 def is_amount(tokens: Sequence[Token], at: int) -> bool:
     """Return whether a distance, an angle, a time or a clock direction begins at a token."""
     words = list(tokens)
