@@ -20,17 +20,17 @@ timing.use_one_thread()
 
 import cv2  # noqa: E402
 import numpy as np  # noqa: E402
-from avlmaps_sim.bench.harness.intervals import in_percent, wilson  # noqa: E402
 
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
 from avlmaps.core.columns import concat  # noqa: E402
 from avlmaps.core.poses import inverse, rotation_angle_rad  # noqa: E402
 from avlmaps.maps.types import Keyframes  # noqa: E402
 from avlmaps.perception.encoders import Encoders  # noqa: E402
-from avlmaps.query.locate import LocateSettings, locate  # noqa: E402
+from avlmaps.query.locate import LocatableMap, LocateSettings, locate  # noqa: E402
 from avlmaps.recordings.open import open_recording  # noqa: E402
 from avlmaps.recordings.types import Recording, Subset  # noqa: E402
-from avlmaps_sim.bench.locate import MapOfPictures, map_of  # noqa: E402
+from avlmaps_sim.bench.harness.figures import in_percent, wilson  # noqa: E402
+from avlmaps_sim.bench.locate import map_of  # noqa: E402
 
 NEAR_M, NEAR_RAD = 0.25, np.deg2rad(10.0)
 TURNED_DEG = ((10, 25), (25, 45), (45, 70))
@@ -79,7 +79,7 @@ def photos_of(recording: Recording, rows: Sequence[int]) -> list[Truth]:
     return [Truth(frame.rgb, frame.world_from_camera @ colour_from_depth) for frame in frames]
 
 
-def located(stored: MapOfPictures, truth: Truth, camera: Pinhole | None = None) -> tuple[str, float]:
+def located(stored: LocatableMap, truth: Truth, camera: Pinhole | None = None) -> tuple[str, float]:
     """Return ``right``, ``wrong``, ``none`` or ``twice`` for a photo, and the seconds that it took."""
     begin_s = time.thread_time()
     settings = LocateSettings()
@@ -107,7 +107,7 @@ def row_of(method: str, what: str, answers: Sequence[tuple[str, float]], wanted:
     }  # fmt: skip
 
 
-def doubled(stored: MapOfPictures) -> MapOfPictures:
+def doubled(stored: LocatableMap) -> LocatableMap:
     """Return a map that holds its place twice, 100 m apart."""
     own = stored.keyframes
     moved = np.array(own.world_from_camera)
@@ -117,7 +117,7 @@ def doubled(stored: MapOfPictures) -> MapOfPictures:
     return replace(stored, keyframes=concat([own, copy]))
 
 
-def pairs_of(stored: MapOfPictures, recording: Recording, between_deg: tuple[int, int], count: int) -> Iterator[Any]:
+def pairs_of(stored: LocatableMap, recording: Recording, between_deg: tuple[int, int], count: int) -> Iterator[Any]:
     """Yield maps of one keyframe, each with a photo that looks at its middle and is turned by so many degrees."""
     poses = np.asarray(recording.world_from_camera)
     keyframes, rng, made = stored.keyframes, np.random.default_rng(SEED), 0

@@ -104,8 +104,10 @@ ENTRIES = (
         Figure("a thing in a map of 10,000,000 voxels, opening included", "",
                r"10,000,000 voxels\n[^\n]+\n[^\n]+\n  object +\S+ +\S+ +\S+ +(\S+) +(\S+)",
                "{1} s of the processor, {2} MB"),), 0.5),
-    Entry("locating", "python benchmarks/locate.py", (
-        Figure("locating a photo", "", r"all of it +(\S+)", "{1} ms of one thread"),)),
+    Entry("locating", "python benchmarks/locate.py RECORDING --elsewhere PHOTOS --photos 30 --pairs 15", (
+        Figure("photos of a real kitchen in a tenth of the light, located", "",
+               r"dim and noisy +(\d+) +(\d+) +(\S+ to \S+) +\d+ +(\S+)",
+               "{2} of {1} within 25 cm and 10° ({3} %), {4} s of one thread each"),)),
     Entry("source-speed", "python benchmarks/sources.py", (
         Figure("where a sound of 5 s came from, 320,000 voxels", "", r"ours +(\S+)", "{1} s of one thread"),)),
     Entry("store", "python benchmarks/store.py", (

@@ -21,7 +21,7 @@ SCRIPTS = {
     "corrected.py": "--scenes house:1 --frames 16 --size 80 60 --most 60",
     "fusion.py": "--frames 2 --repeats 1",
     "geometry.py": "--scenes house:4 --sensors kinect --frames 8",
-    "locate.py": "--keyframes 4 --photos 2",
+    "locate.py": "{REC} --photos 2 --pairs 1",
     "queries.py": "--voxels 20000 --features 5000 --dim 32",
     "report.py": "--check",
     "scale.py": "--folder {OUT} --map {MAP} --photo {PHOTO} --voxels 50000 --only object",
