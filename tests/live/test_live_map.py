@@ -56,7 +56,7 @@ def test_it_answers_from_other_threads_on_snapshots_that_do_not_change(tmp_path:
             while not done.is_set():
                 snapshot = live.map
                 voxels = len(snapshot.points)
-                live.ask("something red")
+                live.ask(object="red")
                 assert len(snapshot.points) == voxels
         except BaseException as fault:  # noqa: BLE001 - shown below
             faults.append(fault)

@@ -110,7 +110,7 @@ class Mapper:
         self._undescribed: list[Frame] = []
         self._left_out: list[BadFrame] = []
         # What a snapshot writes, under ``finishing``; a table is read by gates, under ``_merging``.
-        self.finishing, self._merging = RLock(), RLock()
+        self.finishing, self._merging, self._looking = RLock(), RLock(), RLock()  # the last one: at keyframes
         self._whole: VoxelAccumulator | None = None
         self._views: list[FreeViews] = []
         self._fused, self._stamps_s, self._poses = 0, list[float](), list[np.ndarray]()
@@ -308,7 +308,7 @@ class Mapper:
             self._book.add_whole(submap_of(state.sums, state.stamp_s, state.pose, np.asarray(state.views.clear_mm)))
 
     def _describe(self) -> None:
-        with self.finishing:
+        with self._looking:
             for _ in range(len(self._undescribed)):
                 self._album.add(self._undescribed.pop(0))
 
@@ -373,7 +373,7 @@ class Mapper:
             )
         if not len(self):
             raise MapError("The map has no frame yet, whose pose could be corrected; add one.")
-        with self.finishing, self._adding, silence_progress(True):
+        with self.finishing, self._adding, self._looking, silence_progress(True):
             before = self._walked.until_now()
             step = PoseCorrection.of(stamps_s, poses, before.stamps_s, before.world_from_camera)
             self.settle()
@@ -476,7 +476,8 @@ class Mapper:
             self._surfaces = surfaces(whole, views, about, start.sensor, self._through)
         merged, merged_s = self._surfaces, perf_counter()
         rng = np.random.default_rng([self.settings.seed, _PLACES])
-        keyframes, state = self._album.keyframes(rng, final=final)
+        with self._looking:
+            keyframes, state = self._album.keyframes(rng, final=final)
         keyframes = with_clear_views(keyframes, self._views)
         heard_s = perf_counter()
         walked, walk = self._walks()
