@@ -60,7 +60,7 @@ def test_a_frame_that_others_wait_behind_adds_its_surface_alone(tmp_path: Path) 
         while_busy(live, range(6, 14))  # one is fused, two wait, five are late
     status = live.status()
     assert status.dropped == {"late": 5} and status.fused == 9 and 6 < status.encoded < 9
-    assert live.map.data.info.counts.frames == 9 and live.ask("something red").found
+    assert live.map.data.info.counts.frames == 9 and live.ask(object="red").found
 
 
 def test_up_and_the_floor_are_found_again_behind_when_the_walk_has_doubled() -> None:
