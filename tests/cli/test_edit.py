@@ -9,7 +9,7 @@ import pytest
 
 from avlmaps.maps.store.edits import EDITS, Edit, EditedSpot, append_edit, read_edits
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.view.on_page import MapOnPage
+from avlmaps.view.labels import MapOnPage
 
 
 @pytest.fixture

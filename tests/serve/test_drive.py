@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator, ValidationError
 from starlette.testclient import TestClient
 
-from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.agents import MOST_TOKENS, token_count
 from avlmaps.serve.app import create_app
 from avlmaps.serve.drive.orders import DriveError, OrderPlan, PlanBook, Who
@@ -72,23 +71,6 @@ def test_a_command_is_planned_confirmed_driven_and_logged(client: TestClient, dr
     for entry in drive.entries:
         assert {"time", "who"} <= entry.keys() and entry["words"] == "go to the nearest red thing, then turn left"
     assert told["token"] not in drive.log.read_text(encoding="utf-8"), "a log that is read confirms nothing"
-
-
-def test_a_goal_of_a_plan_is_looked_up_once(client: TestClient, drive: Driven, monkeypatch: pytest.MonkeyPatch) -> None:
-    looked_up: list[str] = []
-    find = AVLMap.object
-
-    def counted(avlmap: AVLMap, *given: Any, **parts: Any) -> Any:
-        looked_up.append(str(given[0]))
-        return find(avlmap, *given, **parts)
-
-    monkeypatch.setattr(AVLMap, "object", counted)
-    told = plan(client, "go to the nearest red thing, then turn left")
-    assert looked_up
-    before = list(looked_up)
-    client.post("/drive/confirm", json={"token": told["token"]})
-    assert idle(client)["last"]["outcome"]["ok"] is True
-    assert looked_up == before
 
 
 def test_the_openapi_document_describes_what_the_addresses_answer(client: TestClient, drive: Driven) -> None:

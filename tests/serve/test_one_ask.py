@@ -21,7 +21,7 @@ from avlmaps.recordings.open import open_recording
 from avlmaps.serve.agents import agent_server, compact, fitting
 from avlmaps.serve.app import create_app
 from avlmaps.serve.service import Service
-from avlmaps.view.on_page import TOP
+from avlmaps.view.labels import TOP
 from helpers.agent_talk import Agent
 
 SENTENCES = [

@@ -11,8 +11,8 @@ import pytest
 
 from avlmaps.core.errors import QueryError
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.view.labels import MapOnPage
 from avlmaps.view.layout import Layout, as_bytes
-from avlmaps.view.on_page import MapOnPage
 from avlmaps.view.page import default_questions, live_page, write_page
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.view.labels import TOP, MapOnPage
 from avlmaps.view.layout import RECORD
-from avlmaps.view.on_page import TOP, MapOnPage
 from helpers.viewing import Served
 
 Call = Callable[..., httpx.Response]

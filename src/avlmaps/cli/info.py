@@ -233,7 +233,8 @@ def _entry_lines(entries: dict[str, Any], layouts: dict[str, Callable[[Any], lis
 
 def _sound_lines(sounds: list[dict[str, Any]]) -> list[str]:
     rows = [
-        f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place_text(s['position'])}{_names_of(s)}" for s in sounds
+        f"  {max(s['onset_s'], 0.0):8.2f} - {s['offset_s']:.2f} s at {place_text(s['position'])}{_names_of(s)}"
+        for s in sounds
     ]
     return [f"sounds: {len(sounds)}", *rows]
 

@@ -212,7 +212,7 @@ def sound_lines(sounds: "list[SoundAnswer]", frame: str = "recording") -> list[s
         return ["no sounds"]
     rows = [
         (", ".join(f"{n} {c:.2f}" for n, c in zip(s["names"], s["confidences"], strict=True)) or "unnamed",
-         f"{s['onset_s']:.1f} - {s['offset_s']:.1f} s", place_text(s["position"]))
+         f"{max(s['onset_s'], 0.0):.1f} - {s['offset_s']:.1f} s", place_text(s["position"]))
         for s in sounds
     ]  # fmt: skip
     head = ("sound", "time", f"position of the robot ({frame} frame)")

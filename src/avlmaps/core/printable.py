@@ -35,7 +35,7 @@ def printable(text: object, most: int | None = None) -> str:
 def shortened(answer: Any) -> Any:
     """Return JSON without digits that no measurement has: six of a small number, six after the point of others."""
     if isinstance(answer, float):
-        return round(answer, 6) if abs(answer) >= 0.1 else float(f"{answer:.6g}")
+        return (round(answer, 6) if abs(answer) >= 0.1 else float(f"{answer:.6g}")) + 0.0  # -0.0 is 0.0
     if isinstance(answer, Mapping):
         return {key: shortened(value) for key, value in cast("Mapping[Any, Any]", answer).items()}
     if isinstance(answer, list | tuple):

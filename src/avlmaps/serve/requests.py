@@ -1,4 +1,7 @@
-"""What clients may ask: one type for each request, of which checks, the document and the tools' schemas are made."""
+"""What clients may ask: one type for each request, of which checks, the document and the tools' schemas are made.
+
+What does not fit raises ``RequestError``, whose sentence says what does.
+"""
 
 import base64
 import binascii
@@ -250,9 +253,6 @@ def read(values: Mapping[str, Any], kind: type[R]) -> R:
 
     A number may be a text, and a place a list of numbers; one value stands for a list of it; what is null or blank was
     left out.
-
-    Raises:
-        RequestError: a value is missing, unknown, of the wrong type or out of range; the sentence names what there is.
     """
     lists = lists_of(kind)
     given = {name: _normal(value, name in lists) for name, value in values.items() if not _is_blank(value)}
@@ -321,11 +321,7 @@ class Uploads:
     clip: bytes | None = None
 
     def attachments(self, limits: Limits) -> Mapping[str, Attachment]:
-        """Decode the files.
-
-        Raises:
-            RequestError: one is of another kind, damaged, or too large.
-        """
+        """Decode the files."""
         found: dict[str, Attachment] = {}
         if self.photo is not None:
             found[PHOTO] = Photo(decode_photo(self.photo, limits), focal_35mm_of(self.photo))
@@ -345,11 +341,7 @@ class Uploads:
 
 
 def file_of(text: str, what: str, most_bytes: int, reads_files: bool = False) -> bytes:
-    """Return the bytes of a file: out of base64, perhaps with line breaks or as a data URI, or of a path if it may be.
-
-    Raises:
-        RequestError: it is neither, or cannot be read.
-    """
+    """Return the bytes of a file: of base64, perhaps with line breaks or as a data URI, or of a path if it may be."""
     if reads_files and len(text) < 1000 and user_path(text).is_file():
         try:
             return read_regular(user_path(text), most_bytes)
@@ -364,11 +356,7 @@ def file_of(text: str, what: str, most_bytes: int, reads_files: bool = False) ->
 
 
 def decode_photo(content: bytes, limits: Limits) -> UInt8[np.ndarray, "h w 3"]:
-    """Decode a PNG or JPEG as RGB.
-
-    Raises:
-        RequestError: it is another kind of file, damaged, or has too many pixels.
-    """
+    """Decode a PNG or JPEG as RGB."""
     import cv2
 
     size = encoded_size(content)
@@ -396,11 +384,7 @@ _HIGHEST_RATE_HZ = 96_000
 
 
 def decode_clip(content: bytes, limits: Limits) -> Sound:
-    """Decode a sound.
-
-    Raises:
-        RequestError: it is another kind of file, damaged, silent, or too long.
-    """
+    """Decode a sound."""
     suffix = self_contained_suffix(content)
     if suffix is None:
         raise RequestError("The clip is no wav, flac, ogg, mp3, m4a or mkv sound; send another one.", 415, "clip")
@@ -425,11 +409,7 @@ def decode_clip(content: bytes, limits: Limits) -> Sound:
 
 
 def numbers_of(intrinsics: str) -> tuple[float, float, float, float]:
-    """Return ``fx,fy,cx,cy``.
-
-    Raises:
-        RequestError: the numbers are not four, or no camera has them.
-    """
+    """Return ``fx,fy,cx,cy``."""
     try:
         fx, fy, cx, cy = (float(word) for word in intrinsics.split(","))
         Pinhole(fx, fy, cx, cy, width=1, height=1)  # no camera has a focal length of 0, or NaN

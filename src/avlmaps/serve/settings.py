@@ -22,30 +22,18 @@ class ServeError(AvlmapsError):
 class Limits:
     """Limits of each request; a request beyond one gets an error, and the others continue."""
 
-    body_bytes: int = 32 * MB
-    """Largest body of a request."""
-    body_s: float = 20.0
-    """Longest time in which a body arrives."""
-    answer_s: float = 60.0
-    """Longest time until an answer; a query that is waiting by then is dropped."""
-    quick_workers: int = 2
-    """Queries in words that run at one time."""
-    slow_workers: int = 1
-    """Photos, clips, lists and pictures that run at one time."""
-    waiting: int = 64
-    """Queries that wait, for each of the two; more are refused with 503."""
-    connections: int = 256
-    """Open connections; more are refused with 503."""
-    picture_pixels: int = 1 << 25
-    """Largest photo."""
-    clip_s: float = 120.0
-    """Longest clip."""
-    goals: int = 100
-    """Most goals of an answer."""
-    cache_bytes: int = 192 * MB
-    """Memory for the heat of words that were queried before, for each map."""
-    shutdown_s: float = 30.0
-    """Longest time for running queries after SIGTERM."""
+    body_bytes: int = 32 * MB  # largest body of a request
+    body_s: float = 20.0  # longest time in which a body arrives
+    answer_s: float = 60.0  # longest time until an answer; a query that is waiting by then is dropped
+    quick_workers: int = 2  # queries in words that run at one time
+    slow_workers: int = 1  # photos, clips, lists and pictures that run at one time
+    waiting: int = 64  # queries that wait, for each of the two; more are refused with 503
+    connections: int = 256  # open connections; more are refused with 503
+    picture_pixels: int = 1 << 25  # largest photo
+    clip_s: float = 120.0  # longest clip
+    goals: int = 100  # most goals of an answer
+    cache_bytes: int = 192 * MB  # memory for the heat of words that were queried before, for each map
+    shutdown_s: float = 30.0  # longest time for running queries after SIGTERM
 
     def __post_init__(self) -> None:
         for name in ("body_bytes", "body_s", "answer_s", "quick_workers", "slow_workers", "connections"):

@@ -30,7 +30,7 @@ from avlmaps.serve.settings import Limits, ServeError
 if TYPE_CHECKING:
     from avlmaps.navigate.paths import PathFinder
     from avlmaps.query.plots import TopDown
-    from avlmaps.view.on_page import MapOnPage
+    from avlmaps.view.labels import MapOnPage
     from avlmaps.view.route import Guide, MakeRobot
 
 T = TypeVar("T")
@@ -112,7 +112,7 @@ class ServedMap:
     @cached_property
     def page(self) -> "MapOnPage":
         """The map as the page of ``view`` draws it."""
-        from avlmaps.view.on_page import MapOnPage
+        from avlmaps.view.labels import MapOnPage
 
         return MapOnPage(self.avlmap)
 

@@ -1,4 +1,7 @@
-"""The work of each request: from a request's values to its answer, in a thread of a lane."""
+"""The work of each request: from a request's values to its answer, in a thread of a lane.
+
+What cannot be answered raises an ``AvlmapsError``; ``lanes.Privacy`` gives it a status and takes paths out of it.
+"""
 
 import tempfile
 from collections import Counter
@@ -211,12 +214,7 @@ _NEEDED = {"rename": ("to",), "rename-room": ("name", "to"), "forbid": ("name",)
 
 
 def edit(task: WorkInput, query: requests.EditQuery) -> EditsAnswer:
-    """Correct the map, and return all edits; later queries know it.
-
-    Raises:
-        RequestError: a value is missing.
-        QueryError: there is no such thing, room or edit.
-    """
+    """Correct the map, and return all edits; later queries know it."""
     editor, by = task.map.avlmap.as_edited_now().edit, query.by or ""
     for name in _NEEDED.get(query.does, ()):
         if getattr(query, name) is None:
@@ -255,12 +253,7 @@ def sound_clip(task: WorkInput, query: requests.NoQuery) -> File:
 
 
 def ask_map(task: WorkInput, query: requests.AskQuery) -> Answer:
-    """Answer a sentence or parts, with the files of the request.
-
-    Raises:
-        AskError: what is given does not fit together.
-        QueryError: the query cannot be answered.
-    """
+    """Answer a sentence or parts, with the files of the request."""
     attachments = task.uploads.attachments(task.limits)
     return task.map.avlmap.ask(
         query.sentence or "",
@@ -378,11 +371,7 @@ def describe_building(task: WorkInput, query: NoQuery) -> dict[str, Any]:
 
 
 def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, Any]:
-    """Return the things of a room, or near a place, or of a name; a page of them.
-
-    Raises:
-        QueryError: there is no such room, or no such thing to be near to.
-    """
+    """Return the things of a room, or near a place, or of a name; a page of them."""
     lists = lists_of(task)
     where, names = lists.where, query.name
     unknown = [name for name in names if not task.map.avlmap.knows(name)]

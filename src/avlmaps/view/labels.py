@@ -1,26 +1,29 @@
-"""What a page writes on a map: its things, sounds and rooms, and for each voxel the thing, the room and the name."""
+"""One map on the page: its things, sounds, rooms and sources, what each voxel is, and the heat of an answer."""
 
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Int, UInt8
 
 from avlmaps.core.arrays import Bool, Float
-from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.errors import AvlmapsError, QueryError
 from avlmaps.maps.sources.candidates import CELL_M
 from avlmaps.query.contents import listed_rooms, numbered
 from avlmaps.query.export import heat_colors, shades_of
-from avlmaps.query.naming import VoxelNamer
+from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
+from avlmaps.view.layout import Layout, as_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from avlmaps.maps.sources.candidates import CandidateGrid
+    from avlmaps.query.answer import Answer
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Room, SoundEvent, Thing
-    from avlmaps.view.layout import Layout
 
 
 SHARES = (0.5, 0.9)
@@ -77,32 +80,21 @@ _GRAY = (150, 150, 150)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Labels:
-    """The contents of a map, and what each voxel is.
+    """The contents of a map, and what each voxel is."""
 
-    Attributes:
-        things: most confident first.
-        sounds: in the order of their onset.
-        rooms: those with most views first.
-        sources: where sounds came from, as the page draws it; none where the map does not know.
-        names: of things, in the order of their colours; a voxel's first label counts into it from 1.
-        room_names: of each room, in the order of ``rooms``; the second label counts into it likewise.
-        voxel_names: likewise, for the third label.
-        voxels: (m, 4) the labels of each voxel that is drawn, in that order: thing, room, name, confidence of the name.
-        notes: one sentence each on what could not be computed.
-    """
-
-    things: "tuple[Thing, ...]"
-    sounds: "tuple[SoundEvent, ...]"
-    rooms: "tuple[Room, ...]"
-    sources: "tuple[dict[str, Any], ...]"
+    things: "tuple[Thing, ...]"  # most confident first
+    sounds: "tuple[SoundEvent, ...]"  # in the order of their onset
+    rooms: "tuple[Room, ...]"  # those with most views first
+    sources: "tuple[dict[str, Any], ...]"  # where sounds came from; none where the map does not know
+    # Labels count from 1 into these: of things in the order of their colours, of rooms, of voxels.
     names: tuple[str, ...]
     room_names: tuple[str, ...]
     voxel_names: tuple[str, ...]
-    voxels: UInt8[np.ndarray, "n 4"]
-    notes: tuple[str, ...]
+    voxels: UInt8[np.ndarray, "n 4"]  # in the order of drawing: thing, room, name, confidence of the name
+    notes: tuple[str, ...]  # one sentence each on what could not be computed
 
     @classmethod
-    def of(cls, layout: "Layout") -> "Labels":
+    def of(cls, layout: Layout) -> "Labels":
         """Compute all of it; a map whose models are not here has less, and its notes say why."""
         avlmap, notes = layout.avlmap, []
         things = _or_note(avlmap.things, notes)
@@ -118,7 +110,7 @@ class Labels:
             tuple(dict.fromkeys(notes)),
         )  # fmt: skip
 
-    def describe(self, layout: "Layout") -> dict[str, Any]:
+    def describe(self, layout: Layout) -> dict[str, Any]:
         """Return things, sounds and rooms as the page reads them; boxes and places in the level frame."""
         level = layout.avlmap.space.level
         things = []
@@ -204,19 +196,7 @@ def _room_labels(
         return names, np.array([*labels, NONE], np.uint8)[number]  # the last is that of no room
     places = np.concatenate([space.level(room.places)[:, :2] for room in rooms])
     label = np.concatenate([np.full(room.views, number, np.uint8) for number, room in zip(labels, rooms, strict=True)])
-    if not _is_level(avlmap):
-        return names, label[KDTree(places).query(space.level(space.centres_of(rows))[:, :2])[1]]
-    ground = np.asarray(space.index)[rows, :2].astype(np.int64)
-    ground -= ground.min(axis=0)
-    width = int(ground[:, 1].max()) + 1
-    column, member = np.unique(ground[:, 0] * width + ground[:, 1], return_inverse=True)
-    low = np.asarray(space.index)[rows, :2].min(axis=0)
-    middles = (np.stack(np.divmod(column, width), axis=1) + low + 0.5) * space.grid.voxel_size_m
-    return names, label[KDTree(places).query(middles)[1]][member.ravel()]
-
-
-def _is_level(avlmap: "AVLMap") -> bool:
-    return bool(np.allclose(avlmap.space.level_from_world, np.eye(3), atol=1e-6))
+    return names, label[KDTree(places).query(space.level(space.centres_of(rows))[:, :2])[1]]
 
 
 def _name_labels(
@@ -239,3 +219,78 @@ def _name_labels(
         tuple(namer.names[k] for k in kept), label_of[number],
         np.round(255 * np.clip(confidence, 0.0, 1.0)).astype(np.uint8),
     )  # fmt: skip
+
+
+TOP = 5  # goals on a page
+_MOST_VIEWS = 12  # keyframes that are named of those which saw a voxel
+
+
+class MapOnPage:
+    """One map on the page. Safe to use from several threads.
+
+    Attributes:
+        avlmap: the map.
+        layout: how it is drawn.
+    """
+
+    def __init__(self, avlmap: "AVLMap", most: int | None = None) -> None:
+        """Lay out a map, for a file with up to ``most`` voxels."""
+        self.avlmap = avlmap
+        self.layout = Layout(avlmap, most)
+        self._labels: Labels | None = None
+        self._lock = threading.Lock()
+
+    @property
+    def labels(self) -> Labels:
+        """Its contents; the first call computes them, others wait for it."""
+        with self._lock:
+            if self._labels is None:
+                self._labels = Labels.of(self.layout)
+            return self._labels
+
+    @cached_property
+    def _namer(self) -> VoxelNamer:
+        return VoxelNamer(self.avlmap)
+
+    def heat_of(self, answer: "Answer") -> bytes:
+        """Return the heat of an answer at each voxel that is drawn, a byte each, in the order of drawing."""
+        return bytes(len(self.layout)) if answer.heat is None else as_bytes(answer.heat.shown_at(self.layout.order))
+
+    def describe_contents(self) -> dict[str, Any]:
+        """Return things, sounds and rooms with the colours of the page."""
+        labels = self.labels
+        return labels.describe(self.layout) | {"palettes": palettes(labels)}
+
+    def describe_voxel(self, drawn: int) -> dict[str, Any]:
+        """Return what a voxel is taken for, by its number in the order of drawing."""
+        if not 0 <= drawn < len(self.layout):
+            raise QueryError(f"There is no voxel {drawn}; the map has {len(self.layout):,}.")
+        row, avlmap = int(self.layout.order[drawn]), self.avlmap
+        names: list[tuple[str, float]] = []
+        note, calibrated = "", True
+        try:
+            names, calibrated = self._namer.likeliest(row), self._namer.calibrated
+        except AvlmapsError as fault:
+            note = str(fault)
+        if (said := avlmap.edited.named_at(np.array([row]))) is not None:
+            names = [(said, 1.0), *names]
+        views = keyframes_that_saw(avlmap, avlmap.space, row)
+        voxels = avlmap.data.voxels
+        thing = self._thing_at(row)
+        return {
+            "position": [round(float(value), 4) for value in avlmap.points[row]],
+            "color": [int(value) for value in voxels.rgb[row]],
+            "names": [{"name": name, "confidence": round(share, 4)} for name, share in names],
+            "calibrated": calibrated,
+            "thing": None if thing is None else {"name": thing.name, "confidence": thing.confidence},
+            "last_seen_s": round(float(voxels.last_seen_s[row]), 3),
+            "pixels": int(voxels.hits[row]),
+            "views": len(views),
+            "seen_by": [int(number) for number in views[:_MOST_VIEWS]],
+            "note": note,
+        }
+
+    def _thing_at(self, row: int) -> "Thing | None":
+        if self._labels is None:  # not computed yet: nothing waits for it here
+            return None
+        return next((thing for thing in self._labels.things if (thing.rows == row).any()), None)

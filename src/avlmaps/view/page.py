@@ -18,8 +18,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import progress
 from avlmaps.core.question import Modality, Part, Question
-from avlmaps.view.labels import palettes
-from avlmaps.view.on_page import TOP, MapOnPage
+from avlmaps.view.labels import TOP, MapOnPage, palettes
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap

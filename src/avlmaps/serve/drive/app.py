@@ -16,7 +16,7 @@ from contextvars import copy_context
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -62,17 +62,7 @@ _AGENT = Who("agent", "mcp")
 
 @dataclass(slots=True)
 class DriveService:
-    """A dispatcher, and the threads in which its work is done.
-
-    Stops have threads of their own, which no plan can fill.
-
-    Attributes:
-        dispatcher: decides what moves.
-        orders: threads of plans and confirmations.
-        stops: threads of stops.
-        waiting: orders that are being read.
-        ending: whether the server ends.
-    """
+    """A dispatcher, and the threads in which its work is done; stops have their own, which no plan can fill."""
 
     dispatcher: Dispatcher
     orders: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(2, "avlmaps-drive"))
@@ -127,55 +117,6 @@ async def _in(threads: ThreadPoolExecutor, work: Callable[[], dict[str, Any]]) -
     return await asyncio.get_running_loop().run_in_executor(threads, lambda: context.run(work))
 
 
-class PlanAnswer(TypedDict):
-    """What an order would do, and the token that confirms it."""
-
-    order: str
-    token: str
-    expires_in_s: float
-    words: str
-    reading: str
-    program: str
-    notes: list[str]
-    path: list[list[float]]
-    path_m: float
-    subgoals: list[dict[str, Any]]
-    frame: str
-    map: str
-    version: str
-    robot: str
-
-
-class StartedAnswer(TypedDict):
-    """An order that began."""
-
-    order: str
-    state: str
-    reading: str
-
-
-class StoppedAnswer(TypedDict):
-    """Whether the robot stands, and how that is known."""
-
-    stopped: bool
-    note: str
-    order: str | None
-
-
-class StatusAnswer(TypedDict):
-    """What the robot does: idle, driving, stopping, or unstopped where it did not confirm its last stop."""
-
-    state: str
-    robot: str
-    real: bool
-    pose: dict[str, Any] | None
-    frame: str
-    order: dict[str, Any] | None
-    last: dict[str, Any] | None
-    plans_waiting: int
-    fault: str | None
-
-
 async def _plan(service: DriveService, query: tuple[PlanRequest, Who]) -> dict[str, Any]:
     (wanted, who), dispatcher = query, service.dispatcher
     begun = dispatcher.begun
@@ -198,15 +139,15 @@ _STOP = "/stop"
 OPERATIONS = (
     Operation("planDrive", "/plan", "Plan a command or a program: what the robot would do, its path, and the token "
               "that confirms it. Nothing moves.",
-              PlanRequest, PlanAnswer, _plan, methods=("POST",), tool="plan_drive"),
+              PlanRequest, dict, _plan, methods=("POST",), tool="plan_drive"),
     Operation("confirmDrive", "/confirm", "Start the plan of a token, after a person agreed to it. The robot moves.",
-              ConfirmRequest, StartedAnswer, _confirm, methods=("POST",), status=202, tool="confirm_drive",
+              ConfirmRequest, dict, _confirm, methods=("POST",), status=202, tool="confirm_drive",
               read_only=False, destructive=True),
     Operation("stopDrive", _STOP, "Stop the robot at once, and forget every plan. A body is not read.",
-              NoQuery, StoppedAnswer, _stop, methods=("POST",), tool="stop_robot", read_only=False,
+              NoQuery, dict, _stop, methods=("POST",), tool="stop_robot", read_only=False,
               brief="Stop the robot at once, and forget every plan."),
     Operation("driveStatus", "/status", "Return where the robot is and what it does, once or as events.",
-              NoQuery, StatusAnswer, _status, tool="robot_status", brief="Return where the robot is and what it does."),
+              NoQuery, dict, _status, tool="robot_status", brief="Return where the robot is and what it does."),
 )  # fmt: skip
 
 
@@ -318,16 +259,7 @@ def _require_showable(wanted: PlanRequest) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Driving:
-    """What a server of maps needs to drive as well.
-
-    Attributes:
-        robot: as people know it.
-        log: file of the log.
-        mounts: the applications by path.
-        lifespans: what is open while the server runs.
-        dispatcher: decides what moves.
-        ending: is called when a signal ends the server; it stops the robot at once.
-    """
+    """What a server of maps needs to drive as well; ``ending`` stops the robot when a signal ends the server."""
 
     robot: str
     log: Path

@@ -34,7 +34,6 @@ from avlmaps.language.program import Budget, parse_program
 from avlmaps.language.translator import Translation
 from avlmaps.navigate.brake import Brake
 from avlmaps.navigate.costmap import floor_of_walk
-from avlmaps.navigate.grounding import Heats
 from avlmaps.navigate.instruct import Outcome, given_by, instruct
 from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse
 from avlmaps.navigate.skills import RobotSettings
@@ -82,25 +81,7 @@ class MapNow:
 
 @dataclass(frozen=True, slots=True)
 class OrderPlan:
-    """What an order would do.
-
-    Attributes:
-        order: its name in the log.
-        words: the command; "" for a program.
-        reading: what the robot will do, in plain words.
-        program: what runs.
-        notes: one sentence each: how words were taken, what a person should know.
-        path: (x, y, z) places, metres, recording frame, as rehearsed on the map.
-        path_m: length.
-        subgoals: where it stops, as `go` reports them.
-        start: where the robot stood.
-        map: which map.
-        version: of the map.
-        robot: identity of the robot.
-        choose: which of several things that fit equally are meant.
-        heats: what the map answered while it was planned; see ``heats_for``.
-        of: that map.
-    """
+    """What an order would do: ``path`` in metres, recording frame; ``version`` of the map, ``robot`` its identity."""
 
     order: str
     words: str
@@ -115,29 +96,14 @@ class OrderPlan:
     version: str
     robot: str
     choose: tuple[int, ...] = ()
-    heats: Heats = field(default_factory=dict, repr=False, compare=False)
-    of: AVLMap | None = field(default=None, repr=False, compare=False)
-
-    def heats_for(self, avlmap: AVLMap) -> Heats:
-        """Return what the map answered, so that a drive need not query it again; nothing of another object."""
-        return self.heats if avlmap is self.of else {}
 
     def to_json(self) -> dict[str, Any]:
         """Return the plan as clients and the log have it; a token is no part of it."""
-        return {
-            "order": self.order,
-            "words": self.words,
-            "reading": self.reading,
-            "program": self.program,
-            "notes": list(self.notes),
-            "path": [list(place) for place in self.path],
-            "path_m": round(self.path_m, 3),
-            "subgoals": list(self.subgoals),
-            "frame": FRAME,
-            "map": self.map,
-            "version": self.version,
-            "robot": self.robot,
-        }
+        told = {name: getattr(self, name) for name in _TOLD}
+        return {**told, "path": [list(place) for place in self.path], "path_m": round(self.path_m, 3), "frame": FRAME}
+
+
+_TOLD = ("order", "words", "reading", "program", "notes", "path", "path_m", "subgoals", "map", "version", "robot")
 
 
 class PlanBook:
@@ -364,10 +330,10 @@ class Dispatcher:
         obstacles = self._machine.prepare(now.avlmap, now.version)
         if fault := self._machine.fault():
             raise NavigationError(f"The robot cannot be driven: {fault.rstrip('.')}.")
-        start, heats = self._machine.pose(), Heats()
+        start = self._machine.pose()
         outcome = rehearse(
             words, translation, now.avlmap, obstacles, start, shape=self._machine.shape,
-            settings=self._settings(choose), budget=_REHEARSAL, heats=heats,
+            settings=self._settings(choose), budget=_REHEARSAL,
         )  # fmt: skip
         if outcome.error is not None:
             kind = _KINDS.get(outcome.error_type or "", "refused")
@@ -387,8 +353,6 @@ class Dispatcher:
             version=now.version,
             robot=self._machine.identity,
             choose=choose,
-            heats=heats,
-            of=now.avlmap,
         )
 
     def _read(self, words: str, program: str, now: MapNow) -> Translation:
@@ -490,7 +454,6 @@ class Dispatcher:
                 settings=self._settings(order.plan.choose), readable=NO_FILES,
                 translation=Translation(order.plan.program, order.plan.notes, order.plan.reading),
                 tell=lambda line: self._tell(order, line), pause=order.brake.pause,
-                heats=order.plan.heats_for(order.now.avlmap),
             )  # fmt: skip
         except Exception:
             log.exception("order %s", order.plan.order)
