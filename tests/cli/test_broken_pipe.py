@@ -33,12 +33,6 @@ def ended(*words: object, reads: int = 0, buffered: bool = True) -> tuple[int, b
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("words", [["--help"], ["bench", "--help"], ["--version"]])
-def test_help(words: list[str]) -> None:
-    assert ended(*words) == (READER_GONE, b"")
-
-
-@pytest.mark.nightly
 @pytest.mark.parametrize(("words", "status"), [(["bench", "--nothing"], 2), (["info", "nothing.avlmap"], 1)])
 @pytest.mark.parametrize("buffered", [True, False])
 def test_an_error_keeps_its_status_and_its_sentence(words: list[str], status: int, buffered: bool) -> None:
@@ -47,30 +41,9 @@ def test_an_error_keeps_its_status_and_its_sentence(words: list[str], status: in
     assert b"Traceback" not in said and b"BrokenPipe" not in said and b"Exception ignored" not in said
 
 
-@pytest.mark.nightly
-def test_help_that_is_read_in_part() -> None:
-    """The pipe may hold the rest before its reader goes; either end is a quiet one."""
-    status, said = ended("bench", "--help", reads=64)
-    assert status in (0, READER_GONE) and said == b""
-
-
 @pytest.mark.parametrize("words", [["profiles"], ["profiles", "--json"]])
 def test_answers(words: list[str]) -> None:
     assert ended(*words) == (READER_GONE, b"")
-
-
-@pytest.mark.nightly
-def test_answers_about_a_map(built: Path) -> None:
-    for words in (["info", built], ["things", built, "--json"], ["query", built, "--object", "red", "--json"]):
-        status, said = ended(*words)
-        assert status == READER_GONE, (words, said)
-        assert said == b"" or said.startswith(b"compiling once"), said
-
-
-def test_a_table_written_to_a_pipe(built: Path, tmp_path: Path) -> None:
-    status, said = ended("things", built, "--csv", tmp_path / "things.csv")
-    assert status == READER_GONE and said.startswith(b"wrote ") and said.count(b"\n") == 1
-    assert (tmp_path / "things.csv").read_text().startswith("kind,name")
 
 
 @pytest.mark.nightly

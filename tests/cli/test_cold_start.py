@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from avlmaps.cli import main
-from avlmaps.core.question import Modality, Part, Question
+from avlmaps.core.question import Question
 from avlmaps.core.registry import Kind, load
 from avlmaps.language.questions import parse_sentence
 from avlmaps.query.asking import Asked, thing_alone
@@ -67,15 +67,3 @@ def test_a_name_is_read_as_the_grammar_reads_it(encoder: object) -> None:
     short = {word: question for word, question in alone.items() if question is not None}
     assert len(short) > 0.75 * len(alone)  # the others are sounds or areas as well
     assert {word: parse_sentence(word) for word in short} == short
-
-
-@pytest.mark.parametrize(
-    "words", ["stairs", "kitchen", "red chair", "the chair near the sound of a dog", "dog barking"]
-)
-def test_all_else_is_left_to_the_grammar(words: str, encoder: object) -> None:
-    assert asked(words, encoder) is None
-
-
-def test_a_part_alone_is_a_question() -> None:
-    asked, parts = Asked(object="red sofa"), [Part(Modality.OBJECT, "red sofa")]
-    assert thing_alone(asked, SimpleNamespace()) == Question.of(parts)  # pyright: ignore[reportArgumentType]

@@ -1,12 +1,10 @@
 """`avlmaps things` and `avlmaps export`, end to end on a small map."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-import trimesh
 
 
 def test_things_lists_what_the_map_holds(built: Path, answer: Callable[..., dict[str, Any]], tmp_path: Path) -> None:
@@ -64,12 +62,6 @@ def test_export_writes_each_format(
     assert written["frame"] == ("level" if name in ("a.pgm", "a.glb") else "recording")
 
 
-def test_export_colours_by_heat(built: Path, answer: Callable[..., dict[str, Any]], tmp_path: Path) -> None:
-    answer("export", built, "--out", tmp_path / "h.ply", "--heat", "the red thing")
-    read: Any = trimesh.load(tmp_path / "h.ply")
-    assert len(read.vertices) > 100
-
-
 @pytest.mark.parametrize(
     ("words", "says"),
     [
@@ -95,9 +87,3 @@ def test_export_replaces_nothing_unasked(built: Path, run: Callable[..., tuple[i
     assert status == 2
     assert "--overwrite" in err
     assert run("export", built, "--out", tmp_path / "a.csv", "--overwrite")[0] == 0
-
-
-def test_an_empty_colour_map_is_valid_json(built: Path, run: Callable[..., tuple[int, str, str]]) -> None:
-    status, out, _ = run("things", built, "--least", "1", "--json")
-    assert status == 0
-    assert json.loads(out)["things"] == []

@@ -60,19 +60,6 @@ def test_a_map_that_is_not_there_is_built_first(answer, walk: Path, tmp_path: Pa
     assert made["corrected"]["most_m"] == pytest.approx(0.2)
 
 
-@pytest.mark.nightly
-def test_poses_may_have_the_dates_that_the_recording_has(answer, walk: Path, tmp_path: Path) -> None:
-    dated = shutil.copytree(walk, tmp_path / "dated")
-    for table, stamp in (("poses.csv", 0), ("frames.csv", 1)):
-        head, *rows = [line.split(",") for line in (dated / table).read_text().splitlines()]
-        for row in rows:
-            row[stamp] = str(float(row[stamp]) + 1.7e9)
-        (dated / table).write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
-    file = moved_file(dated, tmp_path / "poses.txt", 0.2)
-    made = answer("build", dated, "--out", tmp_path / "map", "--corrected-poses", file, *BUILT)
-    assert made["corrected"]["most_m"] == pytest.approx(0.2)
-
-
 FILES = {
     "empty": ("", "holds no pose"),
     "words": ("here there\nand everywhere\n", "numbers"),
@@ -90,33 +77,6 @@ def test_a_wrong_file_is_refused_in_a_sentence(run, walk: Path, copied: Path, tm
     assert code == 1
     assert said in err
     assert "Traceback" not in err
-
-
-@pytest.mark.nightly
-def test_a_map_without_submaps_is_not_replaced(run, walk: Path, built: Path, tmp_path: Path) -> None:
-    path = shutil.copytree(built, tmp_path / "plain")
-    file = moved_file(walk, tmp_path / "poses.txt", 0.2)
-    code, _, err = run("build", walk, "--out", path, "--corrected-poses", file)
-    assert code == 1
-    assert "finished map already" in err
-
-
-@pytest.mark.parametrize("wish", ["--submaps", "--close-loops"])
-def test_a_map_that_lacks_submaps_alone_says_how_it_gets_them(run, walk: Path, built: Path, wish: str) -> None:
-    before = (built / "map.json").read_bytes()
-    code, _, err = run("build", walk, "--out", built, "--voxel-size-m", "0.1", "--profile", "colours", wish)
-    assert code == 1
-    assert "finished map without submaps" in err
-    assert "--submaps and --overwrite" in err
-    assert (built / "map.json").read_bytes() == before
-
-
-def test_a_drive_that_does_not_come_back_closes_no_loop(run, walk: Path, copied: Path) -> None:
-    before = (copied / "map.json").read_bytes()
-    code, _, err = run("build", walk, "--out", copied, "--close-loops", *BUILT)
-    assert code == 1
-    assert "not seen to come back" in err
-    assert (copied / "map.json").read_bytes() == before
 
 
 def there_and_back(path: Path, stray_m: float) -> tuple[Path, np.ndarray]:

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -58,14 +57,6 @@ def test_edits_are_there_in_another_build_of_the_map(home: Path, walk: Path, run
     told = json.loads(run("info", home, "--json")[1])
     assert told["edits"] == 2
     assert "(rename sofa to couch) finds nothing to apply to: nothing like the sofa is at" in told["notices"][-1]
-
-
-def test_people_who_edit_at_once_lose_nothing(tmp_path: Path) -> None:
-    edits = [Edit.new("pin", [EditedSpot(middle=(float(k), 0.0, 0.0))], name=f"place {k}") for k in range(12)]
-    with ThreadPoolExecutor(4) as pool:
-        list(pool.map(lambda edit: append_edit(tmp_path, edit), edits))
-    assert sorted(edit.name for edit in read_edits(tmp_path)) == sorted(edit.name for edit in edits)
-    assert not list(tmp_path.glob("*.partial"))
 
 
 @pytest.mark.parametrize(

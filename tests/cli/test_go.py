@@ -164,20 +164,6 @@ def test_a_start_in_a_thing_or_outside_is_refused(run, built: Path, in_room: Non
     assert out == ""
 
 
-def test_a_scene_that_the_map_was_not_made_of_is_refused(run, built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    elsewhere = Room(things=(), size=(2.0, 2.0, 2.6))
-    monkeypatch.setattr("avlmaps_sim.scenes.open_scene", lambda spec: scene_of(elsewhere))
-    status, _, err = run("go", built, "turn left", "--scene", "room")
-    assert status == 1
-    assert "is not the one that was mapped" in err
-
-
-def test_a_dry_run_prints_the_program_and_opens_nothing(answer) -> None:
-    said = answer("go", "nowhere.avlmap", "go to the chair, then turn left", "--dry-run")
-    assert said["program"].splitlines() == ['robot.move_to_object("chair")', "robot.turn(-90)"]
-    assert said["steps"] == said["actions"] == said["subgoals"] == []
-
-
 @pytest.mark.parametrize("at", ["source", "robot"])
 def test_a_place_of_sounds_is_said_to_be_idle_where_no_sound_is_named(answer, at: str) -> None:
     given = ("--dry-run", "--at", at)
@@ -186,11 +172,6 @@ def test_a_place_of_sounds_is_said_to_be_idle_where_no_sound_is_named(answer, at
     ]
     assert answer("go", "nowhere.avlmap", "go to the barking", *given)["notes"] == []
     assert answer("go", "nowhere.avlmap", "go to the chair", "--dry-run")["notes"] == []
-
-
-def test_the_reader_that_ships_has_its_former_name_too(answer) -> None:
-    said = answer("go", "nowhere.avlmap", "go to the chair", "--dry-run", "--language", "rules")
-    assert said == answer("go", "nowhere.avlmap", "go to the chair", "--dry-run")
 
 
 @pytest.mark.parametrize(
@@ -218,17 +199,6 @@ def test_an_option_without_effect_is_said(answer, option: str, value: str, why: 
 )
 def test_a_file_that_the_sentence_speaks_of_has_an_effect(answer, sentence: str, option: str, file: str) -> None:
     assert answer("go", "nowhere.avlmap", sentence, "--dry-run", option, file)["notes"] == []
-
-
-def test_a_query_says_which_options_have_no_effect(answer, built: Path, tmp_path: Path) -> None:
-    plot = tmp_path / "heat.png"
-    said = answer("query", built, "how many sounds are there?", "--plot", plot, "--at", "robot")
-    assert said["notes"][-2:] == [
-        "--at has no effect: no sound is named.", "--plot has no effect: the answer has no heat to draw.",
-    ]  # fmt: skip
-    assert not plot.exists()
-    said = answer("query", built, "the red thing", "--plot", plot)
-    assert plot.exists() and not [note for note in said.get("notes", ()) if "effect" in note]
 
 
 def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(

@@ -18,14 +18,6 @@ def test_while_the_command_line_is_loading() -> None:
     assert run(interrupt) == (130, "avlmaps: stopped\n")
 
 
-def test_while_the_words_are_read() -> None:
-    interrupt = (
-        "import tyro\ndef cli(*a, **k): raise KeyboardInterrupt\ntyro.cli = cli\n"
-        "from avlmaps.cli import main\nmain(['info', 'x'])"
-    )
-    assert run(interrupt) == (130, "avlmaps: stopped\n")
-
-
 def test_out_of_memory_is_a_sentence() -> None:
     starved = (
         "from avlmaps.cli import main\nfrom avlmaps.cli.info import Info\n"

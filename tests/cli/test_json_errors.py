@@ -12,9 +12,7 @@ from avlmaps.cli import verbs as usage
 from avlmaps.cli.build import Build
 from avlmaps.cli.go import Go
 from avlmaps.cli.output import UsageError
-from avlmaps.cli.verb import Verb
 from avlmaps.cli.verbs import VERBS, read_verb
-from avlmaps.core import errors
 from avlmaps.core.progress import NOTICE
 
 ERRORS = (
@@ -155,13 +153,6 @@ def test_a_fault_of_ours_is_json_with_its_traceback_on_standard_error(
     assert "division by zero; this is a fault of avlmaps" in said["error"]["message"]
 
 
-def test_each_error_of_the_family_has_a_kind_of_its_own() -> None:
-    from avlmaps.cli.output import kind_named
-
-    family = [name for name in vars(errors) if name.endswith("Error")]
-    assert len({kind_named(name) for name in family}) == len(family) >= 9
-
-
 @pytest.mark.nightly
 def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> None:
     code = (
@@ -178,15 +169,6 @@ def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> No
         for _ in range(2)
     ]
     assert told == [f"{NOTICE}\n", ""]
-
-
-def test_verbs_that_run_compiled_loops_say_so(run, monkeypatch: pytest.MonkeyPatch) -> None:
-    compile_something = {
-        "demo", "record", "build", "live", "locate", "go", "bench", "things", "rooms", "export",
-        "shell", "serve", "view", "merge", "changes", "edit", "sources",
-    }  # fmt: skip
-    assert {name for name, verb in VERBS.items() if verb.compiles} == compile_something
-    assert not Verb.compiles
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.core.errors import MapError
 from avlmaps.days.find import visits_of
-from avlmaps.live.live_map import LiveMap
 from avlmaps.maps.store.folder import read
 from avlmaps.recordings.layout import DESCRIPTION, UNFINISHED
 
@@ -45,21 +43,6 @@ def test_a_drive_updates_the_map_of_the_days_before(answer, dated: Path, built: 
     assert today.day == "2023-11-14", "a live map keeps its clock"
     whole = answer("info", home, "--verify")
     assert whole["frames"] == 2 * answer("info", built)["frames"] - 1
-
-
-@pytest.mark.nightly
-def test_a_drive_whose_writer_stopped_updates_the_map_as_well(answer, dated: Path, built: Path, tmp_path: Path) -> None:
-    (dated / DESCRIPTION).rename(dated / UNFINISHED)
-    words = ("--into", shutil.copytree(built, tmp_path / "home.avlmap"), "--voxel-size-m", "0.1", "--give-up-s", "0.3")
-    made = answer("live", dated, "--out", tmp_path / "today.avlmap", *words, "--profile", "colours", "--every-frame")
-    assert made["into"]["days"][-1]["day"] == "2023-11-14", "by its clock"
-
-
-@pytest.mark.nightly
-def test_a_drive_that_is_in_the_map_already_is_not_joined_again(run, walk: Path, built: Path, tmp_path: Path) -> None:
-    words = ("--into", shutil.copytree(built, tmp_path / "home.avlmap"), "--voxel-size-m", "0.1", *WHOLE)
-    code, _, err = run("live", walk, "--out", tmp_path / "today.avlmap", *words)
-    assert code == 1 and "the same drive as visit 1" in err
 
 
 @pytest.mark.nightly
@@ -108,11 +91,3 @@ def test_what_has_no_effect_on_a_recording_that_is_written_is_said(run, walk: Pa
     assert code == 0, err
     assert "--rate has no effect: the recording is being written." in err
     assert "--port has no effect: neither --serve nor --view is given." in err
-
-
-def test_a_device_that_is_not_known_or_not_recorded_is_refused(run, walk: Path, built: Path, tmp_path: Path) -> None:
-    code, _, err = run("live", walk, "--out", tmp_path / "no.avlmap", "--same-device", built)
-    assert code == 1 and "has no directions that a device said" in err
-    with pytest.raises(MapError, match="knows of no device that says directions"):
-        LiveMap(tmp_path / "no.avlmap", "colours", same_device=built)
-    assert not (tmp_path / "no.avlmap").exists()

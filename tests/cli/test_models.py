@@ -16,15 +16,11 @@ from avlmaps.perception.models import (
     ModelSettings,
     availability,
     from_environment,
-    how_to_get,
-    is_here,
     model_settings,
-    published_models,
     using_models,
 )
 from helpers.light_files import write_light
 
-KNOWN = published_models()
 ON_MODELS = ("build", "query", "locate", "go", "bench", "profiles")
 
 
@@ -73,12 +69,6 @@ def test_the_words_hold_while_the_verb_runs_and_for_processes_that_it_starts(
     assert model_settings() == from_environment() == ModelSettings(batch=7)
 
 
-def test_a_verb_that_names_nothing_changes_nothing(empty: Path) -> None:
-    given = ModelSettings(folder=empty, device="cpu")
-    with using_models(given), models_in_force(Query(map=Path("m"))):
-        assert model_settings() == given
-
-
 WRONG = (
     (("--models", "nowhere"), 1, "The folder of models"),
     (("--model", "pixels"), 2, "--model takes words like pixels="),
@@ -124,17 +114,6 @@ def test_a_missing_package_is_told_with_its_command(monkeypatch: pytest.MonkeyPa
     )
 
 
-LAYOUTS = ("org/name", "org--name", "name")
-
-
-@pytest.mark.parametrize("layout", LAYOUTS)
-def test_weights_in_the_folder_of_models_are_seen(empty: Path, every_package: None, layout: str) -> None:
-    assert state_of(Kind.PIXELS, "clip-patches", empty)[0] == "weights missing"
-    (empty / layout.replace("org", "openai").replace("name", "clip-vit-base-patch16")).mkdir(parents=True)
-    assert state_of(Kind.PIXELS, "clip-patches", empty)[0] == "ready"
-    assert state_of(Kind.PIXELS, "clip-patches")[0] == "weights missing", "another folder"
-
-
 def test_weights_in_the_hubs_cache_are_seen_without_its_library(tmp_path: Path, every_package: None) -> None:
     state, how = state_of(Kind.PIXELS, "clip-patches")
     assert state == "weights missing"
@@ -145,27 +124,6 @@ def test_weights_in_the_hubs_cache_are_seen_without_its_library(tmp_path: Path, 
     assert state_of(Kind.PIXELS, "clip-patches")[0] == "weights missing", "a configuration alone is not a model"
     (snapshot / "model.safetensors").write_bytes(b"")
     assert state_of(Kind.PIXELS, "clip-patches")[0] == "ready"
-
-
-@pytest.mark.parametrize("model", [name for name, known in KNOWN.items() if known.files and not known.package])
-def test_single_files_are_seen_where_others_keep_them(model: str, empty: Path, tmp_path: Path) -> None:
-    name = KNOWN[model].files[0]
-    assert not is_here(model)
-    assert name in how_to_get(model) or "hf download" in how_to_get(model) or "curl" in how_to_get(model)
-    cached = tmp_path / "torch" / "hub" / "checkpoints" / name
-    cached.parent.mkdir(parents=True)
-    cached.write_bytes(b"")
-    assert is_here(model)
-
-
-def test_every_model_of_a_profile_says_how_it_is_got() -> None:
-    from avlmaps.core.registry import backends
-
-    for backend in backends():
-        if backend.model and backend.target.startswith("avlmaps."):
-            assert " " in how_to_get(backend.model), backend.model
-            assert backend.licence, backend.model
-            assert "/" in backend.model or backend.model in KNOWN, "no hub can be asked for a file's name"
 
 
 def test_profiles_prints_state_command_size_and_licence(empty: Path, every_package: None, answer, run) -> None:
@@ -179,12 +137,6 @@ def test_profiles_prints_state_command_size_and_licence(empty: Path, every_packa
     licences = {entry["name"]: entry["licence"] for entry in by_name["paper"]["backends"]}
     assert "non-commercial" in licences["superpoint"]
     assert "non-commercial" in run("profiles")[1]
-
-
-def test_listing_the_profiles_loads_no_torch() -> None:
-    code = "import sys\nfrom avlmaps.cli.models import list_profiles\nlist_profiles()\nprint('torch' in sys.modules)"
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert out.strip() == "False"
 
 
 def test_the_light_profile_is_fetched_by_a_verb(empty: Path, answer, run, tmp_path: Path) -> None:

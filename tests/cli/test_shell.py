@@ -20,7 +20,7 @@ from typing import Any
 import cv2
 import pytest
 
-from avlmaps.cli.shell import LONGEST_LINE, PipedLines
+from avlmaps.cli.shell import PipedLines
 from avlmaps.core.extras import install_command
 from helpers.raycast import render
 from helpers.room import Room
@@ -70,15 +70,6 @@ def test_each_verb_answers_as_on_the_command_line(piped, answer, built: Path, tm
         assert without_times(one) == without_times(answer(*words))
 
 
-def test_sounds_and_rooms_are_those_of_things(piped, built: Path) -> None:
-    status, out, _ = piped("things\nsounds\nrooms\n", built, "--json")
-    assert status == 0
-    things, sounds, rooms = objects(out)
-    assert len(sounds["sounds"]) == 1
-    assert sounds["sounds"] == things["sounds"]
-    assert rooms["rooms"] == things["rooms"]
-
-
 def test_an_error_is_one_sentence_and_the_next_line_is_answered(piped, built: Path) -> None:
     lines = [
         "the blorfle",
@@ -99,19 +90,6 @@ def test_an_error_is_one_sentence_and_the_next_line_is_answered(piped, built: Pa
     assert "Traceback" not in err
 
 
-def test_lines_that_are_empty_comments_too_long_or_no_utf_8_do_no_harm(piped, built: Path) -> None:
-    lines = (
-        b"\n# a comment\n"
-        + b"x" * (3 * LONGEST_LINE)
-        + b"\n\xff\xfe\n\x1b]0;title\x07\nthe red cabinet\nquit\nthe blue table\n"
-    )
-    status, out, err = piped(lines, built)
-    assert status == 1
-    assert "\x1b" not in out + err
-    assert "avlmaps: 3 of 4 lines failed." in err
-    assert out.count("query: ") == 1, "quit ends the shell"
-
-
 def test_a_line_that_begins_like_a_verb_may_be_a_question(piped, built: Path) -> None:
     status, out, _ = piped("locate the red cabinet\nwhere is the red thing\n", built, "--json")
     assert status == 0
@@ -127,15 +105,6 @@ def test_plot_draws_the_map_and_then_the_last_answer(piped, built: Path, tmp_pat
     assert "plot takes the name" in said[3]["error"]["message"]
     assert first.read_bytes() != second.read_bytes()
     assert min(first.stat().st_size, second.stat().st_size) > 5000
-
-
-def test_export_writes_once(piped, built: Path, tmp_path: Path) -> None:
-    out_file = tmp_path / "room.ply"
-    status, out, _ = piped(f"export {out_file}\nexport {out_file}\nexport {out_file} --overwrite\n", built, "--json")
-    assert status == 1
-    said = objects(out)
-    assert said[0]["files"] == said[2]["files"] == [str(out_file)]
-    assert "--overwrite" in said[1]["error"]["message"]
 
 
 def test_a_plan_is_driven_only_when_it_is_confirmed(piped, built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -184,13 +153,6 @@ def test_a_map_that_is_replaced_is_opened_again(piped, built: Path, tmp_path: Pa
     status, _, err = piped("", copy, "--json")
     assert status == 0
     assert "was replaced on disk and is opened again" in err
-
-
-def test_start_without_a_scene_and_a_missing_map_end_the_shell(piped, built: Path) -> None:
-    status, _, err = piped("red\n", built, "--start", "1,2,3")
-    assert (status, "--scene" in err) == (2, True)
-    status, _, err = piped("red\n", "nowhere.avlmap")
-    assert (status, "is not there" in err) == (1, True)
 
 
 class Terminal:

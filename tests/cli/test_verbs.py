@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import soundfile
 
-from avlmaps.cli.info import next_lines
 from avlmaps.core.errors import BackendError
 from avlmaps.core.poses import rotation_angle_rad
 from helpers.raycast import render
@@ -27,13 +26,6 @@ def test_build_and_info_tell_the_contracts_keys(built: Path, answer) -> None:
     assert {"onset_s", "offset_s", "position"} <= sound.keys()
     assert sound["onset_s"] == pytest.approx(2.0, abs=0.15)
     assert sound["offset_s"] == pytest.approx(3.75, abs=0.3)
-
-
-def test_building_again_changes_nothing(built: Path, walk: Path, answer) -> None:
-    before = (built / "map.json").read_bytes()
-    told = answer("build", walk, "--out", built, "--voxel-size-m", "0.1", "--resume", "--profile", "colours")
-    assert told["voxels"] == answer("info", built)["voxels"]
-    assert (built / "map.json").read_bytes() == before
 
 
 def test_another_map_is_not_built_over_a_finished_one(built: Path, walk: Path, run) -> None:
@@ -59,10 +51,6 @@ def test_a_query_by_words_finds_the_cabinet(built: Path, answer) -> None:
     assert told["parts"][0]["modality"] == "object"
     assert told["parts"][0]["role"] == "primary"
     assert "understood only 'red'" in told["parts"][0]["note"]
-
-
-def test_a_query_for_what_is_not_there_says_so(built: Path, answer) -> None:
-    assert answer("query", built, "--object", "turquoise chair")["found"] is False
 
 
 def test_a_query_by_clip_finds_where_it_was_heard(built: Path, answer, tmp_path: Path) -> None:
@@ -111,14 +99,6 @@ def test_a_map_whose_sound_model_is_not_here_is_described_without_names(
     status, out, err = run("info", built, "--json")
     assert status == 0 and "names" not in json.loads(out)["sounds"][0]
     assert err == "note: the sounds have no names here. The sound model is not installed.\n"
-
-
-def test_info_of_a_bag_names_the_topics(walk: Path, run, answer, monkeypatch: pytest.MonkeyPatch) -> None:
-    from avlmaps.recordings.types import Recording
-
-    assert answer("info", walk)["topics"] == {}
-    monkeypatch.setattr(Recording, "topics", {"rgb": "/colour", "pose": "/tf"})
-    assert "topics:\n  rgb: /colour\n  pose: /tf\n" in run("info", walk)[1]
 
 
 def test_a_photo_is_located_to_the_contract(built: Path, answer, tmp_path: Path) -> None:
@@ -182,25 +162,6 @@ def test_a_sound_is_taught_and_forgotten(answer, run, tmp_path: Path, monkeypatc
     assert run("teach-sound", "robot beep")[0] == 2
 
 
-def test_profiles_lists_every_backend_with_its_state(answer, run) -> None:
-    told = answer("profiles")
-    (embedded,) = [entry for entry in told["profiles"] if entry["name"] == "embedded"]
-    states = {backend["module"]: backend["state"] for backend in embedded["backends"]}
-    assert states["sounds"] == states["pixels"] == states["local"] == "ready"
-    assert states["views"] == "ready"
-    assert {one["model"] for entry in told["profiles"] for one in entry["backends"]} >= {"avlmaps/colour-words-1"}
-    assert "colours" in run("profiles")[1]
-
-
-@pytest.mark.nightly
-def test_the_words_bench_writes_json_markdown_and_csv(answer, tmp_path: Path) -> None:
-    told = answer("bench", "words", "--out", tmp_path)
-    assert {"suite", "scenes", "tables"} <= told.keys()
-    assert json.loads((tmp_path / "words.json").read_text())["tables"] == told["tables"]
-    assert "weights words" in (tmp_path / "words.md").read_text()
-    assert (tmp_path / "words-phrases-kept-out-of-training.csv").read_text().startswith("queries,encoder,first")
-
-
 WRONG_WORDS = (
     (("query", "MAP"), "takes a sentence, or parts"),
     (("query", "MAP", "the chair", "--object", "red"), "and not both"),
@@ -256,16 +217,6 @@ def test_a_known_error_is_one_sentence(words, code, sentence, built: Path, walk:
         assert err.count("\n") == 1, err
 
 
-def test_adding_sounds_without_progress_says_nothing(walk: Path, tmp_path: Path, capsys) -> None:
-    from avlmaps.recordings.open import open_recording
-    from avlmaps_sim.mixing.add_sounds import add_sounds
-
-    (tmp_path / "clips" / "beep").mkdir(parents=True)
-    soundfile.write(tmp_path / "clips" / "beep" / "a.wav", beeps(1.0), RATE_HZ)
-    assert add_sounds(open_recording(walk), tmp_path / "clips", tmp_path / "out", min_distance_m=0.0, progress=False)
-    assert capsys.readouterr() == ("", "")
-
-
 @pytest.mark.nightly
 def test_info_and_build_end_with_what_to_do_next_in_three_lines(built: Path, walk: Path, run) -> None:
     for place, offered in ((built, "query"), (walk, "build")):
@@ -277,16 +228,6 @@ def test_info_and_build_end_with_what_to_do_next_in_three_lines(built: Path, wal
         assert len(details) > len(lines) - 3 and not [line for line in details if line.startswith("next:")]
         for words in following:  # each can be run
             assert run(*words[1:3], "--help")[0] == 0
-
-
-@pytest.mark.parametrize(
-    ("verdict", "says"), [("fine", "avlmaps build 'a b.bag' c.bag --out"), ("impossible", "correct")]
-)
-def test_what_is_next_has_every_part_and_builds_nothing_impossible(verdict: str, says: str) -> None:
-    lines = next_lines({"path": "a b.bag", "more": ["c.bag"], "consistency": {"verdict": verdict}})
-    assert lines[0].startswith(f"next: {says}") and len(lines) == 3
-    assert all("'a b.bag' c.bag" in line for line in lines[1:])
-    assert next_lines({"path": "rec", "consistency": None})[0] == "next: avlmaps build rec --out rec.avlmap"
 
 
 def test_another_day_is_merged_and_its_changes_are_told(dated: Path, built: Path, tmp_path: Path, answer, run) -> None:
@@ -301,14 +242,3 @@ def test_another_day_is_merged_and_its_changes_are_told(dated: Path, built: Path
     assert status == 0 and out.startswith("nothing is known to have changed")
     status, out, err = run("changes", home, "--since", "")
     assert status == 1 and out == "" and "day" in err
-
-
-def test_a_map_without_features_of_things_is_not_offered_a_question() -> None:
-    lines = next_lines({"path": "a.avlmap", "voxels": 9, "models": {"sounds": "x"}})
-    assert [line.split()[-2] for line in lines[:1]] == ["view"] and lines[0].startswith("next: ") and len(lines) == 2
-
-
-def test_a_map_of_colours_is_offered_a_question_that_it_understands() -> None:
-    answer = {"path": "a.avlmap", "voxels": 9, "models": {"pixels": "x"}}
-    assert '"something red"' in next_lines(answer | {"profile": "colours"})[0]
-    assert '"where is the chair?"' in next_lines(answer | {"profile": "embedded"})[0]

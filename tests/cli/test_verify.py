@@ -36,12 +36,3 @@ def test_the_cameras_height_puts_the_floor_where_it_says(walk: Path, tmp_path: P
     )  # fmt: skip
     assert made["ground"]["camera_height_m"] == 1.1
     assert answer("info", tmp_path / "told.avlmap")["ground"]["camera_height_m"] == 1.1
-
-
-def test_a_height_that_is_none_is_refused(walk: Path, tmp_path: Path, run: Run) -> None:
-    status, _, said = run(
-        "build", walk, "--out", tmp_path / "m.avlmap", "--profile", "colours", "--camera-height-m", "-2"
-    )
-    assert status in (1, 2)
-    assert "camera" in said
-    assert not (tmp_path / "m.avlmap" / "map.json").exists()

@@ -17,9 +17,6 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.changes import Days
 from avlmaps.query.sound_sources import SoundSource
 from avlmaps.serve.service import Service
-from avlmaps.serve.settings import ServeSettings
-
-TOKEN = "a token of twenty letters"
 
 
 @pytest.fixture
@@ -86,12 +83,6 @@ def test_changes_are_those_of_the_verb(client: TestClient, room: Path) -> None:
     assert client.get("/maps/room/changes", params={"since": "2026-11-25"}).json()["changes"] == []
 
 
-def test_a_map_of_one_day_has_neither(client: TestClient) -> None:
-    for address in ("things?at=1", "changes"):
-        refused = client.get(f"/maps/room/{address}")
-        assert refused.status_code == 422 and "seen on one day alone" in refused.json()["error"]["message"]
-
-
 def test_sources_are_those_of_the_verb(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     refused = client.get("/maps/room/sources")
     assert refused.status_code == 422 and "does not know where sounds came from" in refused.json()["error"]["message"]
@@ -108,10 +99,3 @@ def test_sources_are_those_of_the_verb(client: TestClient, monkeypatch: pytest.M
     assert client.get("/maps/room/sources", params=words).json()["sources"] == [source.to_json()]
     assert asked == [(["dog bark", "cat"], {"prior": False, "least": 0.5})]
     assert client.get("/maps/room/sources?prior=all").status_code == 400
-
-
-def test_both_need_the_token(room: Path, serving: Callable[..., TestClient]) -> None:
-    client = serving(Service.open({"room": room}), ServeSettings(token=TOKEN))
-    for address in ("sources", "changes"):
-        assert client.get(f"/maps/room/{address}").status_code == 401
-        assert client.get(f"/maps/room/{address}", headers={"authorization": f"Bearer {TOKEN}"}).status_code == 422

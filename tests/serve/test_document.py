@@ -9,8 +9,6 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from starlette.testclient import TestClient
 
-from avlmaps.core.errors import NoFloorError
-
 # Of a query with neither a sentence nor a part, or with both: OpenAPI cannot state that of an address.
 MAY_LACK_WORDS = ("ask", "askByPost", "askInView", "drawAnswer", "drawAnswerByPost")
 light = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -132,12 +130,6 @@ def test_a_body_is_answered_where_it_fits_and_else_refused(
     assert answered.status_code != 400 or not fits or lacks_words or at_odds, (body, answered.text[:300])
 
 
-def test_a_picture_of_an_answer_from_a_list_is_a_picture(client: TestClient) -> None:
-    for size in ("small", "full"):
-        drawn = client.get("/maps/room/picture", params={"sentence": "the last sound", "size": size})
-        assert drawn.status_code == 200 and drawn.content.startswith(b"\x89PNG"), size
-
-
 def test_intrinsics_without_a_photo_are_refused(client: TestClient) -> None:
     for values in ({}, {"sentence": "the red thing"}):
         refused = client.post("/maps/room/picture", files={"intrinsics": (None, "525,525,320,240")}, data=values)
@@ -164,12 +156,3 @@ def test_parts_of_a_query_that_are_at_odds_are_refused_with_one_sentence(client:
         assert answered.status_code == status, (query, answered.text[:200])
         message = answered.json()["error"]["message"]
         assert said in message and "/" not in message, query
-
-
-def test_a_map_without_a_floor_is_no_fault_of_the_server(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    def bare(*_: object) -> None:
-        raise NoFloorError("None of the map's voxels was hit, so that no floor can be found; map more frames.")
-
-    monkeypatch.setattr("avlmaps.navigate.paths.PathFinder.answer", bare)
-    answered = client.get("/maps/room/path", params={"from": "1,1", "to": "1,2"})
-    assert answered.status_code == 422 and answered.json()["error"]["kind"] == "map"

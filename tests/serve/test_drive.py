@@ -153,12 +153,6 @@ def test_what_has_no_plan_has_no_token(client: TestClient, drive: Driven, body: 
     assert drive.machine.motions == 0
 
 
-def test_a_question_back_names_its_choices_and_gives_no_token(client: TestClient) -> None:
-    answer = client.post("/drive/plan", json={"words": "turn"})
-    assert answer.status_code == 422
-    assert answer.json()["error"]["choices"]
-
-
 def test_a_token_is_good_once_and_for_a_short_time(client: TestClient, drive: Driven) -> None:
     told = plan(client, "turn left")
     assert told["expires_in_s"] == 60.0
@@ -233,20 +227,6 @@ def test_an_area_that_is_forbidden_while_it_drives_stops_the_robot(
     assert last["stopped"] is True and last["outcome"]["ok"] is False
     assert drive.machine.motions == 0 and drive.machine.stops == 1 and "stop" in drive.events
     assert last["note"] == "the wet floor was forbidden while the robot drove; plan again."
-
-
-def test_a_stop_ends_a_wait_and_what_comes_after_it(client: TestClient, drive: Driven) -> None:
-    token = plan(client, "wait 500 seconds, then turn left")["token"]
-    assert client.post("/drive/confirm", json={"token": token}).status_code == 202
-    assert client.post("/drive/stop").json()["stopped"] is True
-    assert idle(client)["last"]["outcome"]["ok"] is False
-    assert drive.machine.motions == 0
-
-
-def test_a_stop_without_any_order_is_accepted_and_logged(client: TestClient, drive: Driven) -> None:
-    assert client.post("/drive/stop").json() == {"stopped": True, "note": "it stands", "order": None}
-    assert drive.machine.stops == 1
-    assert drive.events == ["stop"]
 
 
 def test_a_robot_that_is_not_seen_to_stand_takes_no_order_until_it_is(client: TestClient, drive: Driven) -> None:

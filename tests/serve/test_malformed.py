@@ -7,7 +7,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
-from avlmaps.query.places import place_of
 from avlmaps.serve.lanes import RequestError
 from avlmaps.serve.requests import AskQuery, PathQuery, PlaceQuery, ThingsQuery, Uploads, read
 from avlmaps.serve.settings import Limits
@@ -56,11 +55,6 @@ def test_json_is_a_request_or_an_error_of_the_client(value: Any) -> None:
             assert error.status == 400
         else:
             assert isinstance(request, kind)
-
-
-@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=3))
-def test_a_place_is_read_back_as_it_was_written(numbers: list[float]) -> None:
-    assert place_of(",".join(map(repr, numbers))).tolist() == numbers
 
 
 @given(

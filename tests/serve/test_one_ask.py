@@ -10,7 +10,6 @@ import pytest
 from starlette.testclient import TestClient
 
 from avlmaps.cli import main
-from avlmaps.core.errors import QueryError
 from avlmaps.core.printable import shortened
 from avlmaps.core.question import Modality, Part, Question
 from avlmaps.maps.build import build_map
@@ -24,24 +23,9 @@ from avlmaps.serve.service import Service
 from avlmaps.view.labels import TOP
 from helpers.agent_talk import Agent
 
-SENTENCES = [
-    "chair",
-    "where can I sit?",
-    "how many chairs are there",
-    "the chair near the sofa",
-    "the chiar in the kitchen",
-    "the sound of a doorbell",
-    "a zebra",
-    "sofa or armchair",
-    "two chairs",
-    "what is in the kitchen?",
-    "what is next to the table?",
-    "the biggest room",
-    "the last sound",
-]
+SENTENCES = ["where can I sit?", "how many chairs are there", "the chiar in the kitchen", "a zebra", "the last sound"]
 PARTS = [
     {"object": "sofa", "area": "kitchen"},
-    {"object": "red chair"},
     {"object": "chair", "near": "1.0,2.0"},
     {"sound": "doorbell", "object": "table", "primary": "sound"},
 ]
@@ -121,16 +105,6 @@ def test_every_front_gives_the_answer_of_the_package(
     assert told == fitting(compact(expected)), "the same, rounded and cut for an agent"
 
 
-def test_python_counts_and_weighs_all_that_a_sentence_may_mean(opened: AVLMap) -> None:
-    sit = opened.ask("where can I sit?")
-    assert len(sit.alternatives) > 1
-    assert all(sit.probability >= other.probability for other in sit.alternatives if other.found == sit.found)
-    told = sit.to_dict()
-    assert [one["query"] for one in told.get("alternatives", [])]
-    assert opened.ask("how many zebras are there").count == 0
-    assert "count" not in opened.ask("chair").to_dict()
-
-
 def test_lists_answer_by_what_the_map_lists(opened: AVLMap) -> None:
     last, first = opened.ask("the last sound"), opened.ask("what did you hear first?")
     onsets = {sound.position: sound.onset_s for sound in opened.sounds()}
@@ -143,21 +117,6 @@ def test_lists_answer_by_what_the_map_lists(opened: AVLMap) -> None:
     things = {(thing.name, thing.position) for thing in opened.things()}
     for question in ("what is next to the table?", f"what is in the {opened.rooms()[0].name}?"):
         assert {(goal.name, goal.position) for goal in opened.ask(question, 100).goals} <= things
-
-
-def test_a_number_is_met_or_said_to_be_missed(opened: AVLMap) -> None:
-    count = opened.ask("how many chairs are there").count
-    assert count is not None
-    for number in (2, 3, 40):
-        answer = opened.ask(f"{number} chairs", 1)
-        assert (answer.count, answer.found) == (count, count >= number)
-        assert len(answer.goals) <= number
-
-
-def test_what_is_not_supported_is_said_with_what_is(opened: AVLMap) -> None:
-    for sentence in ("what colour is the sofa?", "why is the sky blue?"):
-        with pytest.raises(QueryError, match="It answers where things"):
-            opened.ask(sentence)
 
 
 NOTHING: list[tuple[Callable[[AVLMap], object], str]] = [

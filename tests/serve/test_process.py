@@ -90,20 +90,6 @@ def test_a_process_answers_programs_and_agents_and_finishes_what_runs(start: Sta
     assert "Traceback" not in process.stderr.read()
 
 
-@pytest.mark.nightly
-def test_a_killed_server_starts_again_on_the_same_port_with_the_same_answers(start: Start) -> None:
-    process, ready = start("--port", "0")
-    port = ready["url"].rpartition(":")[2]
-    before = httpx.get(f"{ready['url']}/maps/room/ask?sentence=the+red+thing").json()
-    process.kill()
-    process.wait(10)
-    again, ready = start("--port", port)
-    after = httpx.get(f"{ready['url']}/maps/room/ask?sentence=the+red+thing").json()
-    assert after["goals"] == before["goals"]
-    again.send_signal(signal.SIGINT)
-    assert again.wait(30) == 0
-
-
 def own_certificate(folder: Path) -> tuple[Path, Path]:
     """Write a certificate for 127.0.0.1 that signs itself, and its key."""
     key = ec.generate_private_key(ec.SECP256R1())
@@ -134,15 +120,6 @@ def test_with_tls_files_it_speaks_https_and_nothing_else(start: Start, tmp_path:
         httpx.get(f"http{ready['url'].removeprefix('https')}/health")
     process.send_signal(signal.SIGTERM)
     assert process.wait(30) == 0
-
-
-def test_tls_files_that_are_none_are_one_sentence(
-    room: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "a.pem").write_text("no certificate")
-    code, error = failed(capsys, room, "--port", 0, "--tls-cert", tmp_path / "a.pem", "--tls-key", tmp_path / "a.pem")
-    assert code == 1
-    assert "The TLS files cannot be used" in error
 
 
 @pytest.mark.nightly

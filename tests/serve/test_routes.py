@@ -120,11 +120,6 @@ def test_contents_are_those_of_things(client: TestClient, document: dict[str, An
     assert len(answer["sounds"]) == 1
 
 
-def test_things_of_some_names_are_listed(client: TestClient, opened: AVLMap) -> None:
-    answer = client.get("/maps/room/things", params={"least": 0.1, "name": ["red", "blue"]}).json()
-    assert answer["things"] == [shortened(thing.to_json()) for thing in opened.things(["red", "blue"], 0.1)]
-
-
 QUERIES = (
     {"object": "red thing", "top": 5},
     {"sentence": "the red thing near the sound of beeping", "top": 2},
@@ -147,13 +142,6 @@ def test_a_query_has_one_answer_by_every_method(
     for answer in answers:
         conforms(document, "/maps/{map}/ask", answer.json())
         assert plain(answer.json()) == plain(answers[0].json())
-
-
-def test_a_query_is_answered_as_the_package_does(client: TestClient, opened: AVLMap) -> None:
-    answer = client.get("/maps/room/ask", params={"sentence": "the red thing", "top": 4}).json()
-    assert plain(answer) == plain(opened.ask("the red thing", top=4).to_json())
-    again = client.get("/maps/room/ask", params={"sentence": "the red thing", "top": 4}).json()
-    assert plain(again) == plain(answer), "the remembered heat gives the same answer"
 
 
 def test_a_photo_and_a_clip_are_taken_from_the_form(client: TestClient, photo: bytes, clip: bytes) -> None:
@@ -247,12 +235,6 @@ def test_tiles_hold_every_voxel(client: TestClient, document: dict[str, Any], op
     assert HEADER.unpack_from(hot.content)[3] == 7
 
 
-def test_the_clip_of_a_sound_is_the_map_s_own(client: TestClient, opened: AVLMap) -> None:
-    clip = client.get("/maps/room/sounds/0/clip")
-    assert clip.headers["content-type"] == "audio/flac"
-    assert clip.content == opened.data.sounds.clips[0].read_bytes()
-
-
 def test_progress_comes_as_events_and_the_answer_last(client: TestClient) -> None:
     params = {"least": 0.123}
     with client.stream("GET", "/maps/room/things", params=params, headers={"accept": "text/event-stream"}) as got:
@@ -265,12 +247,6 @@ def test_progress_comes_as_events_and_the_answer_last(client: TestClient) -> Non
     done = [step["done"] for step in steps if step["stage"] == "things"]
     assert done == sorted(done)
     assert len(done) > 2
-
-
-def test_a_fault_comes_as_an_event(client: TestClient) -> None:
-    got = client.get("/maps/room/ask", params={"sentence": "why"}, headers={"accept": "text/event-stream"})
-    assert "event: error" in got.text
-    assert '"kind":"query"' in got.text
 
 
 ERRORS: tuple[tuple[str, Callable[[TestClient], Any], int, str, str], ...] = (
@@ -342,12 +318,6 @@ def test_a_picture_that_unfolds_to_gigabytes_is_refused_by_its_header(client: Te
     assert "60000x60000" in error["message"]
 
 
-def test_a_long_clip_is_refused_by_its_header(client: TestClient) -> None:
-    stream = io.BytesIO()
-    soundfile.write(stream, np.zeros(130 * 8000, np.float32), 8000, format="FLAC")
-    assert "130 s" in error_of(client.post("/maps/room/ask", files={"clip": stream.getvalue()}), 413)["message"]
-
-
 def test_a_full_queue_and_a_slow_query_are_answered_so(service: Service, serving: Callable[..., TestClient]) -> None:
     from dataclasses import replace
 
@@ -400,11 +370,3 @@ def test_the_focal_length_of_an_uploaded_photo_is_that_of_its_exif(client: TestC
     given = {"intrinsics": "160,160,120,90"}
     sure = client.post("/maps/room/locate", files={"photo": stream.getvalue()}, data=given).json()
     assert noted["focal_from"] in ("exif", "photo") and sure["focal_from"] == "given"
-
-
-def test_a_query_takes_a_photo_with_the_intrinsics_of_its_camera(client: TestClient, photo: bytes) -> None:
-    sent = {"sentence": "the red thing near this photo"}
-    plain = client.post("/maps/room/ask", files={"photo": photo}, data=sent)
-    given = client.post("/maps/room/ask", files={"photo": photo}, data={**sent, "intrinsics": "160,160,120,90"})
-    assert plain.status_code == given.status_code == 200, given.text
-    assert given.json()["goals"] == plain.json()["goals"], "they are the map's own"

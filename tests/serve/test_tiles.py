@@ -59,15 +59,3 @@ def test_a_coarser_voxel_has_the_mean_colour_and_the_highest_heat_of_its_own(ind
         np.testing.assert_allclose([r, g, b], rgb[mine].mean(axis=0), atol=0.51)
         assert abs(hot - 255 * heat[mine].max()) <= 0.51
     assert len(found) == len(np.unique(coarse, axis=0))
-
-
-def test_an_empty_map_has_a_level_without_tiles() -> None:
-    pyramid = Pyramid(np.zeros((0, 3), np.int32), np.zeros((0, 3), np.uint8), 0.05)
-    assert pyramid.index("v")["levels"] == [{"level": 0, "voxel_size_m": 0.05, "voxels": 0, "tiles": []}]
-    assert pyramid.tile(0, (0, 0, 0)) is None
-
-
-def test_a_tile_that_is_not_there_is_none() -> None:
-    pyramid = Pyramid(np.zeros((1, 3), np.int32), np.zeros((1, 3), np.uint8), 0.05)
-    assert pyramid.tile(0, (1, 0, 0)) is None
-    assert pyramid.tile(9, (0, 0, 0)) is None

@@ -146,38 +146,6 @@ def test_colours_and_cuts_change_the_picture(page) -> None:
 
 
 @pytest.mark.nightly
-def test_the_keyboard_alone_moves_the_view(page) -> None:
-    before = picture(page)
-    page.focus("#canvas")
-    for key in ("ArrowLeft", "ArrowLeft", "w", "+"):
-        page.keyboard.press(key)
-    assert (picture(page) != before).any(axis=2).mean() > 0.05
-
-
-@pytest.mark.nightly
-def test_nothing_asked_gets_a_hint_and_no_request(page) -> None:
-    requests = []
-    page.on("request", lambda one: requests.append(one.url))
-    page.click("#ask button.main")
-    page.wait_for_selector("#answer .verdict:has-text('Write a question')")
-    assert requests == []
-
-
-@pytest.mark.nightly
-def test_a_whole_map_stays_whole_in_a_window_of_another_shape(page) -> None:
-    far = "avlmapsView.viewer.camera.distance"
-    wide = page.evaluate(far)
-    page.set_viewport_size({"width": 420, "height": 1400})
-    until(page, f"{far} > {1.2 * wide}")
-    page.focus("#canvas")
-    page.keyboard.press("+")
-    nearer = page.evaluate(far)
-    page.set_viewport_size({"width": 1000, "height": 640})
-    page.wait_for_selector("#canvas[data-state=whole]")
-    assert page.evaluate(far) == nearer, "a view that a person chose stays"
-
-
-@pytest.mark.nightly
 def test_a_phone_has_room_for_every_control_and_is_told_of_fingers(browser, served: Served) -> None:
     context = browser.new_context(viewport={"width": 320, "height": 568}, has_touch=True, is_mobile=True)
     phone = context.new_page()
@@ -316,53 +284,6 @@ def test_the_whole_map_is_in_the_picture_from_its_side_and_as_a_plan(
 
 
 @pytest.mark.nightly
-def test_the_scale_is_as_long_as_it_says(page) -> None:
-    page.click("#above")
-    page.wait_for_selector("#canvas[data-state=whole]")
-    metres = float(page.get_attribute("#scale-bar", "data-metres"))
-    bar = page.locator("#scale-bar").bounding_box()["width"]
-    apart = page.evaluate(
-        """(metres) => { const viewer = avlmapsView.viewer, [place] = viewer.places(), { camera } = viewer;
-        const { clipFromLevel } = camera.seen(place.aspect);
-        return clipFromLevel[0] * metres * place.box.seenWidth / 2; }""",
-        metres,
-    )
-    assert bar == pytest.approx(apart, abs=0.6)
-    assert "level frame" in page.inner_text("#scale-text")
-
-
-@pytest.mark.nightly
-def test_a_pressed_button_can_be_read(page) -> None:
-    page.click("#measure")
-    shades = page.locator("#measure").evaluate(
-        "e => [getComputedStyle(e).color, getComputedStyle(e).backgroundColor].map((c) => c.match(/[0-9.]+/g))"
-    )
-    ink, ground = (np.array(shade[:3], float) for shade in shades)
-    assert abs(ink - ground).sum() > 250
-
-
-@pytest.mark.parametrize("width", [390, 700, 1000, 1280])
-@pytest.mark.nightly
-def test_nothing_at_the_foot_lies_over_anything_else(browser, served: Served, width: int) -> None:
-    page = opened(browser, served.url, width, 700)
-    page.wait_for_selector("#canvas[data-state=whole]")
-    page.click("#above")
-    page.locator("#length").evaluate("e => { e.textContent = '13.40 m; level 12.94 m, up 11.70 m'; }")
-    canvas = page.locator("#canvas").bounding_box()
-    scale = page.locator("#scale").bounding_box()
-    for box in (one.bounding_box() for one in page.locator("#tools button, #length").all()):
-        apart = (
-            box["x"] + box["width"] <= scale["x"] + 0.5
-            or box["y"] + box["height"] <= scale["y"] + 0.5
-            or scale["y"] + scale["height"] <= box["y"] + 0.5
-        )
-        assert apart
-        assert box["x"] >= 0 and box["x"] + box["width"] <= canvas["width"]
-    assert page.faults == []
-    page.close()
-
-
-@pytest.mark.nightly
 def test_a_reload_brings_back_the_view_and_the_question(page) -> None:
     page.fill("#sentence", "the red thing")
     page.keyboard.press("Enter")
@@ -378,41 +299,6 @@ def test_a_reload_brings_back_the_view_and_the_question(page) -> None:
     assert camera(page)["numbers"] == pytest.approx(before, abs=2e-3)
     assert page.input_value("#colour") == "thing"
     assert float(page.input_value("#high")) == pytest.approx(1.0, abs=0.03)
-
-
-@pytest.mark.parametrize("hash_", ["#view=a,b,c,d,e,f,g&cut=x", "#view=0,0,-1,0,0,0,0&colour=none"])
-@pytest.mark.nightly
-def test_an_address_that_means_nothing_opens_the_whole_map(browser, served: Served, hash_: str) -> None:
-    page, plain = opened(browser, served.url + hash_), opened(browser, served.url)
-    assert camera(page)["numbers"] == camera(plain)["numbers"]
-    assert page.faults == []
-    page.close()
-    plain.close()
-
-
-@pytest.mark.nightly
-def test_a_name_on_the_map_is_a_way_to_go_there(page) -> None:
-    page.wait_for_selector("#canvas[data-state=whole]")
-    mark = page.locator(".mark.thing:visible").first
-    name, before = mark.inner_text(), camera(page)["numbers"]
-    mark.click()
-    after = camera(page)["numbers"]
-    things = page.evaluate("avlmapsView.contents[0].things.map(({ name, position }) => ({ name, position }))")
-    reached = [t for t in things if t["name"] == name and t["position"] == pytest.approx(after[3:6], abs=2e-3)]
-    assert reached and after[2] < before[2]
-
-
-@pytest.mark.nightly
-def test_the_legend_lies_on_the_map_with_a_colour_for_each_kind(page) -> None:
-    page.select_option("#colour", "thing")
-    shades = page.locator("#legend li i").evaluate_all("all => all.map((e) => getComputedStyle(e).backgroundColor)")
-    assert len(shades) == len(set(shades)) >= 2
-    assert page.locator("#stage #legend").is_visible()
-    legend, goals = page.locator("#legend").bounding_box(), page.locator("#panel").bounding_box()
-    assert legend["x"] + legend["width"] <= goals["x"]
-    page.locator("details:has(#things) summary").click()
-    listed = page.locator("#things .swatch").evaluate_all("all => all.map((e) => getComputedStyle(e).backgroundColor)")
-    assert set(listed) <= set(shades)
 
 
 @pytest.mark.nightly

@@ -21,14 +21,6 @@ def test_every_voxel_is_drawn_once_and_the_last_level_draws_all(index: np.ndarra
 
 
 @given(voxels())
-def test_levels_grow_and_their_blocks_shrink(index: np.ndarray) -> None:
-    _, levels = detail_order(index)
-    assert [level.count for level in levels] == sorted(level.count for level in levels)
-    edges = [level.edge for level in levels]
-    assert edges == sorted(edges, reverse=True)
-
-
-@given(voxels())
 def test_a_level_shows_every_block_and_little_more(index: np.ndarray) -> None:
     order, levels = detail_order(index)
     for number, level in enumerate(levels[:-1]):
@@ -37,23 +29,6 @@ def test_a_level_shows_every_block_and_little_more(index: np.ndarray) -> None:
         np.testing.assert_array_equal(drawn, blocks)
         if number == 0:
             assert level.count == len(blocks)
-
-
-def test_any_part_of_a_level_is_spread_over_the_map() -> None:
-    index = np.argwhere(np.ones((64, 64, 1), bool))
-    order, levels = detail_order(index)
-    for count in (levels[-2].count // 2, len(index) // 2):
-        quarter = np.bincount((index[order[:count], :2] // 32) @ [2, 1], minlength=4)
-        assert quarter.min() > 0.1 * count
-
-
-@given(voxels(), st.integers(0, 60))
-def test_a_smaller_number_of_voxels_is_the_beginning_of_all(index: np.ndarray, most: int) -> None:
-    order, levels = detail_order(index)
-    some, fewer = detail_order(index, most)
-    np.testing.assert_array_equal(some, order[:most])
-    assert fewer == levels[: len(fewer)]
-    assert fewer[-1].count >= len(some)
 
 
 def test_far_voxels_need_no_table_of_all_blocks() -> None:

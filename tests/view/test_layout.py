@@ -7,8 +7,8 @@ import pytest
 
 from avlmaps.maps.storeys import Storey, Storeys
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
-from avlmaps.view.labels import Labels, palettes
+from avlmaps.query.naming import keyframes_that_saw
+from avlmaps.view.labels import Labels
 from avlmaps.view.layout import RECORD, Layout, as_bytes
 
 
@@ -62,11 +62,6 @@ def test_the_description_of_a_map_of_several_storeys_cuts_each_out(layout: Layou
     assert all(np.isfinite(one["cut"]).all() for one in (ground, first))
 
 
-def test_thumbnails_are_jpegs_and_others_are_none(layout: Layout) -> None:
-    assert layout.thumbnail(0)[:2] == b"\xff\xd8"  # pyright: ignore[reportOptionalSubscript]
-    assert layout.thumbnail(-1) is None and layout.thumbnail(10_000) is None
-
-
 def test_each_voxel_of_a_thing_has_the_things_label(layout: Layout, labels: Labels) -> None:
     assert labels.voxels.shape == (len(layout), 4)
     by_row = np.zeros(len(layout), np.uint8)
@@ -85,27 +80,6 @@ def test_contents_are_described_with_boxes_round_their_voxels(layout: Layout, la
     assert len(told["sounds"]) == 1 and "clip" not in told["sounds"][0]
 
 
-def test_a_map_without_a_model_for_rooms_has_a_note_in_their_place(labels: Labels) -> None:
-    assert labels.rooms == () and labels.notes
-
-
-def test_palettes_have_256_colours_each(labels: Labels) -> None:
-    for colours in palettes(labels).values():
-        assert len(colours) == 768 and min(colours) >= 0 and max(colours) <= 255
-
-
-def test_the_likeliest_name_of_a_voxel_is_that_of_all_voxels(room: AVLMap) -> None:
-    namer = VoxelNamer(room)
-    number, confidence = namer.best()
-    for row in range(0, len(number), 997):
-        named = namer.likeliest(row)
-        if number[row] < 0:
-            assert named == []
-            continue
-        assert named[0] == (namer.names[number[row]], pytest.approx(float(confidence[row]), abs=1e-5))
-        assert [share for _, share in named] == sorted((share for _, share in named), reverse=True)
-
-
 def test_a_keyframe_saw_what_stood_open_before_it_and_nothing_behind_a_wall(room: AVLMap) -> None:
     stored = room.data
     number = len(stored.keyframes) // 2
@@ -119,12 +93,3 @@ def test_a_keyframe_saw_what_stood_open_before_it_and_nothing_behind_a_wall(room
     behind = int(np.argmin((room.points - start) @ ahead))
     assert ((room.points[behind] - start) @ ahead) < 0
     assert number not in keyframes_that_saw(room, room.space, behind)
-
-
-def test_a_space_holds_its_own_cells_and_no_others(room: AVLMap) -> None:
-    index = np.asarray(room.space.index)
-    assert room.space.holds(index).all()
-    others = index + np.array([10_000, 0, 0])
-    assert not room.space.holds(others).any()
-    missing = {tuple(cell) for cell in index + np.array([1, 0, 0])} - {tuple(cell) for cell in index}
-    assert not room.space.holds(np.array(sorted(missing))).any()

@@ -76,11 +76,6 @@ def test_a_text_cannot_end_the_script_or_stand_for_another_part(room: AVLMap, tm
         assert made.count("<script") == 2 and "<title>" in made
 
 
-def test_default_questions_are_answered_by_the_map(room: AVLMap) -> None:
-    asked = default_questions(MapOnPage(room).labels)
-    assert asked and any(room.ask(question).found for _, question in asked)
-
-
 def test_a_large_map_is_asked_few_questions_of_one_part(
     room: AVLMap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

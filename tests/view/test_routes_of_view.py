@@ -1,8 +1,6 @@
 """The page as operations of the server: what it draws, asks and plans, and what it refuses."""
 
-import gc
 import json
-import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,7 @@ import numpy as np
 import pytest
 
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.view.labels import TOP, MapOnPage
+from avlmaps.view.labels import TOP
 from avlmaps.view.layout import RECORD
 from helpers.viewing import Served
 
@@ -80,24 +78,6 @@ def test_what_is_not_there_is_not_found(call: Call, path: str) -> None:
     assert answer.status_code == 404 and set(answer.json()) == {"error"}
 
 
-@pytest.mark.nightly
-def test_memory_stays_flat_over_many_questions(room: AVLMap) -> None:
-    page = MapOnPage(AVLMap(room))
-    words = ["the red thing", "the blue thing near the red thing", "the sound of rain", "how many red things are there"]
-    for sentence in words:
-        page.heat_of(page.avlmap.ask(sentence))
-    tracemalloc.start()
-    sizes = []
-    for _ in range(5):
-        for k in range(12):
-            page.heat_of(page.avlmap.ask(words[k % 4]))
-        gc.collect()
-        sizes.append(tracemalloc.get_traced_memory()[0])
-    tracemalloc.stop()
-    # What leaks grows in every round; what other threads of the tests hold comes and goes.
-    assert np.diff(sizes).min() < 50_000, sizes
-
-
 def test_a_command_is_read_and_planned_and_nothing_drives_without_a_scene(call: Call) -> None:
     told = call("view/rehearse", command="go to the nearest red thing, then wait 30 seconds and turn left").json()
     assert told["driven"] is None and told["planned"]["ok"] is True
@@ -109,12 +89,6 @@ def test_a_command_is_read_and_planned_and_nothing_drives_without_a_scene(call: 
     start = ",".join(f"{value:.6f}" for value in told["pose"])
     then = call("view/rehearse", command="turn left", start=start).json()
     np.testing.assert_allclose(then["planned"]["places"][0], places[-1], atol=1e-3)
-
-
-def test_a_plan_lets_no_time_pass(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.navigate.skills.sleep", lambda seconds: pytest.fail(f"it sleeps {seconds} s"))
-    told = call("view/rehearse", command="wait 500 seconds").json()
-    assert "wait" in told["program"] and told["planned"]["error"] is None
 
 
 def test_a_command_goes_to_a_photo_and_its_program_names_no_folder(call: Call) -> None:

@@ -106,25 +106,15 @@ class Go(Asking, MapVerb):
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """A robot that is ready for a program.
-
-    Attributes:
-        driver: moves it.
-        start: where it stands.
-        obstacles: the obstacles that the map knows.
-        contacts: returns where it touched something that the map does not know.
-        halt: returns how the robot stands after an interrupt.
-        owes: returns whether a goal was sent whose end is not confirmed.
-        close: ends the connection; a real robot stops where it is.
-    """
+    """A robot that is ready for a program."""
 
     driver: "Driver"
     start: "GroundPose"
     obstacles: "Obstacles"
-    contacts: "Callable[[], Float[np.ndarray, 'm 2'] | None]"
-    halt: "Callable[[], Halt]"
-    owes: "Callable[[], bool]"
-    close: "Callable[[], None]"
+    contacts: "Callable[[], Float[np.ndarray, 'm 2'] | None]"  # where it touched what the map does not know
+    halt: "Callable[[], Halt]"  # how it stands after an interrupt
+    owes: "Callable[[], bool]"  # whether a goal was sent whose end is not confirmed
+    close: "Callable[[], None]"  # ends the connection; a real robot stops where it is
 
 
 def go(verb: "Go") -> dict[str, Any]:

@@ -119,14 +119,7 @@ def _live(verb: Live) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Source:
-    """Where frames and sound come from.
-
-    Attributes:
-        up_in_world: up in the world of its poses, where that is known.
-        begins_s: what its clock said at time 0; 0 where stamps are dates.
-        microphones: where those of its sound are, where that is known before.
-        play: gives a map frames and sound until it says that it is over.
-    """
+    """Where frames and sound come from; ``begins_s`` is what its clock said at time 0, 0 where stamps are dates."""
 
     up_in_world: Any
     begins_s: float

@@ -13,7 +13,6 @@ from avlmaps.cli.verb import Asking, InFrame, MapVerb, OptionalPath, OptionalTex
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
-    from avlmaps.core.camera import Pinhole
     from avlmaps.query.asking import Asked
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.settings import QuerySettings
@@ -139,12 +138,14 @@ class Locate(InFrame, MapVerb):
         super().run()
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
+        from avlmaps.core.camera import Pinhole
         from avlmaps.query.locate import focal_35mm_of
         from avlmaps.query.modalities.image import read_picture
         from avlmaps.query.schema import locate_answer
 
         rgb = read_picture(self.image)
-        given = None if self.intrinsics is None else camera_of(self.intrinsics, rgb.shape[1], rgb.shape[0])
+        size = {"width": rgb.shape[1], "height": rgb.shape[0]}
+        given = None if self.intrinsics is None else Pinhole(*numbers_of(self.intrinsics), **size)
         found = avlmap.locate(rgb, given, None if given is not None else focal_35mm_of(self.image))
         if found.world_from_camera is not None and given is not None and found.camera != given:
             say(f"note: the focal length {given.fx:g} does not fit the photo; {found.camera.fx:.1f} was used.")
@@ -161,13 +162,6 @@ class Locate(InFrame, MapVerb):
             f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):",
             *rows,
         ]
-
-
-def camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
-    """Read ``fx,fy,cx,cy`` in pixels for a picture of this size."""
-    from avlmaps.core.camera import Pinhole
-
-    return Pinhole(*numbers_of(intrinsics), width=width, height=height)
 
 
 def numbers_of(intrinsics: str) -> tuple[float, float, float, float]:

@@ -7,7 +7,6 @@ import shlex
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
-from pathlib import Path
 
 from prompt_toolkit import PromptSession
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
@@ -20,7 +19,6 @@ from avlmaps.core.lexicon import lexicon
 from avlmaps.core.printable import UNSAFE
 from avlmaps.core.progress import say
 
-_MOST_HISTORY_BYTES = 1_000_000
 _MOST_WORDS = 4  # of a name that is being typed
 _MOST_SHOWN = 40
 
@@ -70,19 +68,12 @@ def _history() -> FileHistory | InMemoryHistory:
     path = state_file("shell_history")
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        with path.open("ab+") as file:
-            path.chmod(0o600)
-            if file.tell() > _MOST_HISTORY_BYTES:
-                _shorten(path)
+        path.touch(0o600)
+        path.chmod(0o600)  # nobody else reads it
     except OSError as error:
         say(f"note: there is no history: {path}: {error.strerror}.")
         return InMemoryHistory()
     return FileHistory(str(path))
-
-
-def _shorten(path: Path) -> None:
-    content = path.read_bytes()[-_MOST_HISTORY_BYTES // 2 :]
-    path.write_bytes(content[max(content.find(b"\n\n"), 0) :])
 
 
 def completions(line: str, verbs: Sequence[str], file_verbs: Sequence[str], here: Iterable[str]) -> list[Completion]:

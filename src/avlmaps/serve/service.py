@@ -33,21 +33,13 @@ log = logging.getLogger("avlmaps.serve")
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """What every part of the server shares.
-
-    Attributes:
-        settings: where it listens, and its limits.
-        shelf: the maps.
-        quick: the lane of queries in words.
-        slow: the lane of photos, clips, lists and pictures.
-        privacy: takes paths out of sentences.
-    """
+    """What every part of the server shares."""
 
     settings: ServeSettings
     shelf: Shelf
-    quick: Lane
-    slow: Lane
-    privacy: Privacy
+    quick: Lane  # of queries in words
+    slow: Lane  # of photos, clips, lists and pictures
+    privacy: Privacy  # takes paths out of sentences
 
     @classmethod
     def open(

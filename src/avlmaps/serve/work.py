@@ -60,15 +60,7 @@ from avlmaps.serve.shelf import ServedMap, Shelf
 
 @dataclass(frozen=True, slots=True)
 class WorkInput:
-    """What a piece of work is given.
-
-    Attributes:
-        map: the map that it is about.
-        limits: of the server.
-        uploads: files of the request.
-        watch: reports progress; ends the work when nobody waits for it.
-        path: the numbers in the address.
-    """
+    """What a piece of work is given; ``path`` are the numbers in the address."""
 
     map: ServedMap
     limits: Limits
