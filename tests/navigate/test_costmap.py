@@ -142,7 +142,7 @@ class _WordMap:
             zero, np.full(n, 9, np.int64),
         )  # fmt: skip
         keyframes = SimpleNamespace(world_from_camera=np.zeros((0, 4, 4)))
-        self = SimpleNamespace(voxels=voxels, grid=grid, up_in_world=np.eye(3)[2], keyframes=keyframes)
+        self.data = SimpleNamespace(voxels=voxels, grid=grid, up_in_world=np.eye(3)[2], keyframes=keyframes)
         self.edited = SimpleNamespace(forbidden=())
 
     def knows(self, word):

@@ -42,12 +42,10 @@ def home(stairs: bool = True) -> Any:
                     np.zeros((count, 3), np.uint8), np.zeros(count), np.full(count, 9))  # fmt: skip
     poses = np.tile(np.eye(4), (len(drawn.cameras), 1, 1))
     poses[:, :3, 3] = drawn.cameras
-    stored = SimpleNamespace(
-        voxels=voxels, grid=grid, up_in_world=Z, keyframes=SimpleNamespace(world_from_camera=poses)
-    )
+    data = SimpleNamespace(voxels=voxels, grid=grid, up_in_world=Z, keyframes=SimpleNamespace(world_from_camera=poses))
     storeys = find_storeys(grid.centre_of(index), VOXEL_M, drawn.cameras)
     unedited = SimpleNamespace(forbidden=())
-    return SimpleNamespace(stored=stored, space=Space(grid, index, Z), storeys=storeys, edited=unedited)
+    return SimpleNamespace(data=data, space=Space(grid, index, Z), storeys=storeys, edited=unedited)
 
 
 HOME, BARE = home(), home(stairs=False)

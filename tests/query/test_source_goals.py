@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from query_fakes import furnished_map, sounds_of
+from query_fakes import FakeMap, furnished_map, sounds_of
 
 from avlmaps.core.question import HeardAt, Modality, Part, Role
 from avlmaps.language.learned_translator import LearnedTranslator
@@ -16,7 +16,6 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.sources.candidates import Spread
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.answer import PartAnswer, absent_text, found_text
-from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.sound import SourceAnchors, source_factor
 from avlmaps.query.settings import HeatSettings, SoundSettings
@@ -108,7 +107,7 @@ def test_a_plan_says_where_a_sound_comes_from_where_that_is_meant() -> None:
     ]
 
 
-class Asked(AVLMap):
+class Asked(FakeMap):
     """A map that notes what it is asked for, and answers where it was heard."""
 
     def heat(self, part: Part, intrinsics: Any = None, attachments: Any = None) -> Heatmap:
@@ -130,7 +129,8 @@ def test_each_sound_that_says_where_a_thing_is_has_its_own_place(
     words: str, places: list[HeardAt | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("avlmaps.query.sound_sources.no_sources", lambda stored: "")
-    asked = Asked(furnished_map(sounds=sounds_of([np.ones((3, 3))], [1.0])))
+    home = furnished_map(sounds=sounds_of([np.ones((3, 3))], [1.0]))
+    asked = Asked(home.data, home.encoders)
     asked.ask(words)
     assert [part.at for part in asked.__dict__["parts"] if part.modality is Modality.SOUND] == places
     for chosen in AT:

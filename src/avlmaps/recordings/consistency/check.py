@@ -18,6 +18,7 @@ from avlmaps.core.wording import option
 from avlmaps.recordings.channels import level_faults
 from avlmaps.recordings.consistency import agreement as limits
 from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, Agreement, compare, without_occluded
+from avlmaps.recordings.consistency.flats import Flats
 from avlmaps.recordings.consistency.readings import LEAST_OFF, Reading, Trial, Trials, cause_of, find_cause, find_closer
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.consistency.verdict import Reason, Said, Suspicion, Verdict, findings_of
@@ -116,6 +117,11 @@ class Evidence:
             return (), ()
 
     @cached_property
+    def flats(self) -> Flats:
+        """Flat surfaces of single frames, where lenses show."""
+        return Flats.of(self.sample)
+
+    @cached_property
     def trials(self) -> Trials:
         """Tries other readings."""
         return Trials(self.recording, self.sample)
@@ -132,10 +138,8 @@ class Evidence:
         if best is None:
             return ""
         if best.reading == Reading(focal=best.reading.focal):
-            from avlmaps.recordings.consistency.suspicions import lens_words
-
-            if lens := lens_words(self):  # another focal length moves what it bends, and leaves flat surfaces flat
-                return lens
+            for lens in findings_of((LENS,), self):  # another focal length moves what it bends; flat stays flat
+                return str(lens)
         return cause_of(best.reading, self.recording, self.median_m, self._gain(best))
 
     def _explains(self, trial: Trial) -> bool:
@@ -159,6 +163,24 @@ class Evidence:
             )
         then = best.after if unlike is self.after else best.apart
         return f"(correlation {unlike.likeness:.2f} -> {then.likeness:.2f})"
+
+
+def _lens(evidence: Evidence) -> Iterator[Said]:
+    if (found := evidence.flats.lens()) is not None:
+        k1, corner = found
+        yield Said(
+            "Flat surfaces are curved in the depth of single frames as behind a wide lens: things lie about "
+            f"{corner:.0%} farther out at the corners of the pictures than a pinhole's numbers say, by "
+            f"{len(evidence.flats.bend)} surfaces (k1 about {k1:.2g})."
+        )
+
+
+LENS = Suspicion(
+    Reason.INTRINSICS,
+    _lens,
+    "Take the distortion of the lens out of the colour and the depth pictures, and give the intrinsics of the new "
+    "pictures; else walls are bent in the map.",
+)
 
 
 def _unlike(after: Agreement, apart: Agreement) -> Agreement | None:

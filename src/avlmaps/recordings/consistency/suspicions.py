@@ -11,8 +11,8 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.recordings.consistency import agreement as limits
 from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, compare
-from avlmaps.recordings.consistency.check import Evidence, door_verdict
-from avlmaps.recordings.consistency.flats import Flats, Levels
+from avlmaps.recordings.consistency.check import LENS, Evidence, door_verdict
+from avlmaps.recordings.consistency.flats import Levels
 from avlmaps.recordings.consistency.readings import AS_IT_IS, Reading, is_closer
 from avlmaps.recordings.consistency.sample import (
     WIDTH,
@@ -51,10 +51,6 @@ _MOST_THROUGH_PARTS, _SAME_PARTS = 0.06, 0.7
 @dataclass(eq=False)
 class _Closer(Evidence):
     """Evidence with what the rows of this file alone measure, when it is asked for."""
-
-    @cached_property
-    def flats(self) -> Flats:
-        return Flats.of(self.sample)
 
     @cached_property
     def levels(self) -> Levels:
@@ -173,22 +169,6 @@ _SINGLE = (
 # Frames against frames
 
 
-def _lens(evidence: _Closer) -> Iterator[Said]:
-    if (found := evidence.flats.lens()) is not None:
-        k1, corner = found
-        yield Said(
-            "Flat surfaces are curved in the depth of single frames as behind a wide lens: things lie about "
-            f"{corner:.0%} farther out at the corners of the pictures than a pinhole's numbers say, by "
-            f"{len(evidence.flats.bend)} surfaces (k1 about {k1:.2g})."
-        )
-
-
-def lens_words(evidence: Evidence) -> str:
-    """Return that the distortion of a lens was not taken out and what to do, nothing where it was."""
-    closer = _Closer(evidence.recording, evidence.sample, evidence.surfaces, evidence.after, evidence.apart)
-    return next(map(str, findings_of(_GEOMETRY[:1], closer)), "")
-
-
 def _tilted(evidence: _Closer) -> Iterator[Said]:
     tilt, camera = evidence.levels.tilt, evidence.recording.rig.depth
     if not evidence.judged or tilt is None:
@@ -261,12 +241,7 @@ def _parted(evidence: Evidence) -> Iterator[Said]:
 
 
 _GEOMETRY = (
-    Suspicion(
-        Reason.INTRINSICS,
-        _lens,
-        "Take the distortion of the lens out of the colour and the depth pictures, and give the intrinsics of the new "
-        "pictures; else walls are bent in the map.",
-    ),
+    LENS,
     Suspicion(Reason.GEOMETRY, _tilted),
     Suspicion(
         Reason.GEOMETRY,
