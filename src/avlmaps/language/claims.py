@@ -83,6 +83,7 @@ def _known() -> Mapping[str, str]:
     book = _book()
     known = {name: f"{_BEGIN}(?:{'|'.join(map(re.escape, text.split()))}) " for name, text in book["lists"].items()}
     known |= {name: f"{_BEGIN}(?:{pattern_of(text)})" for name, text in book["phrases"].items()}
+    known["colours"] = f"{_BEGIN}(?:{'|'.join(map(re.escape, lexicon().colours))}) "
     for name, text in book["patterns"].items():
         known[name] = _filled(text, known)
     return known
