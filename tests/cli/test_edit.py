@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -73,3 +74,11 @@ def test_options_that_do_not_fit_are_a_wrong_command_line(home: Path, run, words
     status, _, err = run("edit", home, *words)
     assert status == 2 and why in err
     assert not (home / EDITS).exists()
+
+
+def test_people_who_edit_at_once_lose_nothing(tmp_path: Path) -> None:
+    edits = [Edit.new("pin", [EditedSpot(middle=(float(k), 0.0, 0.0))], name=f"place {k}") for k in range(12)]
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda edit: append_edit(tmp_path, edit), edits))
+    assert sorted(edit.name for edit in read_edits(tmp_path)) == sorted(edit.name for edit in edits)
+    assert not list(tmp_path.glob("*.partial"))

@@ -196,3 +196,60 @@ def test_of_two_robots_the_one_of_the_file_drives(go: Started, name: str) -> Non
     assert (turn["action"], straight["action"]) == (f"{name}/spin", f"{name}/drive_on_heading")
     assert straight["args"]["speed"] == 0.42
     assert services <= {name.strip("/")}
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.1])
+def test_a_signal_while_it_plans_leaves_no_goal(go: Started, later_s: float) -> None:
+    with robot_here() as robot:
+        process = go(robot.url, "move forward 50 metres")
+        assert robot.soon(lambda: bool(robot.ops("subscribe")), START_S)
+        sleep(later_s)
+        process.terminate()
+        _, err = process.communicate(timeout=START_S)
+        assert ended(robot)
+    assert process.returncode == 128 + signal.SIGTERM, err
+    assert "stopped by SIGTERM: " in err.splitlines()[-1]
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.05])
+def test_a_signal_between_two_goals_leaves_no_goal(go: Started, later_s: float) -> None:
+    with robot_here() as robot:
+        robot.does["/spin"] = "succeed"
+        process = go(robot.url, "turn left, then move forward 50 metres")
+        assert robot.soon(lambda: bool(robot.goals) and ended(robot), START_S)
+        sleep(later_s)
+        process.terminate()
+        _, err = process.communicate(timeout=START_S)
+        assert ended(robot)
+        assert not robot.moves_on
+    assert process.returncode == 128 + signal.SIGTERM, err
+    assert "robot stands at" in err.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        (
+            {"name_space": "/robot1"},
+            "sets 'name_space', which is not a setting of a robot; the settings are namespace,",
+        ),
+        ({"speed_m_s": "fast"}, "speed_m_s is 'fast'; it is a number from 0.01 to 2."),
+        ({"speed_m_s": 15}, "speed_m_s is 15; it is a number from 0.01 to 2."),
+        ({"goal_timeout_s": True}, "goal_timeout_s is True; it is a number from 0.1 to 86400."),
+        ({"pose_max_age_s": 3000}, "pose_max_age_s is 3000; it is a number from 0.1 to 60."),
+        ({"namespace": 3}, "namespace is 3, which is not a ROS namespace"),
+        ({"namespace": ["a"]}, "which is not a ROS namespace"),
+        ({"radius_m": None}, "radius_m is None; it is a number"),
+    ],
+)
+def test_nonsense_in_the_robot_file_is_one_sentence_before_anything_connects(
+    run: Callable[..., tuple[int, str, str]], built: Path, tmp_path: Path, settings: dict[str, Any], says: str
+) -> None:
+    file = tmp_path / "robot.json"
+    file.write_text(json.dumps({"settings": settings}))
+    words = ("--robot", "nav2", "--ros", "ws://127.0.0.1:1", "--ros-frames", file)
+    status, out, err = run("go", built, "turn left", *words)
+    assert (status, out) == (1, "")
+    assert says in err.splitlines()[-1]
+    assert str(file) in err.splitlines()[-1]

@@ -438,3 +438,23 @@ def test_a_stop_voids_plans_that_are_still_computed(
     assert client.get("/drive/status").json()["plans_waiting"] == 0
     token = plan(client, "turn left")["token"]
     assert client.post("/drive/confirm", json={"token": token}).status_code == 202
+
+
+def test_a_stop_ends_a_wait_and_what_comes_after_it(client: TestClient, drive: Driven) -> None:
+    token = plan(client, "wait 500 seconds, then turn left")["token"]
+    assert client.post("/drive/confirm", json={"token": token}).status_code == 202
+    assert client.post("/drive/stop").json()["stopped"] is True
+    assert idle(client)["last"]["outcome"]["ok"] is False
+    assert drive.machine.motions == 0
+
+
+def test_a_stop_without_any_order_is_accepted_and_logged(client: TestClient, drive: Driven) -> None:
+    assert client.post("/drive/stop").json() == {"stopped": True, "note": "it stands", "order": None}
+    assert drive.machine.stops == 1
+    assert drive.events == ["stop"]
+
+
+def test_a_question_back_names_its_choices_and_gives_no_token(client: TestClient) -> None:
+    answer = client.post("/drive/plan", json={"words": "turn"})
+    assert answer.status_code == 422
+    assert answer.json()["error"]["choices"]

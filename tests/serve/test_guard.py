@@ -190,3 +190,14 @@ def test_a_request_is_answered_in_fields_while_the_process_speaks_in_flags() -> 
         client = TestClient(AccessGuard(says, ServeSettings()), base_url="http://127.0.0.1:8750")
         assert client.get("/").text == "camera_height_m"
         assert option("camera-height-m") == "--camera-height-m"
+
+
+def test_its_own_page_and_a_click_on_a_link_are_let_through_and_embedding_is_not() -> None:
+    assert guarded().get("/", headers={"origin": "http://127.0.0.1:8750"}).status_code == 200
+    linked = {"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"}
+    assert guarded().get("/", headers=linked).status_code == 200
+    refused(guarded().get("/", headers={**linked, "sec-fetch-mode": "no-cors"}), 403, "origin")
+
+
+def test_settings_do_not_show_their_token() -> None:
+    assert TOKEN not in repr(ServeSettings(token=TOKEN))
