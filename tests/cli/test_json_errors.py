@@ -94,7 +94,7 @@ def test_a_command_line_that_cannot_be_read_says_what_is_wrong(run) -> None:
         (("merge", "A"), "merge needs OTHER and --out MAP."),
         (("edit", "MAP", "--undo"), "--undo needs a value: ID."),
         (("go", "MAP", "x", "--language"), "--language needs a value: learned|rules"),
-        (("go", "MAP", "x", "--language", "x"), "--language takes learned, rules, chat; not 'x'."),
+        (("go", "MAP", "x", "--language", "x"), "--language takes learned, rules, local, chat; not 'x'."),
         (("build", "x", "--out", "y", "--voxel-size-m", "abc"), "--voxel-size-m takes a number, not 'abc'."),
         (("query", "MAP", "x", "--top", "1.5"), "--top takes a whole number, not '1.5'."),
         ((), "a verb comes first: demo"),

@@ -16,7 +16,7 @@ from avlmaps.core.machine import run_ahead
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map, encode_frames
 from avlmaps.maps.store.manifest import BadFrame
-from avlmaps.perception.encoders import Encoders, profile
+from avlmaps.perception.encoders import Encoders, encoders_of, profile
 from avlmaps.recordings.types import Frame
 
 PROFILE = register_fakes()
@@ -169,6 +169,6 @@ def test_what_an_encoder_raises_ends_the_build_with_its_sentence(tmp_path: Path)
 
 def test_a_profile_of_ones_own_is_itself_and_nobody_elses() -> None:
     own = Encoders("of-my-own", pixels="fake")
-    assert profile(own) is own
+    assert encoders_of(own) is own
     with pytest.raises(BackendError, match="no profile called 'of-my-own'"):
         profile("of-my-own")

@@ -13,18 +13,18 @@ SOURCE = Path(__file__).parent / "example_backend"
 USED = """
 import json, sys
 from avlmaps.core.registry import Kind, find, load
-from avlmaps.maps.store.folder import read
+from avlmaps.query.avlmap import AVLMap
 from avlmaps.perception.conformance import check
 
 backend = load(Kind.PLACE, "thumbnail")
 check(Kind.PLACE, backend)
-stored = read(sys.argv[1])
-stored.require_model(Kind.PLACE)
+avlmap = AVLMap.open(sys.argv[1])
+avlmap.require_model(Kind.PLACE)
 print(json.dumps({
     "target": find(Kind.PLACE, "thumbnail").target,
-    "profile": [stored.encoders.name, *map(stored.encoders.name_of, (Kind.PLACE, Kind.PIXELS))],
-    "model": stored.info.models["place"].id,
-    "descriptors": list(stored.keyframes.place.shape),
+    "profile": [avlmap.encoders.name, *map(avlmap.encoders.name_of, (Kind.PLACE, Kind.PIXELS))],
+    "model": avlmap.data.info.models["place"].id,
+    "descriptors": list(avlmap.data.keyframes.place.shape),
 }))
 """
 

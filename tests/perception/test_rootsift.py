@@ -25,8 +25,8 @@ def dot(x: float, y: float, sigma: float = 5.0, width: int = 120, height: int = 
 @pytest.mark.parametrize("value", [0, 128, 255])
 def test_a_blank_picture_has_no_keypoints_and_arrays_of_the_right_shape(sift: RootSift, value: int) -> None:
     found = sift.encode(np.full((48, 64, 3), value, np.uint8))
-    assert (found.xy.shape, found.descriptors.shape, found.scale.shape) == ((0, 2), (0, 128), (0,))
-    assert {found.xy.dtype, found.descriptors.dtype, found.scale.dtype} == {np.dtype(np.float32)}
+    assert (found.xy.shape, found.descriptors.shape) == ((0, 2), (0, 128))
+    assert {found.xy.dtype, found.descriptors.dtype} == {np.dtype(np.float32)}
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (2, 300), (7, 5)])
@@ -47,12 +47,11 @@ def test_a_large_picture_is_looked_at_small_and_told_in_its_own_pixels(sift: Roo
     found = sift.encode(large)
     nearest = np.linalg.norm(found.xy - (60.0 * factor, 45.0 * factor), axis=1).argmin()
     assert np.linalg.norm(found.xy[nearest] - (60.0 * factor, 45.0 * factor)) < 3.0
-    assert found.scale[nearest] > factor  # the spot's size in the pixels of the large picture
 
 
 def test_a_rich_picture_gives_the_capped_count_of_unit_descriptors(sift: RootSift) -> None:
     found = sift.encode(painting(np.random.default_rng(0), shapes=3000))
-    assert len(found.xy) == len(found.scale) == MAX_KEYPOINTS
+    assert len(found.xy) == MAX_KEYPOINTS
     np.testing.assert_allclose(np.linalg.norm(found.descriptors, axis=1), 1.0, atol=1e-5)
 
 
@@ -66,7 +65,7 @@ def test_threads_change_nothing(sift: RootSift) -> None:
         four = sift.encode(picture)
     finally:
         cv2.setNumThreads(threads)
-    for name in ("xy", "descriptors", "scale"):
+    for name in ("xy", "descriptors"):
         np.testing.assert_array_equal(getattr(one, name), getattr(four, name))
 
 

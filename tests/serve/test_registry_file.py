@@ -17,7 +17,7 @@ def test_server_json_is_of_this_release() -> None:
     assert len(entry["description"]) <= 100
     assert package["identifier"] == "avlmaps"
     assert package["transport"] == {"type": "stdio"}
-    assert f"[serve]=={__version__}" in package["runtimeArguments"][0]["value"]
+    assert f"avlmaps=={__version__}" == package["runtimeArguments"][0]["value"]
     assert [one.get("value") or one.get("name") or one["valueHint"] for one in package["packageArguments"]] == [
         "serve", "map", "--stdio",
     ]  # fmt: skip

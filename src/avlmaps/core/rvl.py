@@ -5,7 +5,8 @@ sign are small numbers, and written in groups of three bits with a fourth that s
 """
 
 import numpy as np
-from jaxtyping import UInt16
+
+from avlmaps.core.arrays import UInt16
 
 _MOST_GROUPS = 11  # 33 bits
 

@@ -22,6 +22,7 @@ _SELF_CONTAINED = (
 )  # fmt: skip
 _PIECE_SAMPLES = 1 << 16
 _UNKNOWN = 1 << 48  # a FLAC that was written to a pipe may say that it has this many samples or more
+_STREAMED_BYTES = 0xFFFFFFFF - 0xFFFF  # of a WAV that says nothing of its length
 _PREROLL_S = 1.0  # a decoder that starts in the middle needs a while until its output is right
 _RESYNC_S = 0.05  # stamps are rounded (to 1 ms in mkv); only a larger jump is a gap
 _LOOKS, _LOOK_S = 20, 0.25  # of a file, to find out whether its channels cancel
@@ -184,15 +185,25 @@ def _examine_plain(path: Path) -> tuple[int, int]:
         rate_hz, count = int(file.samplerate), int(file.frames)
         if 0 < count < _UNKNOWN:
             most = count * file.channels * _SAMPLE_BYTES + _LARGE_BYTES  # a seek looks for samples in all there is
-            if (file.format != "FLAC" or path.stat().st_size <= most) and _reaches(file, count):
+            padded = file.format == "FLAC" and path.stat().st_size > most
+            if not padded and not _is_short_wav(path) and _reaches(file, count):
                 return rate_hz, count
             raise AudioError(
-                f"{path} is truncated or damaged: its length does not fit the {count / rate_hz:.2f} s that its header "
-                "promises; copy or convert it again."
+                f"{path} is truncated or damaged: its length does not fit the sound that its header promises; "
+                "copy or convert it again."
             )
         whole: Any = file
         whole.seek(0)
         return rate_hz, sum(len(piece) for piece in whole.blocks(_PIECE_SAMPLES, dtype="float32"))
+
+
+def _is_short_wav(path: Path) -> bool:
+    """Return whether a WAV promises more bytes than there are; libsndfile reads what is left of it without a word."""
+    with path.open("rb") as file:
+        head = file.read(12)
+    promised = int.from_bytes(head[4:8], "little")
+    streamed = promised == 0 or promised >= _STREAMED_BYTES
+    return head[:4] == b"RIFF" and head[8:] == b"WAVE" and not streamed and promised + 7 > path.stat().st_size
 
 
 def _reaches(file: "soundfile.SoundFile", count: int) -> bool:

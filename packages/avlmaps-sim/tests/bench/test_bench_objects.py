@@ -59,17 +59,16 @@ class AskedMap:
     space: Space = field(default_factory=lambda: Space(GridSpec(SIZE_M), INDEX, np.array([0.0, 0.0, 1.0])))
 
     @property
-    def encoders(self):
-        return self.encoders
+    def encoders(self) -> SimpleNamespace:
+        pixels = SimpleNamespace(vocabulary=("chair", "bed", "toilet", "wall"), encode_words=codes_of)
+        return SimpleNamespace(pixels=pixels)
+
+    def require_model(self, kind: object) -> None:
+        """Every model is there."""
 
     @property
-    def stored(self):
-        encoder = SimpleNamespace(vocabulary=("chair", "bed", "toilet", "wall"), encode_words=codes_of)
-        return SimpleNamespace(
-            encoders=SimpleNamespace(pixels=encoder),
-            require_model=lambda kind: None,
-            voxels=Features(np.repeat(codes_of(list(self.names)), 512, axis=0)),
-        )
+    def data(self) -> SimpleNamespace:
+        return SimpleNamespace(voxels=Features(np.repeat(codes_of(list(self.names)), 512, axis=0)))
 
     def object(self, word: str, primary: bool = False) -> Heatmap:
         owner = np.repeat(np.arange(3), 512)
