@@ -72,8 +72,9 @@ def save_state(file: Path, key: str, state: MapState) -> None:
 def load_state(file: Path) -> MapState:
     """Read a state; its large arrays stay on the disk until they are used."""
     arrays, note = read_arrays(file)
-    parts: list[Any] = [as_kind(kind, arrays, file, f"{name}.") for name, kind in _KINDS.items()]
-    return MapState(*parts, arrays["stamp_s"], arrays["pose"], decode_json(note.encode(), _Note).bad)
+    parts: dict[str, Any] = {name: as_kind(kind, arrays, file, f"{name}.") for name, kind in _KINDS.items()}
+    bad = decode_json(note.encode(), _Note).bad
+    return MapState(**parts, stamp_s=arrays["stamp_s"], pose=arrays["pose"], bad=bad)
 
 
 def bad_frames(file: Path, key: str) -> tuple[BadFrame, ...] | None:

@@ -107,7 +107,7 @@ class _Models(msgspec.Struct):
 
 
 class _NoRedirect(HTTPRedirectHandler):
-    def redirect_request(self, *_: Any) -> None:
+    def redirect_request(self, req: Any, fp: Any, code: Any, msg: Any, headers: Any, newurl: Any) -> None:
         """Follow none: each ends as an error of its status."""
 
 

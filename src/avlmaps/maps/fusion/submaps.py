@@ -166,11 +166,11 @@ class MovedSubmaps:
     @cached_property
     def _shares(self) -> Any:
         """A sparse array: of each voxel the rows that move there, by what their features weigh."""
-        from scipy.sparse import coo_array
+        from scipy.sparse import csr_array
 
         submaps, (to, row, share) = self._submaps, self._pairs
         weight = share * np.asarray(submaps.weight)[row] * np.asarray(submaps.feature_scale)[row]
-        return coo_array((weight.astype(np.float32), (to, row)), (self._table.count, len(submaps.weight))).tocsr()
+        return csr_array((weight.astype(np.float32), (to, row)), (self._table.count, len(submaps.weight)))
 
     def _features(self, rows: Int[np.ndarray, " k"]) -> Float32[np.ndarray, "k d"]:
         feature, some = np.asarray(self._submaps.feature).view(np.ndarray), self._shares[rows]
