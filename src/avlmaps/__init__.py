@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from avlmaps.live.status import LiveSettings
     from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
     from avlmaps.navigate.bodies import BodyShape
-    from avlmaps.navigate.skills import Robot
+    from avlmaps.navigate.skills import Robot, RobotSettings
     from avlmaps.perception.encoders import Encoders, profile
     from avlmaps.query.answer import Answer
     from avlmaps.query.avlmap import AVLMap
@@ -69,7 +69,7 @@ _HOMES = {
         "live.status": "LiveSettings",
         "maps.settings": "BuildSettings FrameSettings FusionSettings",
         "navigate.bodies": "BodyShape",
-        "navigate.skills": "Robot",
+        "navigate.skills": "Robot RobotSettings",
         "perception.encoders": "Encoders profile",
         "query.answer": "Answer",
         "query.avlmap": "AVLMap",
@@ -125,6 +125,7 @@ __all__ = [
     "RecordingWriter",
     "Rig",
     "Robot",
+    "RobotSettings",
     "Role",
     "Room",
     "Sound",

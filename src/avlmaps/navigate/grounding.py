@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError, ProgramError, SeveralFitError
 from avlmaps.core.question import HeardAt
-from avlmaps.core.wording import option, place_text, the_room
+from avlmaps.core.wording import in_python, option, place_text, the_room
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.language.storey_words import said_storeys
 from avlmaps.maps.store.folder import stamp
@@ -217,7 +217,7 @@ class Seeker:
         more = f"; and {len(fitting) - _MOST_LISTED} more" if len(fitting) > _MOST_LISTED else ""
         raise SeveralFitError(
             f"{len(fitting)} places fit {name} equally: {listed}{more}. Which one? Say the nearest, or what it is "
-            f"near, or choose one by its number ({option('choose', '1')}).",
+            f"near, or choose one by its number ({option('choose', '(1,)' if in_python() else '1')}).",
             self.choices,
         )
 

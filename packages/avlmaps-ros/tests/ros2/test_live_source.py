@@ -138,7 +138,7 @@ FAULTS = {
     "nobody": (None, (), "nobody publishes pictures of colour and of depth"),
     "another topic": ((), ("--topics", "rgb=/left", "depth=/right"), "nobody publishes /left and /right"),
     "no transforms": (("--lost",), (), "nothing moves the camera 'camera'"),
-    "an encoding": (("--encoding", "yuv422_yuy2"), (), "has encoding 'yuv422_yuy2'"),
+    "an encoding": (("--encoding", "nv24"), (), "have the encoding 'nv24'"),
 }
 
 
