@@ -78,6 +78,9 @@ class KnownThings:
     def referent(self, target: Any, here: np.ndarray) -> Destination:
         return self.things[target]
 
+    def nearest(self, target: Any, here: np.ndarray) -> Destination:
+        return self.things[target]
+
     def pair(self, a: Any, b: Any, here: np.ndarray) -> tuple[Destination, Destination]:
         return self.things[a], self.things[b]
 

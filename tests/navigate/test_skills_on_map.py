@@ -63,7 +63,7 @@ def test_of_things_that_fit_equally_the_chosen_one_is_meant(
 
 def test_of_things_that_fit_equally_none_is_driven_to_until_one_is_chosen() -> None:
     robot = furnished_robot(4.8, 2.6)
-    for skill in (robot.get_pos, robot.move_to, robot.move_to_object, robot.face, robot.move_north, robot.get_contour):
+    for skill in (robot.get_pos, robot.move_to, robot.move_to_object, robot.move_north, robot.get_contour):
         with pytest.raises(SeveralFitError) as asked:
             skill("chair")
         assert len(asked.value.choices) == 2 and not robot.moves

@@ -318,7 +318,7 @@ class Robot:
         self._done(skill, thing.name, goal, [self.driver.go_to(world(goal), face=looked_at)])
 
     def _turn_to_see(self, skill: str, target: Target, at_rad: float) -> None:
-        thing = self.seeker.referent(target, self._here)
+        thing = self.seeker.nearest(target, self._here)  # a turn costs less than a question
         bearing = bearing_rad(self._here, thing.outline.centre)
         heading = self.driver.pose.heading_rad if bearing is None else bearing - at_rad
         self._turn_towards(skill, thing.name, heading)
