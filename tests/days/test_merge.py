@@ -29,7 +29,8 @@ def drives(tmp_path_factory: pytest.TempPathFactory) -> list[AVLMap]:
 def of_another_file(stored: AVLMap) -> AVLMap:
     """Return a map whose recording has another fingerprint, as where it was driven live or read in another way."""
     recording = msgspec.structs.replace(stored.data.info.recording, fingerprint="0" * 64)
-    return stored.of_data(replace(stored.data, info=msgspec.structs.replace(stored.data.info, recording=recording)))
+    data = replace(stored.data, info=msgspec.structs.replace(stored.data.info, recording=recording))
+    return AVLMap(data, stored.encoders, path=stored.path)
 
 
 @pytest.mark.parametrize("again", [lambda stored: stored, of_another_file], ids=["itself", "read in another way"])
@@ -54,7 +55,7 @@ def test_a_day_is_that_of_the_clock_where_the_clock_can_be_right(
 ) -> None:
     recording = msgspec.structs.replace(drives[0].data.info.recording, begins_s=begins_s)
     data = replace(drives[0].data, info=msgspec.structs.replace(drives[0].data.info, recording=recording))
-    (visit,) = visits_of(drives[0].of_data(data))
+    (visit,) = visits_of(AVLMap(data, drives[0].encoders, path=drives[0].path))
     assert visit.day == day
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Chat:
-    """Options of --language chat; their defaults are AVLMAPS_CHAT_MODEL, AVLMAPS_CHAT_URL and AVLMAPS_CHAT_REPLAY."""
+    """Options of --language chat; defaults: AVLMAPS_CHAT_MODEL, AVLMAPS_CHAT_BASE_URL and AVLMAPS_CHAT_REPLAY."""
 
     chat_model: Annotated[str | None, arg(metavar="NAME")] = None
     """Name of the chat model. Default: the only one that the server has."""

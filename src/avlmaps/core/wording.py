@@ -106,18 +106,21 @@ def flag(name: str, value: str = "") -> str:
     return f"--{name} {value}".rstrip()
 
 
-def option(name: str, value: str = "", argument: str = "") -> str:
+def option(name: str, value: str = "", argument: str = "", python: str = "") -> str:
     """Return how the reader of a sentence gives an option.
 
     Args:
         name: its name on the command line, without dashes.
         value: what to give, such as ``METRES``; "" for a switch, or to name the option alone.
         argument: its name in Python, where that is another one here than elsewhere.
+        python: what to give in Python, where that is another value.
     """
     spelling = _asked_as.get() or _spelling
     if spelling is Spelling.FLAG:
         return flag(name, value)
     plain = name.replace("-", "_")
-    named = argument or _ARGUMENTS.get(name, plain) if spelling is Spelling.ARGUMENT else plain
+    named = plain
+    if spelling is Spelling.ARGUMENT:
+        named, value = argument or _ARGUMENTS.get(name, plain), python or value
     given = value or ("True" if name in _SWITCHES else "")
     return f"{named}={given}" if given else named

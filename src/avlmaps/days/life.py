@@ -14,14 +14,13 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from avlmaps.core.arrays import Bool, Float, Int
-from avlmaps.core.poses import plain_point
 from avlmaps.core.timeline import DAY_S
 from avlmaps.days.evidence import Day, DayVerdict, DayViews, seen_again, seen_before
 from avlmaps.days.surfaces import AROUND, Occupied, packed
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.life import Life, Stay
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.contents import STRUCTURE, Thing
+from avlmaps.query.contents import STRUCTURE, Thing, thing_of
 from avlmaps.query.naming import VoxelNamer
 from avlmaps.query.voxel_space import linked
 
@@ -300,12 +299,12 @@ def changed_things(
         loose[rows] = False
     if "pixels" not in stored.data.info.models or not (loose & through).any():
         return []
-    avlmap, namer = AVLMap(stored.data, stored.encoders, path=stored.path, edits=()), VoxelNamer(stored)
+    space, namer = stored.space, VoxelNamer(stored)
     voxel_m = stored.data.grid.voxel_size_m
     named = np.array([name not in (*STRUCTURE, "other") for name in namer.names])
 
     def size_m(own: Int[np.ndarray, " k"]) -> Float[np.ndarray, "3"]:
-        return np.ptp(avlmap.space.level(avlmap.space.centres_of(own)), axis=0) + voxel_m
+        return np.ptp(space.level(space.centres_of(own)), axis=0) + voxel_m
 
     def groups(rows: Int[np.ndarray, " r"]) -> Iterator[Int[np.ndarray, " k"]]:
         which = linked(index[rows], _BESIDE)
@@ -316,17 +315,13 @@ def changed_things(
     for whole in groups(np.flatnonzero(loose)):
         is_thing = size_m(whole).max() <= MOST_M and through[whole].mean() >= _LOOKED
         for own in [whole] if is_thing else groups(whole[through[whole]]):
-            points, size = avlmap.space.centres_of(own), size_m(own)
+            size = size_m(own)
             if size[2] < LOWEST_VOXELS * voxel_m or size.max() > MOST_M or not named.any():
                 continue
-            if parts_of.near(points, _BESIDE + 0.5).any():
+            if parts_of.near(space.centres_of(own), _BESIDE + 0.5).any():
                 continue
             share = np.where(named, namer.confidences(own).mean(axis=0), -1.0)
             best = int(share.argmax())
-            r, g, b = (int(value) for value in np.asarray(stored.data.voxels.rgb)[own].mean(axis=0).round())
-            middle = points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
-            likely = round(min(float(share[best]), CONFIDENT_AT - 0.01), 3)
-            found.append(
-                Thing(namer.names[best], likely, plain_point(middle), plain_point(size), (r, g, b), own, points)
-            )
+            likely = min(float(share[best]), CONFIDENT_AT - 0.01)
+            found.append(thing_of(stored, namer.names[best], likely, own))
     return found

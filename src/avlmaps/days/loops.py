@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
-from avlmaps.core.columns import take
+from avlmaps.core.columns import concat, take
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import from_rotation, inverse, mean_rotation, rotation_angle_rad, rotation_to_level
 from avlmaps.core.progress import progress
@@ -201,10 +201,10 @@ def find_loops(stored: AVLMap) -> Loops:
             "needed. The map stays as it was."
         )
     odometry = _odometry(poses)
-    found = optimise(poses, _joined(odometry, closures))
+    found = optimise(poses, concat([odometry, closures]))
     agree = _agreeing(closures, found)
     if 0 < agree.sum() < len(agree):
-        found = optimise(poses, _joined(odometry, closures.only(agree)))
+        found = optimise(poses, concat([odometry, closures.only(agree)]))
         agree = _agreeing(closures, found)
     found = _upright(found, poses, stored.data.up_in_world)
     strain = odometry.errors(found) / np.repeat(np.stack([odometry.sigma_m, odometry.sigma_rad], axis=1), 3, axis=1)
@@ -280,10 +280,6 @@ def _upright(
     tipped = mean_rotation(found @ inverse(before)) @ up
     to_level = rotation_to_level(up).T @ rotation_to_level(rotation_to_level(up) @ tipped) @ rotation_to_level(up)
     return from_rotation(to_level, found[0, :3, 3] - to_level @ found[0, :3, 3]) @ found
-
-
-def _joined(one: Edges, other: Edges) -> Edges:
-    return Edges(*(np.concatenate([getattr(of, name) for of in (one, other)]) for name in Edges.__dataclass_fields__))
 
 
 def _agreeing(closures: Edges, poses: Float[np.ndarray, "k 4 4"]) -> np.ndarray:

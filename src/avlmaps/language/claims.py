@@ -36,6 +36,7 @@ from avlmaps.language.intents import (
     Turn,
     TurnSense,
     VisitEach,
+    steps_of,
     targets_of,
 )
 from avlmaps.language.lexer import Token
@@ -185,7 +186,7 @@ def unmet_by(tokens: Sequence[Token], inquiry: Inquiry, used: frozenset[int]) ->
 def in_direction(tokens: Sequence[Token], intents: Sequence[Intent]) -> tuple[Intent, ...] | Clarify:
     """Return intents whose circles run in the direction that is said, or the question which one is meant."""
     ways = [_WAYS[token.text] for token in tokens if token.text in _WAYS]
-    steps = [step for one in intents for step in (one.body if isinstance(one, Repeat) else (one,))]
+    steps = steps_of(intents)
     circles = sum(isinstance(step, Circle) for step in steps)
     if not circles or not ways or any(isinstance(step, Turn) for step in steps):
         return tuple(intents)
@@ -219,8 +220,7 @@ def _facts_of_targets(targets: Sequence[Target]) -> Iterator[str]:
         if target.pick:
             yield str(target.pick)
         if target.near:
-            yield "room near" if target.kind is TargetKind.AREA else "near"
-            yield "near"
+            yield from ("near", "room near") if target.kind is TargetKind.AREA else ("near",)
         if target.kind is TargetKind.SOUND:
             yield "sound"
         *before, last = target.name.split() or ("",)
@@ -237,7 +237,7 @@ def _facts(intents: Sequence[Intent], targets: Sequence[Target]) -> Iterator[str
     yield from _facts_of_targets(targets)
     if len({one for intent in intents for one in targets_of(intent) if one.kind is TargetKind.OBJECT}) < 2:
         yield "one thing"
-    steps = [step for one in intents for step in (one.body if isinstance(one, Repeat) else (one,))]
+    steps = steps_of(intents)
     if len(steps) == 1:
         yield "one step"
     for step in steps:

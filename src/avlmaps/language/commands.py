@@ -15,12 +15,12 @@ from avlmaps.language.intents import (
     Pick,
     RefusalReason,
     Refuse,
-    Repeat,
     StopAt,
     Target,
     TargetKind,
     Wait,
     on_targets,
+    steps_of,
     targets_of,
 )
 from avlmaps.language.learned.decision import EXAMPLE, REFUSALS, NameResolver, Weighed, decided, weighed
@@ -220,7 +220,7 @@ def _without_effect(sentence: Sentence) -> list[str]:
 
 def _lost_sides(intents: Sequence[Intent], sentence: Sentence) -> tuple[str, ...]:
     """Return a note for each side ("the chair left of the table") that only says which thing is meant."""
-    steps = [step for intent in intents for step in (intent.body if isinstance(intent, Repeat) else (intent,))]
+    steps = steps_of(intents)
     if any(isinstance(step, Beside | Face | StopAt) for step in steps):  # the side is where it drives or looks
         return ()
     return sentence.side_notes if any(target.near for intent in intents for target in targets_of(intent)) else ()

@@ -35,12 +35,10 @@ class NoOrder:
         kind: the kind of its row: ``cancelled``, ``postponed``, ``asked``, ``reported``, ``other`` (said to somebody
             else), ``wished``, ``sarcastic`` or ``crossed``; ``unsure`` where the network says so.
         answer: one sentence that says why nothing is driven.
-        probability: that it is no order.
     """
 
     kind: str
     answer: str
-    probability: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +59,8 @@ def no_order(text: str) -> NoOrder | None:
     if found is not None or any(row.says.search(ordered) for row in _rows() if row.kind == _ORDER):
         return found
     judge = _judge()
-    probability = judge.probability(text if ordered == said else ordered)
-    return NoOrder("unsure", _UNSURE, probability) if probability > judge.limit else None
+    unsure = judge.probability(text if ordered == said else ordered) > judge.limit
+    return NoOrder("unsure", _UNSURE) if unsure else None
 
 
 @cache

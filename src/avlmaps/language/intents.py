@@ -4,7 +4,7 @@
 clockwise (positive is to the right); distances are in metres.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, ClassVar
@@ -287,6 +287,11 @@ def targets_of(intent: Intent) -> tuple[Target, ...]:
 
     on_targets(intent, note)
     return tuple(found)
+
+
+def steps_of(intents: Sequence[Intent]) -> list[Intent]:
+    """Return intents with the bodies of those that are repeated in their places."""
+    return [step for intent in intents for step in (intent.body if isinstance(intent, Repeat) else (intent,))]
 
 
 class Ask(StrEnum):

@@ -31,10 +31,17 @@ class LearnedTranslator:
 
     def __init__(self, given: Attachments | None = None) -> None:
         self.given, self.knows_map = given or Attachments(), given is not None
+        self._last: tuple[str, Command] | None = None
 
     def read(self, command: str) -> Command:
         """Return the meaning of a command, with all readings that were weighed."""
         return read_command(command, self.given)
+
+    def last_read(self, command: str) -> Command:
+        """Return what ``read`` returns; the last command, which is explained and then driven, is read once."""
+        if self._last is None or self._last[0] != command:
+            self._last = command, self.read(command)
+        return self._last[1]
 
     def program_for(self, command: str) -> Translation:
         """Return the program for a command; the same command always gives the same.
@@ -43,7 +50,7 @@ class LearnedTranslator:
             UnclearError: the command is refused, or unclear; the sentence says why or asks back.
             LanguageError: the command is empty or too long.
         """
-        read = self.read(command)
+        read = self.last_read(command)
         said = verbalise(read.intents)
         if read.stops is not None:
             raise UnclearError(said, getattr(read.stops, "choices", ()))
@@ -73,6 +80,6 @@ def explanation(translator: Translator, command: str) -> list[str]:
     """
     if not isinstance(translator, LearnedTranslator):
         return ["readings: this translator weighs none"]
-    read = translator.read(command)
+    read = translator.last_read(command)
     lines = [f"reading {one.probability:5.2f}: {verbalise(one.intents)}" for one in read.readings]
     return [*lines, f"decided by: {_WHY[read.why]}"]

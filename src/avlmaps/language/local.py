@@ -360,7 +360,8 @@ class LocalTranslator(LearnedTranslator):
             LanguageError: the command is empty or too long, or the model does not answer.
         """
         read = read_command(command, self.given)
-        return read if is_settled(read) or no_order(command) else both(read, self.proposed(command))
+        settled = is_settled(read) or (read.stops is not None and no_order(command))  # the reader asks it of all else
+        return read if settled else both(read, self.proposed(command))
 
     def proposed(self, command: str) -> Weighed | None:
         """Return what the model makes of a command, checked; None where it means nothing."""

@@ -1,6 +1,6 @@
 """What some frames brought to a map: their sums, where they saw freely, their submap; and that in a folder."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float64, Int32, UInt16
+from avlmaps.core.arrays import Float, Float64, Int32
 from avlmaps.core.columns import concat
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.files import decode_json
@@ -189,13 +189,6 @@ class SubmapBook:
         """Return all, with the one that is not whole; None where there is none."""
         every = self._whole + ([] if self._open is None else [self._open.submap()])
         return concat(every) if every else None
-
-
-def placed(
-    submaps: Submaps, pose: Float[np.ndarray, "f 4 4"], clear_mm: UInt16[np.ndarray, "f_or_0 rows columns"]
-) -> Submaps:
-    """Return submaps whose frames have these poses now."""
-    return replace(submaps, pose=pose, clear_mm=clear_mm)
 
 
 @dataclass(slots=True)

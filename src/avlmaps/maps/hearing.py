@@ -21,7 +21,7 @@ from avlmaps.maps.audio.events import GrowingSounds, WalkedTrack, collect, detec
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.estimate import doubts_of_channels
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.sources.find import GrowingSources, require_fit
+from avlmaps.maps.sources.find import AT_ONCE, GrowingSources, require_fit
 from avlmaps.maps.store.folder import read
 from avlmaps.maps.types import HeardSounds, SourceEvidence, Voxels
 from avlmaps.perception.encoders import Encoders
@@ -97,7 +97,7 @@ class Hearing:
             whole: the sound of a recording.
             name_first: a sound has its name in one snapshot, and its place in a later one.
         """
-        self.whole, self.sources = whole, GrowingSources(1 if name_first else None)
+        self.whole, self.sources = whole, GrowingSources(AT_ONCE if name_first else None)
         self._encoders, self._settings, self._name_first = encoders, settings, name_first
         self._sounds: GrowingSounds | None = None
         self._heard: HeardSounds | None = None

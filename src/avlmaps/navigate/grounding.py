@@ -11,15 +11,16 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError, ProgramError, SeveralFitError
 from avlmaps.core.question import HeardAt
-from avlmaps.core.wording import in_python, option, place_text, the_room
+from avlmaps.core.wording import option, place_text, the_room
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.language.storey_words import said_storeys
 from avlmaps.maps.store.folder import stamp
 from avlmaps.maps.storeys import said_storeys as storeys_in_words
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
-from avlmaps.navigate.instances import Destination, equal, likely, nearest, same_thing, tells_one, things_in
+from avlmaps.navigate.instances import Destination, likely, nearest, same_thing, tells_one, things_in
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.goals import as_likely
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.lists import at_storey, storeys_meant
 from avlmaps.query.sound_sources import no_sources
@@ -200,12 +201,12 @@ class Seeker:
             GoalNotFoundError: there is none.
         """
         things, one = self._candidates(target)
-        among = equal(things) if one and self._asks else things
-        return self._chosen(among[0] if one and not self._asks else nearest(among, here), len(things))
+        among = things if not one else as_likely(things) if self._asks else things[:1]
+        return self._chosen(nearest(among, here), len(things))
 
     def _of_equal(self, things: list[Destination]) -> Destination:
         """Return the likeliest thing; of several that fit equally the one that was chosen."""
-        fitting = equal(things)
+        fitting = as_likely(things)
         name = fitting[0].name
         if len(fitting) > 1 and name not in self._meant and self._numbers:
             self._meant[name] = self._numbers.pop(0)
@@ -217,7 +218,7 @@ class Seeker:
         more = f"; and {len(fitting) - _MOST_LISTED} more" if len(fitting) > _MOST_LISTED else ""
         raise SeveralFitError(
             f"{len(fitting)} places fit {name} equally: {listed}{more}. Which one? Say the nearest, or what it is "
-            f"near, or choose one by its number ({option('choose', '(1,)' if in_python() else '1')}).",
+            f"near, or choose one by its number ({option('choose', '1', python='(1,)')}).",
             self.choices,
         )
 
@@ -256,11 +257,7 @@ class Seeker:
             level = self.avlmap.space.level(np.array([target.x, target.y, target.z]))
             known = self._handed_out.get(target, Destination("", Outline.at(level[:2]), level))
             return [known if target in self._instances else replace(known, outline=Outline.at(level[:2]))], True
-        heat = target
-        if isinstance(target, str):
-            heat = self._named("object", target, True, lambda name: self.avlmap.object(name, primary=True))
-        if not isinstance(heat, Heatmap):
-            raise ProgramError(f"A skill takes a phrase, a place or a heatmap to go to, not {kind_of(target)}.")
+        heat = self._heat_of(target, "go to")
         things = things_in(heat, self.guess)
         if isinstance(target, str):
             self._note(heat)
@@ -289,14 +286,17 @@ class Seeker:
         if isinstance(target, Place):
             return True
         try:
-            heat = target
-            if isinstance(target, str):
-                heat = self._named("object", target, True, lambda name: self.avlmap.object(name, primary=True))
+            heat = self._heat_of(target, "look for")
         except GoalNotFoundError:
             return False
-        if not isinstance(heat, Heatmap):
-            raise ProgramError(f"A skill takes a phrase, a place or a heatmap to look for, not {kind_of(target)}.")
         return bool(heat.found)
+
+    def _heat_of(self, target: Target, purpose: str) -> Heatmap:
+        if isinstance(target, str):
+            return self._named("object", target, True, lambda name: self.avlmap.object(name, primary=True))
+        if not isinstance(target, Heatmap):
+            raise ProgramError(f"A skill takes a phrase, a place or a heatmap to {purpose}, not {kind_of(target)}.")
+        return target
 
     def place_of(self, target: Target) -> Place:
         """Return the place of the thing that a target means; a later skill finds the thing again at that place.

@@ -11,7 +11,7 @@ from avlmaps.core.errors import GoalNotFoundError
 from avlmaps.core.wording import option, place_text
 from avlmaps.navigate.footprint import Outline
 from avlmaps.query.factors import Factor, NearThings
-from avlmaps.query.goals import ALIKE, Goal
+from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
 
 if TYPE_CHECKING:
@@ -97,12 +97,6 @@ def nearest(things: Sequence[Destination], xy: Float[np.ndarray, "2"]) -> Destin
     """
     found = [thing for thing in things if thing.found and 2.0 * thing.probability >= things[0].probability]
     return min(found, key=lambda thing: thing.outline.distance_m(xy)) if found else things[0]
-
-
-def equal(things: Sequence[Destination]) -> list[Destination]:
-    """Return the things that fit as well as the likeliest, in their order."""
-    least = max(thing.probability for thing in things) - ALIKE - 1e-9
-    return [thing for thing in things if thing.probability >= least]
 
 
 def likely(things: Sequence[Destination], one: bool) -> Sequence[Destination]:

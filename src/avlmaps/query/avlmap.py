@@ -115,10 +115,6 @@ class AVLMap:
 
         require_model(self.data.info, self.encoders, kind, self.path)
 
-    def of_data(self, data: "MapData") -> Self:
-        """Return this map with other content."""
-        return type(self)(data, self.encoders, path=self.path, settings=self.settings, edits=self._given_edits)
-
     def has(self, kind: Kind) -> bool:
         """Return whether the map was made with a model of a kind: without one of pixels it names no things."""
         return kind in self.data.info.models

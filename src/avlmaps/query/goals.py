@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.poses import plain_point
 from avlmaps.core.question import Modality
 from avlmaps.query.factors import Factor, NearAnchors, NearThings, lead_of
+from avlmaps.query.voxel_space import boxes
 
 if TYPE_CHECKING:
     from avlmaps.maps.sources.candidates import Spread
@@ -132,7 +133,7 @@ def weights() -> Weights:
     return json.loads(Path(__file__).with_name("found.json").read_text(encoding="utf-8"))["weights"]
 
 
-ALIKE = 0.05
+_ALIKE = 0.05
 """Goals whose probabilities differ by no more fit equally: no calibration tells them apart."""
 # Two sounds heard at one place are one place to go to.
 SEPARATION_M = 1.0
@@ -178,11 +179,29 @@ class Goal:
         return goal
 
 
+@runtime_checkable
+class HasProbability(Protocol):
+    """A thing that may be meant."""
+
+    @property
+    def probability(self) -> float:
+        """In [0, 1]."""
+        ...
+
+
+_Likely = TypeVar("_Likely", bound=HasProbability)
+
+
 def alike(goals: Sequence[Goal], found_at: float) -> list[Goal]:
     """Return the goals that are found and fit as well as the likeliest."""
     found = [goal for goal in goals if goal.probability >= found_at and goal.probability > 0.0]
-    most = max((goal.probability for goal in found), default=0.0)
-    return [goal for goal in found if goal.probability >= most - ALIKE - 1e-9]
+    return as_likely(found)
+
+
+def as_likely(things: Sequence[_Likely]) -> list[_Likely]:
+    """Return those of some things that fit as well as the likeliest, in their order."""
+    most = max((thing.probability for thing in things), default=0.0)
+    return [thing for thing in things if thing.probability >= most - _ALIKE - 1e-9]
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,11 +307,7 @@ class _Extents:
     """The boxes of a lead's instances, level frame, and the goals that lie in them."""
 
     def __init__(self, lead: NearThings) -> None:
-        points, shape = lead.space.level(lead.anchors), (len(lead.confidence), 3)
-        self.low, self.high = np.full(shape, np.inf), np.full(shape, -np.inf)
-        for axis in range(3):  # each by itself: NumPy is ten times as fast on numbers as on rows
-            np.minimum.at(self.low[:, axis], lead.instance, points[:, axis])
-            np.maximum.at(self.high[:, axis], lead.instance, points[:, axis])
+        self.low, self.high = boxes(lead.space.level(lead.anchors), lead.instance, len(lead.confidence))
         self.goals: dict[int, Float[np.ndarray, 3]] = {}
 
     def holds(self, instance: int, place: Float[np.ndarray, "3"]) -> bool:

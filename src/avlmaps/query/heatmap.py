@@ -305,9 +305,14 @@ class Heatmap(Heat):
         """Return the goals, each with the evidence that its probability rests on."""
         if self.where is None:
             return weigh_goals(self.factors, self._shares, top)
+        return self._where_it_may[:top]
+
+    @cached_property
+    def _where_it_may(self) -> list[tuple[Goal, GoalEvidence]]:
+        assert self.where is not None
         every = weigh_goals(self.factors, self._shares, _MOST_GOALS)
         fits = self.where(np.array([goal.position for goal, _ in every]).reshape(-1, 3))
-        return [one for one, fit in zip(every, fits.tolist(), strict=True) if fit][:top]
+        return [one for one, fit in zip(every, fits.tolist(), strict=True) if fit]
 
     @overload
     def plot(self, path: str | Path, *, top: int = 3) -> Path: ...

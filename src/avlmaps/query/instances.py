@@ -17,7 +17,7 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
 from avlmaps.query.rooms import ThingsInRooms, with_rooms
 from avlmaps.query.settings import ObjectSettings
-from avlmaps.query.voxel_space import Space, connected, distinct, linked
+from avlmaps.query.voxel_space import Space, boxes, connected, distinct, linked
 from avlmaps.query.words import EncodedWord, Scored, Vocabulary, is_open, scorer_of
 
 # The log-odds fall by this times ln of how many times too long an instance is: twice what they rise by with its area.
@@ -46,13 +46,8 @@ def box_lengths_m(
     points_level: Float[np.ndarray, "a 3"], instance: Int[np.ndarray, " a"], count: int
 ) -> Float[np.ndarray, " i"]:
     """Return the longer horizontal side of the box round each of ``count`` instances, metres."""
-    longest = np.zeros(count)
-    for axis in range(2):  # each by itself: NumPy is ten times as fast on numbers as on rows
-        low, high = np.full(count, np.inf), np.full(count, -np.inf)
-        np.minimum.at(low, instance, points_level[:, axis])
-        np.maximum.at(high, instance, points_level[:, axis])
-        longest = np.maximum(longest, high - low)
-    return longest
+    low, high = boxes(points_level[:, :2], instance, count)
+    return np.maximum(high - low, 0.0).max(axis=1)
 
 
 def less_likely(

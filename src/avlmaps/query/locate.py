@@ -18,7 +18,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.core.numbers import unmasked
 from avlmaps.core.poses import rotation_angle_rad
-from avlmaps.core.wording import in_python, option, place_text
+from avlmaps.core.wording import option, place_text
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.pose import PoseSettings, agreement, estimate_pose, pose_deviation, refine_focal
@@ -157,7 +157,7 @@ class Located:
             )
         if self.uncertainty is None:
             return tuple(notes)
-        give = f"({option('intrinsics', 'Pinhole(...)' if in_python() else 'fx,fy,cx,cy')})"
+        give = f"({option('intrinsics', 'fx,fy,cx,cy', python='Pinhole(...)')})"
         focal = f"{self.camera.fx:.0f} ± {self.uncertainty.focal * self.camera.fx:.0f} pixels"
         where = f"{100 * self.uncertainty.place_m:.1f} cm and {np.rad2deg(self.uncertainty.angle_rad):.1f} degrees"
         if self.world_from_camera is None:

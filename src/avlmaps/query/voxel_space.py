@@ -81,6 +81,17 @@ def _numbered(root: Int64[np.ndarray, " n"]) -> Int64[np.ndarray, " n"]:
     return (np.cumsum(root == np.arange(len(root))) - 1)[root]
 
 
+def boxes(
+    points: Float[np.ndarray, "n d"], owner: Int[np.ndarray, " n"], count: int
+) -> tuple[Float[np.ndarray, "i d"], Float[np.ndarray, "i d"]]:
+    """Return the lowest and the highest corner of each owner's points; infinite and turned round without any."""
+    low, high = (np.full((count, points.shape[1]), end) for end in (np.inf, -np.inf))
+    for axis in range(points.shape[1]):  # each by itself: NumPy is ten times as fast on numbers as on rows
+        np.minimum.at(low[:, axis], owner, points[:, axis])
+        np.maximum.at(high[:, axis], owner, points[:, axis])
+    return low, high
+
+
 def distinct(values: Int[np.ndarray, " n"]) -> Int[np.ndarray, " d"]:
     """Return the distinct values, ascending, as ``np.unique`` does; that loads ``numpy.ma`` to compare with."""
     ordered = np.sort(values)

@@ -194,7 +194,7 @@ class Decision:
 
     Attributes:
         intents: what to do; one refusal or question where the robot may not drive.
-        why: ``read``, ``parts``, ``danger``, ``stop`` or ``unsure``.
+        why: ``read``, ``danger``, ``stop`` or ``unsure``.
         notes: of the reading that counts.
     """
 

@@ -237,24 +237,23 @@ def add_features(
         weight: added to.
     """
     pair_cell, pair_weight, pair_before, last_pair = pairs[:4]
-    dim, faults = features.shape[1], 0
+    dim, most, faults = features.shape[1], pair_cell.shape[0], 0
     total = np.empty(dim, np.float32)
-    live, share = np.empty(pair_cell.shape[0] + 4, np.int64), np.empty(pair_cell.shape[0] + 4, np.float32)
+    live, share = np.empty(most + 4, np.int64), np.empty(most + 4, np.float32)
     for voxel in range(rows.shape[0]):
-        count, amount, pair = 0, 0.0, last_pair[voxel]
+        first, amount, pair = most, 0.0, last_pair[voxel]
         while pair >= 0:
             cell, column = pair_cell[pair], 0
             while column < dim and features[cell, column] == 0.0:  # nearly always the first number decides
                 column += 1
             if column < dim:
                 amount += pair_weight[pair]
-                live[count], share[count] = cell, pair_weight[pair]
-                count += 1
+                first -= 1  # from the back: pairs are met the last one first, and read as they lie in memory
+                live[first], share[first] = cell, pair_weight[pair]
             pair = pair_before[pair]
         total[:] = 0.0
-        live[:count], share[:count] = live[:count][::-1].copy(), share[:count][::-1].copy()  # as they lie in memory
-        live[count : count + 3], share[count : count + 3] = live[0], 0.0
-        for n in range(0, count, 4):  # four at once: the sum is read and written a quarter as often
+        live[most : most + 3], share[most : most + 3] = live[first], 0.0
+        for n in range(first, most, 4):  # four at once: the sum is read and written a quarter as often
             a, b, c, d = live[n], live[n + 1], live[n + 2], live[n + 3]
             of_a, of_b, of_c, of_d = share[n], share[n + 1], share[n + 2], share[n + 3]
             for column in range(dim):

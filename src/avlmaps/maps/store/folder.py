@@ -35,7 +35,9 @@ from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.tables import (
     EDITING,
     LOCK,
+    MOST_BYTES,
     RESTORE,
+    SMALL_BYTES,
     SUFFIX,
     FileInfo,
     as_kind,
@@ -48,8 +50,6 @@ from avlmaps.maps.store.tables import (
 )
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps, Voxels
 
-_MOST_BYTES = 1 << 42
-_SMALL_BYTES = 1 << 20
 _OLD_CLIP = "sounds/clips/"
 # What a file was called in ``map.json``, and the section and prefix that its array has now.
 _PLACES = {
@@ -108,9 +108,9 @@ def read_schema1(path: Path, content: bytes) -> tuple[dict[str, tuple[Path, dict
 
 def _array(path: Path, size: int) -> np.ndarray:
     try:
-        if checked_size(path, _MOST_BYTES) != size:
+        if checked_size(path, MOST_BYTES) != size:
             raise ValueError(f"it has another size than {size} bytes")
-        return np.load(path, mmap_mode="r" if size > _SMALL_BYTES else None, allow_pickle=False)
+        return np.load(path, mmap_mode="r" if size > SMALL_BYTES else None, allow_pickle=False)
     except (OSError, ValueError) as fault:
         raise MapError(f"{path} is missing or damaged ({fault}); {RESTORE}.") from fault
 

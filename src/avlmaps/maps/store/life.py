@@ -13,7 +13,6 @@ import numpy as np
 from avlmaps.core.arrays import Int32, Int64
 from avlmaps.core.errors import MapError
 
-LIFE = "life/"
 PEOPLE = ("person",)
 """Names of what comes and goes by itself: it is listed, and is never a wall."""
 

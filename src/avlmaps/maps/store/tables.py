@@ -25,8 +25,8 @@ SUFFIX = ".safetensors"
 TO_BUILD = "choose another folder. What was finished there stays, and a second try continues from it."
 TO_EDIT = "edit a copy that lies where you may write; the map is as it was."
 RESTORE = "restore it from a copy, or build the map again in its place"
-_MOST_BYTES = 1 << 42
-_SMALL_BYTES = 1 << 20  # arrays up to this size are read, larger ones are memory-mapped
+MOST_BYTES = 1 << 42
+SMALL_BYTES = 1 << 20  # arrays up to this size are read, larger ones are memory-mapped
 _NOTE = "avlmaps"
 _TYPES = {
     "BOOL": np.bool_, "U8": np.uint8, "U16": np.uint16, "U32": np.uint32, "U64": np.uint64, "I8": np.int8,
@@ -95,11 +95,11 @@ def read_arrays(path: Path) -> tuple[dict[str, np.ndarray], str]:
     from safetensors import SafetensorError, safe_open
 
     try:
-        checked_size(path, _MOST_BYTES)
+        checked_size(path, MOST_BYTES)
         opening: Any = safe_open(path, "np")  # holds the header against the file's size
         with opening as file:
             metadata: dict[str, str] = file.metadata() or {}
-        with open_regular(path, _MOST_BYTES) as stream:
+        with open_regular(path, MOST_BYTES) as stream:
             header = int.from_bytes(stream.read(8), "little")
             entries: dict[str, Any] = msgspec.json.decode(stream.read(header))
             content = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
@@ -119,7 +119,7 @@ def _array(content: mmap.mmap, begin: int, entry: Mapping[str, Any]) -> np.ndarr
     if not count:
         return np.zeros(shape, kind)
     array = np.frombuffer(content, kind, count, at).reshape(shape)
-    return array.copy() if array.nbytes <= _SMALL_BYTES else array
+    return array.copy() if array.nbytes <= SMALL_BYTES else array
 
 
 def key_of(*ingredients: Any) -> str:

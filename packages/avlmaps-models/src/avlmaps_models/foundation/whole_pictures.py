@@ -26,14 +26,3 @@ def imagenet_picture(
         )
     mean, deviation = (torch.tensor(row, device=device).view(1, 3, 1, 1) for row in (_MEAN, _DEVIATION))
     return (picture - mean) / deviation
-
-
-def size_with_short_side(height: int, width: int, short_side: int, multiple: int = 1) -> tuple[int, int]:
-    """Return (height, width) of a picture's shape: each side the nearest multiple, the shorter about ``short_side``.
-
-    A very long picture is squeezed to four times as long as wide: its attention would fill any memory.
-    """
-    scale = short_side / (multiple * min(height, width))
-    most = 4 * short_side // multiple
-    sides = [min(max(1, round(side * scale)), most) * multiple for side in (height, width)]
-    return sides[0], sides[1]
