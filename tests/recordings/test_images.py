@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image
 from recording_scenes import CAMERA, metres, save_depth, save_rgb, shot
 
 from avlmaps.core.camera import Pinhole
@@ -132,6 +133,13 @@ def test_depth_arrays_that_cannot_be_used_are_named(tmp_path: Path):
 # Pictures of other codings: HEIC of phones; Bayer and YUV of cameras' raw topics.
 
 SHADE = np.full((48, 64, 3), (200, 120, 40), np.uint8)
+
+
+@pytest.mark.parametrize("suffix", ["png", "jpg", "webp", "tiff", "bmp"])
+def test_each_format_of_pictures_is_read(tmp_path: Path, suffix: str):
+    Image.fromarray(SHADE).save(tmp_path / f"p.{suffix}")
+    assert picture_size(tmp_path / f"p.{suffix}") == (64, 48)
+    assert np.abs(read_colour(tmp_path / f"p.{suffix}", CAMERA).astype(int) - SHADE).max() <= 6
 
 
 def test_a_heic_picture_is_read_like_any_other(tmp_path: Path):

@@ -36,7 +36,7 @@ _HEIF_KINDS = (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1")
 _HEADER_BYTES = 1 << 18
 _TRIED = 9
 _RESTORE = "restore it, or leave that frame out of the recording"
-_FORMATS = ("PNG", "JPEG", "MPO", "WEBP", "TIFF", "BMP", "AVIF", "HEIF")
+_FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "AVIF", "HEIF")  # JPEG opens MPO as well
 # What Pillow raises where a file is none of a format, or is damaged.
 _UNREADABLE = (OSError, SyntaxError, ValueError, TypeError, LookupError, EOFError, OverflowError, struct.error)
 _ORIENTATION = 0x0112
@@ -107,7 +107,10 @@ def _opened(content: bytes) -> Any:
     if content[4:8] == b"ftyp" and content[8:12] in _HEIF_KINDS:
         with suppress(ImportError):
             import_module("pillow_heif").register_heif_opener()
-    return Image.open(BytesIO(content), formats=_FORMATS)
+    if content.startswith((_PNG, _JPEG)):
+        return Image.open(BytesIO(content), formats=_FORMATS[:2])
+    Image.init()  # which formats there are depends on Pillow and on what is installed; `open` knows no others
+    return Image.open(BytesIO(content), formats=[name for name in _FORMATS if name in Image.OPEN])
 
 
 def read_bytes(path: Path) -> bytes:
