@@ -28,7 +28,7 @@ from avlmaps.query.goals import Goal, alike
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities.image import Attachment, Photo, read_picture
 from avlmaps.query.places import distance_m, place_given
-from avlmaps.query.whereabouts import own_names
+from avlmaps.query.whereabouts import NOWHERE, Whereabouts, own_names
 
 if TYPE_CHECKING:
     from avlmaps.language.questions import AskedSentence
@@ -458,8 +458,6 @@ def _lies_between(heat: Heatmap) -> "Callable[[Float[np.ndarray, 'n 3']], Bool[n
 
 
 def _one_a_room(avlmap: "AVLMap", goals: Sequence[Goal]) -> tuple[Goal, ...]:
-    from avlmaps.query.whereabouts import NOWHERE, Whereabouts
-
     rooms: list[int] = Whereabouts.of(avlmap).rooms_of(np.array([goal.position for goal in goals])).tolist()
     first = {room: at for at, room in reversed(list(enumerate(rooms)))}
     return tuple(goal for at, goal in enumerate(goals) if rooms[at] == NOWHERE or first[rooms[at]] == at)

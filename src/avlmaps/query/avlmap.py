@@ -23,13 +23,13 @@ from avlmaps.query.heatmap import HeatCache, Heatmap
 from avlmaps.query.instances import Instances
 from avlmaps.query.modalities.area import area_factor
 from avlmaps.query.modalities.image import Attachment, Photo, image_factor, read_picture, require_fitting
-from avlmaps.query.modalities.sound import read_clip, require_audible, sound_factor, sound_features
+from avlmaps.query.modalities.sound import read_clip, require_audible, sound_factor, sound_features, source_factor
 from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import RoomField, Rooms, ThingsInRooms
 from avlmaps.query.settings import QuerySettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.whereabouts import numbered_rooms, region_named
-from avlmaps.query.words import ClosestWords
+from avlmaps.query.whereabouts import Whereabouts, numbered_rooms, region_named
+from avlmaps.query.words import ClosestWords, is_open
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
@@ -275,8 +275,6 @@ class AVLMap:
         settings, heat = self.settings.sounds, self.settings.heat
         _require_place(at)
         if (at or settings.at) == "source" and len(scores):
-            from avlmaps.query.modalities.sound import source_factor
-
             factor = source_factor(self.space, self.source_map, scores, part, settings, heat)
         else:
             factor = sound_factor(self.space, self.data.sounds, scores, part, settings, heat)
@@ -402,8 +400,6 @@ class AVLMap:
     @checked(QueryError)
     def sees(self, phrase: str) -> bool:
         """Return whether the pixel encoder can look for a phrase: any phrase for an open vocabulary, else its words."""
-        from avlmaps.query.words import is_open
-
         encoder = self.encoders.pixels
         return is_open(encoder) or bool(encoder.understood(phrase))
 
@@ -444,8 +440,6 @@ class AVLMap:
         ``QueryError``: there is no such room, or the map was not seen on such a day, or on one day alone.
         """
         if room is not None:
-            from avlmaps.query.whereabouts import Whereabouts
-
             return Whereabouts.of(self).things_in(room, self.things(names, least_confidence, structure, watch, at=at))
         if at is not None:
             from avlmaps.query.changes import Days, things_at
@@ -519,8 +513,6 @@ class AVLMap:
         things = with_heard(self, things, are_all=not names)
         rooms = self.rooms() if self.has(Kind.VIEWS) else []
         if rooms:
-            from avlmaps.query.whereabouts import Whereabouts
-
             things = Whereabouts.of(self).with_rooms(things)
         return Contents(things, self.sounds(), rooms, self.doubts_of_things, self.storeys)
 

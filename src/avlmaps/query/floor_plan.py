@@ -12,7 +12,7 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.maps.grid import index_ends
 from avlmaps.maps.storeys import Storeys
-from avlmaps.query.voxel_space import Space
+from avlmaps.query.voxel_space import Space, connected
 
 CELL_M = 0.2
 # Heights over the floor between which a wall is seen: over tables and sofas, below the heads of doors.
@@ -155,8 +155,6 @@ class FloorPlan:
 
         Every cell of a wall is a region by itself.
         """
-        from avlmaps.query.voxel_space import connected
-
         a, b = self._neighbours
         same = label[a] == label[b]
         return connected(len(self), a[same], b[same])

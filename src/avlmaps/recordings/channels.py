@@ -61,8 +61,6 @@ def with_microphones(track: AudioTrack, microphones: Microphones, files: tuple[P
         RecordingError: there are more or fewer channels than microphones.
         AudioError: files of channels have another length or rate.
     """
-    from dataclasses import replace
-
     if files and len(files) != len(microphones):
         raise RecordingError(
             f"The recording has {len(files)} files of channels, but {len(microphones)} microphone(s) are described; "

@@ -48,4 +48,5 @@ def test_places_by_name_tell_one_picture_from_another(models: Path) -> None:
 
 
 def test_the_profile_names_them() -> None:
-    assert profile("foundation").views == "siglip2" and profile("foundation").place == "megaloc"
+    foundation = profile("foundation")
+    assert foundation.name_of(Kind.VIEWS) == "siglip2" and foundation.name_of(Kind.PLACE) == "megaloc"

@@ -125,8 +125,6 @@ def _no_features() -> LocalFeatures:
 
 
 def _thumbnail(rgb: UInt8[np.ndarray, "h w 3"], width_px: int) -> bytes:
-    import cv2
-
     if rgb.shape[1] > width_px:
         size = (width_px, max(1, round(rgb.shape[0] * width_px / rgb.shape[1])))
         rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)

@@ -203,14 +203,11 @@ class Seen:
         category: probability of each category on a grid that covers the colour picture evenly.
         known: which cells have a depth.
         room: probability of each kind of room.
-        floor_offset_m: estimated height of the true floor over the one that the frame's ground says; None where the
-            weights do not estimate it.
     """
 
     category: Float32[np.ndarray, "h w c"]
     known: np.ndarray
     room: Float32[np.ndarray, " r"]
-    floor_offset_m: float | None = None
 
 
 class SceneNetwork:
@@ -258,20 +255,15 @@ class SceneNetwork:
             geometry, colour = geometry[:, :, ::-1].copy(), colour[:, :, ::-1]
             geometry[_ACROSS] *= -1.0
         geometry, colour = _padded(geometry, multiple), _padded(colour, fineness * multiple)
-        score, room, *floor = (
-            np.asarray(output)
-            for output in self._session.run(None, {"geometry": geometry[None], "colour": colour[None]})
-        )
+        scores = self._session.run(["category", "room"], {"geometry": geometry[None], "colour": colour[None]})
+        score, room = (np.asarray(output) for output in scores)
         h, w = (depth_m.shape[0] + 1) // 2, (depth_m.shape[1] + 1) // 2
         category = score[0, :, :h, :w].transpose(1, 2, 0) + self._bias
         if augmentation.mirrored:
             category = category[:, ::-1]
         known = cv2.resize((depth_m > 0.0).astype(np.uint8), (w, h), interpolation=cv2.INTER_AREA) > 0
         return Seen(
-            _softmax(category / self.notes.temperature),
-            known,
-            _softmax(room[0] / self.notes.room_temperature),
-            float(floor[0].item()) if floor else None,
+            _softmax(category / self.notes.temperature), known, _softmax(room[0] / self.notes.room_temperature)
         )
 
 

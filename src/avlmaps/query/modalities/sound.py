@@ -16,7 +16,7 @@ from avlmaps.maps.types import HeardSounds
 from avlmaps.query.factors import NearAnchors, stretch_scores
 from avlmaps.query.settings import FOUND_AT, HeatSettings, SoundSettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.audio import AudioTrack, Sound
 
 if TYPE_CHECKING:
     from avlmaps.query.sound_sources import SourceMap
@@ -66,8 +66,6 @@ def sound_factor(
 
 def read_clip(path: Path) -> Sound:
     """Read a clip to ask with. ``QueryError``: it is missing, unreadable or silent."""
-    from avlmaps.recordings.audio import AudioTrack
-
     if not path.is_file():
         raise QueryError(f"The clip {path} is not there; check the name.")
     try:
