@@ -8,17 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, wrap_angle
-from avlmaps.navigate.controller import (
-    CLOSE_M,
-    ActionController,
-    RouteProgress,
-    VelocityController,
-    VelocitySettings,
-    bearing,
-    turns_for,
-)  # fmt: skip
+from avlmaps.navigate.controller import CLOSE_M, ActionController, RouteProgress, bearing, turns_for
 
 POSES = st.builds(GroundPose, st.floats(-3, 3), st.floats(-3, 3), st.floats(-pi, pi))
 WAYS = st.lists(st.tuples(st.floats(-3, 3), st.floats(-3, 3)), min_size=1, max_size=5)
@@ -105,76 +96,6 @@ def test_without_a_safe_step_it_says_so():
     assert ActionController(np.array([(0.0, 0.0), (1.0, 0.0)]), lambda a, b: False).action(GroundPose(0, 0)) is None
 
 
-def driven(controller, pose, seconds=240.0, **options):
-    """Drive a point by the commands, in fine steps; check the bounds at each."""
-    settings = controller.settings
-    poses, before = [pose], (0.0, 0.0)
-    for _ in range(int(seconds / settings.tick_s)):
-        command = controller.command(poses[-1], **options)
-        if command is None:
-            return poses
-        assert 0.0 <= command[0] <= settings.speed_m_s + 1e-9
-        assert abs(command[1]) <= settings.turn_rad_s + 1e-9
-        assert abs(command[0] - before[0]) <= settings.speed_m_s2 * settings.tick_s + 1e-9
-        assert abs(command[1] - before[1]) <= settings.turn_rad_s2 * settings.tick_s + 1e-9
-        before = command
-        for _ in range(5):
-            half = poses[-1].turned(0.5 * command[1] * settings.tick_s / 5).ahead(command[0] * settings.tick_s / 5)
-            poses.append(half.turned(0.5 * command[1] * settings.tick_s / 5))
-    raise AssertionError(f"never arrives: {poses[-1]}")
-
-
-@given(
-    pose=POSES,
-    goal=st.tuples(st.floats(-3, 3), st.floats(-3, 3)),
-    speed=st.floats(0.1, 1.0),
-    turn=st.floats(0.3, 3.0),
-)
-def test_velocities_keep_their_bounds_and_arrive_from_anywhere(pose, goal, speed, turn):
-    points = np.array([(pose.x_m, pose.y_m), goal])
-    poses = driven(VelocityController(points, VelocitySettings(speed_m_s=speed, turn_rad_s=turn)), pose)
-    assert hypot(poses[-1].x_m - goal[0], poses[-1].y_m - goal[1]) < 0.1
-
-
-@pytest.mark.nightly
-@given(heading=st.floats(-pi, pi), room_m=st.floats(0.0, 1.0))
-def test_velocities_keep_to_a_way_with_corners(heading, room_m):
-    points = np.array([(0, 0), (2, 0), (2, 1.5), (0.5, 1.5), (0.5, 3.0)], float)
-    poses = driven(VelocityController(points), GroundPose(0.0, 0.0, heading), room_m=room_m)
-    assert off_way_m(points, poses) < 0.25
-    assert poses[-1].distance_m(GroundPose(0.5, 3.0)) < 0.1
-
-
-def test_it_drives_slower_where_there_is_little_room():
-    times = []
-    for room_m in (1.0, 0.15, 0.0):
-        controller = VelocityController(np.array([(0.0, 0.0), (3.0, 0.0)]))
-        times.append(len(driven(controller, GroundPose(0.0, 0.0), room_m=room_m)))
-    assert times[0] < times[1] < times[2]
-
-
-def test_blocked_it_only_turns():
-    controller = VelocityController(np.array([(0.0, 0.0), (3.0, 0.3)]))
-    for _ in range(30):
-        speed, _ = controller.command(GroundPose(0.0, 0.0), blocked=True)
-        assert speed == 0.0
-
-
-@given(turn=st.floats(-pi, pi))
-def test_a_turn_by_velocities_comes_to_rest_at_its_heading(turn):
-    controller, pose = VelocityController(np.zeros((1, 2))), GroundPose(0.0, 0.0)
-    left = turn
-    for _ in range(400):
-        command = controller.turn(left)
-        if command is None:
-            break
-        assert command[0] == 0.0
-        pose = pose.turned(command[1] * controller.settings.tick_s)
-        left -= command[1] * controller.settings.tick_s
-    assert command is None
-    assert abs(left) < 0.01
-
-
 def test_a_route_never_goes_back():
     route = RouteProgress(np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 0.1), (0.0, 0.1)]))
     assert route.length_m == pytest.approx(2.1)
@@ -182,8 +103,3 @@ def test_a_route_never_goes_back():
     assert far == sorted(far)
     assert route.at(99.0) == route.end == (0.0, 0.1)
     assert bearing(GroundPose(0, 0), 0.0, 1.0) == pytest.approx(pi / 2)
-
-
-def test_bounds_that_are_none_are_refused():
-    with pytest.raises(NavigationError, match="must be over 0"):
-        VelocitySettings(speed_m_s=0.0)

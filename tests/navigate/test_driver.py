@@ -14,7 +14,7 @@ from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, 
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.bodies import BodyShape
 from avlmaps.navigate.controller import bearing
-from avlmaps.navigate.driver import Driver, DriveSettings, MapDriver
+from avlmaps.navigate.driver import Driver, MapDriver
 from avlmaps.navigate.rehearsal import FreeBody
 from avlmaps_sim.body import Building, MotionNoise, SimulatedBody
 from avlmaps_sim.scenes import open_scene
@@ -29,13 +29,11 @@ KNOWN = hall(6.0, 4.0, BOXES)
 MAP = seen(KNOWN)
 BUILDING = Building(KNOWN)
 START = GroundPose(0.5, 0.5)
-VELOCITY = DriveSettings(mode="velocity")
-MODES = pytest.mark.parametrize("drive", [DriveSettings(), VELOCITY], ids=["actions", "velocity"])
 PLACES = st.tuples(st.floats(0.05, 5.95), st.floats(0.05, 3.95))
 
 
-def driver_in(building, drive=None, start=START, obstacles=MAP, **options):
-    return MapDriver(obstacles, SimulatedBody(building, start, **options), settings=drive)
+def driver_in(building, start=START, obstacles=MAP, **options):
+    return MapDriver(obstacles, SimulatedBody(building, start, **options))
 
 
 def place(x, y):
@@ -46,12 +44,10 @@ def test_it_is_a_driver():
     assert isinstance(driver_in(BUILDING), Driver)
 
 
-@given(
-    goals=st.lists(PLACES, min_size=1, max_size=4), smooth=st.booleans(), on_contact=st.sampled_from(["stop", "slide"])
-)
+@given(goals=st.lists(PLACES, min_size=1, max_size=4), on_contact=st.sampled_from(["stop", "slide"]))
 @pytest.mark.slow
-def test_by_a_true_map_it_touches_nothing_and_arrival_means_being_there(goals, smooth, on_contact):
-    driver = driver_in(BUILDING, VELOCITY if smooth else None, on_contact=on_contact)
+def test_by_a_true_map_it_touches_nothing_and_arrival_means_being_there(goals, on_contact):
+    driver = driver_in(BUILDING, on_contact=on_contact)
     for goal in goals:
         stop = driver.planner.stop_for(np.array([driver.pose.x_m, driver.pose.y_m]), np.array(goal))
         arrival = driver.go_to(place(*goal))
@@ -65,9 +61,8 @@ def test_by_a_true_map_it_touches_nothing_and_arrival_means_being_there(goals, s
         assert np.all(np.linalg.norm(np.diff(arrival.path, axis=0), axis=1) <= 0.1 + 1e-9)
 
 
-@pytest.mark.parametrize("drive", [DriveSettings(), VELOCITY], ids=["actions", "velocity"])
-def test_it_faces_what_it_is_told_to_once_there(drive):
-    driver = driver_in(BUILDING, drive)
+def test_it_faces_what_it_is_told_to_once_there():
+    driver = driver_in(BUILDING)
     arrival = driver.go_to(place(3.0, 3.2), face=place(3.4, 2.3))
     off = wrap_angle(bearing(arrival.pose, 3.4, 2.3) - arrival.pose.heading_rad)
     assert arrival.reached
@@ -86,11 +81,10 @@ def test_the_actions_are_those_that_were_taken():
     assert len(arrival.path) == len(arrival.actions) + 1
 
 
-@MODES
 @pytest.mark.parametrize("on_contact", ["stop", "slide"])
-def test_a_wall_that_the_map_does_not_know_is_found_and_driven_round(drive, on_contact):
+def test_a_wall_that_the_map_does_not_know_is_found_and_driven_round(on_contact):
     other = Building(hall(6.0, 4.0, [*BOXES, (2.5, 1.5, 0.0, 2.6, 4.0, 2.0)]))
-    driver = driver_in(other, drive, start=GroundPose(0.5, 3.0), on_contact=on_contact)
+    driver = driver_in(other, start=GroundPose(0.5, 3.0), on_contact=on_contact)
     arrival = driver.go_to(place(4.0, 3.3))
     assert arrival.reached
     assert arrival.contacts > 0
@@ -102,10 +96,9 @@ def test_a_wall_that_the_map_does_not_know_is_found_and_driven_round(drive, on_c
 
 
 @pytest.mark.nightly
-@MODES
-def test_what_stands_round_it_on_all_sides_makes_it_give_up(drive):
+def test_what_stands_round_it_on_all_sides_makes_it_give_up():
     ring = [(0.05, 1.0, 0, 1.2, 1.1, 1), (1.1, 0.05, 0, 1.2, 1.1, 1)]
-    driver = driver_in(Building(hall(6.0, 4.0, [*BOXES, *ring])), drive)
+    driver = driver_in(Building(hall(6.0, 4.0, [*BOXES, *ring])))
     arrival = driver.go_to(place(3.0, 3.2))
     assert not arrival.reached
     assert arrival.note
@@ -144,26 +137,25 @@ def test_a_body_that_the_map_says_is_stuck_says_so():
     assert arrival.note == "nothing round the robot is known to be free, so that it cannot set out"
 
 
-@given(angle=st.floats(-pi, pi), smooth=st.booleans())
-def test_a_turn_is_to_the_left_and_as_far_as_told(angle, smooth):
-    driver = driver_in(BUILDING, VELOCITY if smooth else None, start=GroundPose(0.8, 0.6, 1.0))
+@given(angle=st.floats(-pi, pi))
+def test_a_turn_is_to_the_left_and_as_far_as_told(angle):
+    driver = driver_in(BUILDING, start=GroundPose(0.8, 0.6, 1.0))
     arrival = driver.turn(angle)
     assert arrival.reached
     assert abs(wrap_angle(arrival.pose.heading_rad - 1.0 - angle)) <= TURN_RAD / 2 + 0.01
-    assert len(arrival.actions) == (0 if smooth else abs(round(angle / TURN_RAD)))
+    assert len(arrival.actions) == abs(round(angle / TURN_RAD))
 
 
-@MODES
-def test_forward_goes_as_far_as_told_or_as_nothing_is_in_the_way(drive):
-    driver = driver_in(BUILDING, drive)
+def test_forward_goes_as_far_as_told_or_as_nothing_is_in_the_way():
+    driver = driver_in(BUILDING)
     ahead = driver.forward(1.0)
     assert ahead.reached
     assert ahead.pose.x_m == pytest.approx(1.5, abs=0.06)
-    blocked = driver_in(BUILDING, drive, start=GroundPose(0.5, 1.2)).forward(2.0)
+    blocked = driver_in(BUILDING, start=GroundPose(0.5, 1.2)).forward(2.0)
     assert not blocked.reached
     assert blocked.contacts == 0
     assert blocked.note.startswith("an obstacle is ahead after 0.")
-    back = driver_in(BUILDING, drive, start=GroundPose(1.0, 0.5)).forward(-0.5)
+    back = driver_in(BUILDING, start=GroundPose(1.0, 0.5)).forward(-0.5)
     assert back.pose.x_m == pytest.approx(0.5, abs=0.06)
 
 
@@ -174,11 +166,10 @@ def test_stop_stands_still():
     assert arrival.pose == START
 
 
-@MODES
-def test_it_corrects_for_a_body_that_moves_inexactly(drive):
+def test_it_corrects_for_a_body_that_moves_inexactly():
     for seed in range(3):
         noise = MotionNoise(0.1, 0.1, 0.05)
-        driver = driver_in(BUILDING, drive, noise=noise, rng=np.random.default_rng(seed))
+        driver = driver_in(BUILDING, noise=noise, rng=np.random.default_rng(seed))
         for goal in ((5.5, 3.5), (0.5, 3.5), (5.3, 0.5)):
             assert driver.go_to(place(*goal)).reached
 
@@ -205,13 +196,12 @@ def test_a_body_that_never_moves_is_given_up():
 
 
 @pytest.mark.nightly
-@MODES
-def test_in_a_home_it_gets_everywhere_and_touches_nothing(drive):
+def test_in_a_home_it_gets_everywhere_and_touches_nothing():
     scene = open_scene("house:7")
     building, obstacles = Building(scene), seen(scene)
     rng = np.random.default_rng(0)
     body = SimulatedBody(building, GroundPose(*_somewhere(obstacles, building, rng)))
-    driver = MapDriver(obstacles, body, settings=drive)
+    driver = MapDriver(obstacles, body)
     part = driver.planner._part
     here = part[tuple(driver.planner.costmap.cell_of(np.array([driver.pose.x_m, driver.pose.y_m])))]
     reachable = driver.planner.costmap.middle_of(np.argwhere(part == here))
@@ -247,15 +237,11 @@ class Free:
 
     def __init__(self, pose, ahead=1.0, turns=1.0, contact=False, noise_rad=0.0):
         self.pose, self.ahead, self.turns, self.contact = pose, ahead, turns, contact
-        self.noise_rad, self.rng, self.time_s = noise_rad, np.random.default_rng(0), 0.0
+        self.noise_rad, self.rng = noise_rad, np.random.default_rng(0)
 
     def act(self, action):
         sign = {Action.LEFT: 1, Action.RIGHT: -1}.get(action, 0)
         return self._moved(FORWARD_M * (action is Action.FORWARD), sign * TURN_RAD)
-
-    def drive(self, speed_m_s, turn_rad_s, duration_s):
-        self.time_s += duration_s
-        return self._moved(speed_m_s * duration_s, turn_rad_s * duration_s)
 
     def _moved(self, ahead_m, turn_rad):
         turn_rad = self.turns * turn_rad + (self.noise_rad * self.rng.normal() if turn_rad else 0.0)
@@ -266,50 +252,45 @@ class Free:
 FLOOR = of_plan(np.full((200, 100), CellState.FREE))
 
 
-@MODES
 @pytest.mark.parametrize("told_m, heading_rad, gone_m", [(4.0, 0.0, 2.0), (20.0, pi, 1.0), (1e5, pi / 2, 4.0)])
-def test_forward_stops_where_the_known_floor_ends(drive, told_m, heading_rad, gone_m):
+def test_forward_stops_where_the_known_floor_ends(told_m, heading_rad, gone_m):
     states = np.full((120, 100), CellState.UNKNOWN)
     states[:60] = CellState.FREE
     states[30:34, 18:22] = CellState.UNKNOWN  # a small hole is not an end
     body = Free(GroundPose(1.0, 1.0, heading_rad))
-    arrival = MapDriver(of_plan(states), body, settings=drive).forward(told_m)
+    arrival = MapDriver(of_plan(states), body).forward(told_m)
     assert not arrival.reached
     assert arrival.note.startswith("the floor ahead is not known after ")
     gone = hypot(arrival.pose.x_m - 1.0, arrival.pose.y_m - 1.0)
     assert gone_m - 0.15 <= gone <= gone_m + 0.01
 
 
-@MODES
-def test_from_unknown_ground_forward_leads_a_short_way_out_and_no_farther(drive):
+def test_from_unknown_ground_forward_leads_a_short_way_out_and_no_farther():
     states = np.full((200, 40), CellState.FREE)
     states[:80] = CellState.UNKNOWN
-    out = MapDriver(of_plan(states), Free(GroundPose(3.5, 1.0)), settings=drive).forward(1.5)
+    out = MapDriver(of_plan(states), Free(GroundPose(3.5, 1.0))).forward(1.5)
     assert out.reached
     assert out.pose.x_m == pytest.approx(5.0, abs=0.1)
-    lost = MapDriver(of_plan(states), Free(GroundPose(1.0, 1.0)), settings=drive).forward(1.5)
+    lost = MapDriver(of_plan(states), Free(GroundPose(1.0, 1.0))).forward(1.5)
     assert not lost.reached
     assert lost.pose == GroundPose(1.0, 1.0)
 
 
-@MODES
 @pytest.mark.parametrize("wrong", [{"turns": 0.0}, {"turns": -1.0}, {"turns": 0.1}, {"turns": 0.0, "contact": True}])
-def test_a_turn_that_does_not_come_about_is_not_reached(drive, wrong):
+def test_a_turn_that_does_not_come_about_is_not_reached(wrong):
     body = Free(GroundPose(2.0, 2.0), **wrong)
-    arrival = MapDriver(FLOOR, body, settings=drive).turn(1.0)
+    arrival = MapDriver(FLOOR, body).turn(1.0)
     assert not arrival.reached
     assert arrival.note.startswith(("the turn ended ", "the body does not turn when commanded"))
     assert len(arrival.actions) <= 60
-    assert body.time_s <= 15.0
     assert bool(arrival.contacts) == body.contact
 
 
-@MODES
-def test_a_turn_is_put_right_where_the_body_turns_inexactly(drive):
+def test_a_turn_is_put_right_where_the_body_turns_inexactly():
     for seed in range(5):
         body = Free(GroundPose(2.0, 2.0), turns=1.1, noise_rad=0.02)
         body.rng = np.random.default_rng(seed)
-        arrival = MapDriver(FLOOR, body, settings=drive).turn(2.0)
+        arrival = MapDriver(FLOOR, body).turn(2.0)
         assert arrival.reached
         assert abs(arrival.pose.heading_rad - 2.0) <= TURN_RAD / 2 + 0.011
 
@@ -320,22 +301,19 @@ def test_a_contact_in_a_turn_tells_of_nothing_ahead():
     assert not driver.contacts.cells.any()
 
 
-@MODES
 @pytest.mark.parametrize("wrong", [{"ahead": -1.0}, {"turns": -1.0}])
-def test_a_body_that_moves_otherwise_than_told_is_stopped_soon(drive, wrong):
-    driver = MapDriver(FLOOR, Free(GroundPose(5.0, 2.5, 1.0), **wrong), settings=drive)
+def test_a_body_that_moves_otherwise_than_told_is_stopped_soon(wrong):
+    driver = MapDriver(FLOOR, Free(GroundPose(5.0, 2.5, 1.0), **wrong))
     arrival = driver.go_to(place(9.0, 2.5))
     assert not arrival.reached
     assert "the body does not move as commanded; check the frame of its pose" in arrival.note
     assert hypot(arrival.pose.x_m - 5.0, arrival.pose.y_m - 2.5) < 2.5
 
 
-def test_a_body_that_stands_dead_is_given_up_in_seconds():
-    body = Free(GroundPose(2.0, 2.0, 2.0), ahead=0.0, turns=0.0)
-    arrival = MapDriver(FLOOR, body, settings=VELOCITY).go_to(place(8.0, 2.5))
-    assert not arrival.reached
-    assert "when commanded" in arrival.note
-    assert body.time_s < 30.0
+def test_a_body_that_stands_dead_is_given_up_soon():
+    arrival = MapDriver(FLOOR, Free(GroundPose(2.0, 2.0, 2.0), ahead=0.0, turns=0.0)).go_to(place(8.0, 2.5))
+    assert not arrival.reached and "when commanded" in arrival.note
+    assert len(arrival.actions) < 30
 
 
 def test_what_is_too_small_for_an_action_is_told():
@@ -346,10 +324,9 @@ def test_what_is_too_small_for_an_action_is_told():
     assert not driver.turn(0.001).note
 
 
-@MODES
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e300])
-def test_numbers_that_are_none_are_answered(drive, number):
-    driver = driver_in(BUILDING, drive)
+def test_numbers_that_are_none_are_answered(number):
+    driver = driver_in(BUILDING)
     assert not driver.turn(number).reached
     assert not driver.forward(number).reached
     assert not driver.go_to(place(number, 1.0)).reached
@@ -357,10 +334,9 @@ def test_numbers_that_are_none_are_answered(drive, number):
     assert driver.go_to(place(1.0, 0.5), face=place(number, 0.0)).pose.x_m == pytest.approx(1.0, abs=0.15)
 
 
-@MODES
-def test_before_a_wall_that_nobody_knew_it_is_not_where_it_was_told(drive):
+def test_before_a_wall_that_nobody_knew_it_is_not_where_it_was_told():
     other = Building(hall(6.0, 4.0, [(3.5, 0.0, 0.0, 3.6, 4.0, 2.0)]))
-    driver = driver_in(other, drive, start=GroundPose(1.0, 1.0), obstacles=seen(hall(6.0, 4.0)))
+    driver = driver_in(other, start=GroundPose(1.0, 1.0), obstacles=seen(hall(6.0, 4.0)))
     arrival = driver.go_to(place(4.6, 1.0))
     assert arrival.contacts > 0
     assert arrival.pose.x_m < 3.5
@@ -388,9 +364,6 @@ class Odd(FreeBody):
         self.stops += action is Action.STOP
         return self._done(super().act(action))
 
-    def drive(self, speed_m_s, turn_rad_s, duration_s):
-        return self._done(super().drive(speed_m_s, turn_rad_s, duration_s))
-
     def _done(self, moved):
         self.count += 1
         if self.count < 4:
@@ -416,7 +389,6 @@ class Odd(FreeBody):
         return Moved(self.pose)
 
 
-@MODES
 @pytest.mark.parametrize(
     ("odd", "says"),
     [
@@ -426,37 +398,34 @@ class Odd(FreeBody):
         ("jumps", "the body moved by 3.2"),
     ],
 )
-def test_a_body_that_fails_or_does_something_else_is_stopped(drive, odd, says):
+def test_a_body_that_fails_or_does_something_else_is_stopped(odd, says):
     for move in (lambda d: d.go_to(place(3.0, 3.2)), lambda d: d.forward(0.9), lambda d: d.turn(pi / 2)):
         body = Odd(odd)
-        arrival = move(MapDriver(MAP, body, settings=drive))
+        arrival = move(MapDriver(MAP, body))
         assert not arrival.reached and says in arrival.note
         assert np.isfinite(arrival.path).all() and body.count <= 6
         assert odd == "jumps" or body.stops
 
 
-@MODES
-def test_a_body_that_says_it_is_at_the_goal_at_once_is_not_there(drive):
+def test_a_body_that_says_it_is_at_the_goal_at_once_is_not_there():
     body = Odd("is there")
-    arrival = MapDriver(MAP, body, settings=drive).go_to(place(3.0, 3.2))
+    arrival = MapDriver(MAP, body).go_to(place(3.0, 3.2))
     assert not arrival.reached and "the body moved by" in arrival.note and body.stops
 
 
 @pytest.mark.nightly
-@MODES
-def test_a_body_whose_heading_never_changes_is_stopped_soon(drive):
+def test_a_body_whose_heading_never_changes_is_stopped_soon():
     body = Odd("looks ahead")
-    arrival = MapDriver(MAP, body, settings=drive).go_to(place(3.0, 3.2))
+    arrival = MapDriver(MAP, body).go_to(place(3.0, 3.2))
     assert not arrival.reached and "does not turn when commanded" in arrival.note
     assert body.stops and body.count < 60
 
 
-@MODES
-def test_a_program_that_is_ended_while_the_body_moves_stops_it(drive):
+def test_a_program_that_is_ended_while_the_body_moves_stops_it():
     for move in (lambda d: d.go_to(place(3.0, 3.2)), lambda d: d.forward(0.9), lambda d: d.turn(pi / 2)):
         body = Odd("ends the program")
         with pytest.raises(KeyboardInterrupt):
-            move(MapDriver(MAP, body, settings=drive))
+            move(MapDriver(MAP, body))
         assert body.stops == 1
 
 
@@ -486,11 +455,10 @@ def test_what_ends_elsewhere_than_it_should_is_not_reached():
     assert "from where 0.60 m ahead is" in MapDriver(MAP, Odd("creeps")).forward(0.6).note
 
 
-@MODES
-def test_a_driver_that_is_held_moves_no_further(drive):
+def test_a_driver_that_is_held_moves_no_further():
     for move in (lambda d: d.go_to(place(3.0, 3.2)), lambda d: d.forward(-0.9), lambda d: d.turn(pi / 2)):
         body = Odd("")
-        driver = MapDriver(MAP, body, settings=drive)
+        driver = MapDriver(MAP, body)
         driver.held = lambda body=body: "the floor is wet" if body.count >= 4 else ""
         arrival = move(driver)
         assert not arrival.reached and "the floor is wet" in arrival.note

@@ -55,12 +55,6 @@ class GroundPose:
             return self.ahead(FORWARD_M)
         return self if action is Action.STOP else self.turned(TURN_RAD if action is Action.LEFT else -TURN_RAD)
 
-    def driven(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> "GroundPose":
-        """Return the pose after driving along an arc: a constant speed ahead and a constant turn, positive left."""
-        half_rad = 0.5 * turn_rad_s * duration_s
-        chord = sin(half_rad) / half_rad if abs(half_rad) > 1e-6 else 1.0  # of the arc's length
-        return self.turned(half_rad).ahead(speed_m_s * duration_s * chord).turned(half_rad)
-
     def distance_m(self, other: "GroundPose") -> float:
         """Return the horizontal distance to another pose."""
         return hypot(self.x_m - other.x_m, self.y_m - other.y_m)

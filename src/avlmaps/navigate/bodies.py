@@ -30,16 +30,6 @@ class Body(Protocol):
         """
         ...
 
-    def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
-        """Move at a velocity for a while.
-
-        Args:
-            speed_m_s: ahead; negative drives back.
-            turn_rad_s: to the left; negative turns to the right.
-            duration_s: for how long.
-        """
-        ...
-
 
 BASE = BodyShape()
 """A wheeled base of the size of those in homes, with a camera on a mast."""

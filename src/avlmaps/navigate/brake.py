@@ -120,11 +120,6 @@ class BrakedBody:
         self._wait(0.0 if action is Action.STOP else self._action_s)
         return self._body.act(action)
 
-    def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
-        """Move at a velocity for a while."""
-        self._wait(min(duration_s, self._action_s))
-        return self._body.drive(speed_m_s, turn_rad_s, duration_s)
-
     def _wait(self, seconds: float) -> None:
         try:
             self._brake.pause(seconds)

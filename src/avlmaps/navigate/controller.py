@@ -1,13 +1,11 @@
-"""Following a path: by the paper's actions, or by velocities. Both look at the pose again each time, level frame."""
+"""Following a path by the paper's actions, by a look at the pose before each, level frame."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from math import atan2, copysign, cos, hypot, pi, sin, sqrt
+from math import atan2, cos, hypot, pi
 
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, wrap_angle
 
 # Whether a body can move straight from one pose to another, as far as is known.
@@ -18,7 +16,6 @@ CLOSE_M = 0.5 * FORWARD_M / cos(0.5 * TURN_RAD) + 1e-6
 _ASTRAY_M = 1.1  # only a body that does not follow its commands gets this far off its path
 _FARTHER_M, _MOST_IN_VAIN = 0.01, 150  # as does one that gains no distance in this many movements
 _LOOKAHEADS_M = (0.4, 0.25, 0.15)
-_SHORTER = (1.0, 0.6, 0.35, 0.15)  # parts of a lookahead
 _TURNS = round(pi / TURN_RAD)
 
 
@@ -86,18 +83,6 @@ class StallDetector:
         return "the body does not move as commanded; check the frame of its pose"
 
 
-def still(before: GroundPose, now: GroundPose) -> bool:
-    """Return whether a body neither moved nor turned."""
-    return before.distance_m(now) <= 1e-4 and abs(wrap_angle(now.heading_rad - before.heading_rad)) <= 1e-3
-
-
-def _farthest(
-    route: RouteProgress, lookaheads_m: tuple[float, ...], pose: GroundPose, safe: Safe | None
-) -> tuple[float, float]:
-    places = [route.at(route.along_m + lookahead_m) for lookahead_m in lookaheads_m]
-    return next((place for place in places if safe is None or safe(pose, GroundPose(*place))), places[-1])
-
-
 class ActionController:
     """Chooses the paper's actions: turns until it looks along the path as well as 5 degrees allow, then steps on."""
 
@@ -130,7 +115,8 @@ class ActionController:
 
     def _turns_to_step(self, pose: GroundPose) -> int | None:
         """Return by how many turns to the left the best safe step begins."""
-        x_m, y_m = _farthest(self.route, _LOOKAHEADS_M, pose, self._safe)
+        places = [self.route.at(self.route.along_m + lookahead_m) for lookahead_m in _LOOKAHEADS_M]
+        x_m, y_m = next((place for place in places if self._safe(pose, GroundPose(*place))), places[-1])
         ahead = round(wrap_angle(bearing(pose, x_m, y_m) - pose.heading_rad) / TURN_RAD)
         if self._safe(pose, pose.turned(ahead * TURN_RAD).ahead(FORWARD_M)):
             return ahead
@@ -148,113 +134,3 @@ def turns_for(angle_rad: float) -> list[Action]:
     """Return the actions that turn by an angle as nearly as 5 degrees allow, left positive."""
     turns = round(angle_rad / TURN_RAD)
     return [Action.LEFT if turns > 0 else Action.RIGHT] * abs(turns)
-
-
-@dataclass(frozen=True, slots=True)
-class VelocitySettings:
-    """Bounds of a body driven by velocities, and how it follows a path."""
-
-    speed_m_s: float = 0.5
-    """Never faster ahead."""
-    turn_rad_s: float = 1.2
-    """Never turns faster."""
-    speed_m_s2: float = 0.6
-    """Speed never changes faster."""
-    turn_rad_s2: float = 3.0
-    """Turning never changes faster."""
-    tick_s: float = 0.1
-    """Time between two commands."""
-    lookahead_m: float = 0.4
-    """Distance along the path to the place that it heads for, metres."""
-    turn_first_rad: float = 0.8
-    """It turns on the spot where the path leads farther to a side than this."""
-    slow_room_m: float = 0.3
-    """With less room than this beside it, it drives slower in proportion ..."""
-    slowest: float = 0.25
-    """... but not slower than this part of its speed."""
-    close_m: float = 0.03
-    """It is there when it is so close."""
-
-    def __post_init__(self) -> None:
-        values = (self.speed_m_s, self.turn_rad_s, self.speed_m_s2, self.turn_rad_s2, self.tick_s, self.lookahead_m)
-        if not (min(values) > 0.0 and self.close_m > 0.0 and 0.0 < self.slowest <= 1.0 and self.slow_room_m > 0.0):
-            raise NavigationError("Speeds, times and distances of a velocity controller must be over 0.")
-
-
-class VelocityController:
-    """Regulated pure pursuit: heads for a place on the path, slower in curves, near things and before the end.
-
-    Attributes:
-        route: the path.
-        speed_m_s: of the last command.
-        turn_rad_s: of the last command.
-    """
-
-    def __init__(
-        self, points: Float[np.ndarray, "n 2"], settings: VelocitySettings | None = None, safe: Safe | None = None
-    ) -> None:
-        self.route = RouteProgress(points)
-        self._safe = safe
-        self.settings = settings or VelocitySettings()
-        self.speed_m_s, self.turn_rad_s = 0.0, 0.0
-        self._turning = False
-
-    def command(self, pose: GroundPose, room_m: float = np.inf, blocked: bool = False) -> tuple[float, float] | None:
-        """Return the speed ahead and the turning to the left for the next tick, None once it stands at the end.
-
-        Args:
-            pose: where the body is.
-            room_m: how much room it has beyond its radius.
-            blocked: whether something is close ahead: then it only turns.
-        """
-        settings, route = self.settings, self.route
-        route.advance(pose)
-        left_m = route.to_end_m(pose)
-        passed = route.length_m - route.along_m < 1e-6
-        if left_m <= settings.close_m and passed:
-            return None if self._stands() else self._limited(0.0, 0.0)
-        lookaheads_m = tuple(part * settings.lookahead_m for part in _SHORTER)
-        x_m, y_m = _farthest(route, lookaheads_m, pose, self._safe)
-        off_rad = wrap_angle(bearing(pose, x_m, y_m) - pose.heading_rad)
-        apart_m = max(hypot(x_m - pose.x_m, y_m - pose.y_m), 1e-6)
-        self._turning = abs(off_rad) > (0.1 if self._turning else settings.turn_first_rad)
-        if self._turning or blocked:
-            return self._limited(0.0, self._turn_by(off_rad))
-        curvature = 2.0 * sin(off_rad) / apart_m
-        remaining_m = max(left_m, route.length_m - route.along_m)
-        speed = min(self._regulated(curvature, room_m), sqrt(settings.speed_m_s2 * remaining_m))
-        return self._limited(speed, speed * curvature)
-
-    def turn(self, angle_left_rad: float) -> tuple[float, float] | None:
-        """Return the next command of a turn on the spot by what is left of it, None once it is done."""
-        if abs(angle_left_rad) < 0.01 and self._stands():
-            return None
-        return self._limited(0.0, self._turn_by(angle_left_rad))
-
-    def _stands(self) -> bool:
-        return abs(self.speed_m_s) < 1e-9 and abs(self.turn_rad_s) < 1e-9
-
-    def _turn_by(self, angle_rad: float) -> float:
-        """Return the fastest turning that still comes to rest at an angle."""
-        settings = self.settings
-        if abs(angle_rad) < 0.005:
-            return 0.0
-        rest = sqrt(settings.turn_rad_s2 * abs(angle_rad))
-        return copysign(min(settings.turn_rad_s, rest, abs(angle_rad) / settings.tick_s), angle_rad)
-
-    def _regulated(self, curvature: float, room_m: float) -> float:
-        settings = self.settings
-        speed = settings.speed_m_s * min(1.0, max(room_m / settings.slow_room_m, settings.slowest))
-        if abs(curvature) > 1e-9:
-            speed = min(speed, settings.turn_rad_s / abs(curvature))
-        return speed
-
-    def _limited(self, speed_m_s: float, turn_rad_s: float) -> tuple[float, float]:
-        """Return the nearest command within the bounds, and keep it."""
-        settings = self.settings
-        by = settings.speed_m_s2 * settings.tick_s, settings.turn_rad_s2 * settings.tick_s
-        speed = min(max(speed_m_s, self.speed_m_s - by[0]), self.speed_m_s + by[0])
-        turn = min(max(turn_rad_s, self.turn_rad_s - by[1]), self.turn_rad_s + by[1])
-        self.speed_m_s = min(max(speed, 0.0), settings.speed_m_s)
-        self.turn_rad_s = min(max(turn, -settings.turn_rad_s), settings.turn_rad_s)
-        return self.speed_m_s, self.turn_rad_s

@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from math import pi
 from time import sleep
-from typing import Literal, Protocol, TypeVar, runtime_checkable
+from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -15,15 +15,7 @@ from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, 
 from avlmaps.core.printable import printable
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, Body, BodyShape
-from avlmaps.navigate.controller import (
-    ActionController,
-    StallDetector,
-    VelocityController,
-    VelocitySettings,
-    bearing,
-    still,
-    turns_for,
-)
+from avlmaps.navigate.controller import ActionController, StallDetector, bearing, turns_for
 from avlmaps.navigate.costmap import ContactMap, CostSettings, costmap_of
 from avlmaps.navigate.grids import rooms
 from avlmaps.navigate.planner import Planner, PlanSettings, Stop
@@ -34,7 +26,6 @@ _STILL_M = 0.005  # a step that brings the body no farther was stopped
 _OPEN_M = 0.5  # beside a place in which it could stand, but to which no path leads, it stops no farther off
 _TURNED_RAD = 0.5 * TURN_RAD + 0.01  # a turn that is off by no more is done
 _EXTRA_TURNS = 36  # actions that a turn may take beyond its angle
-_PATIENCE_S = 5.0  # time for which a body may stand still against its commands
 _MOST_M, _MOST_RAD = 1e6, 1e3
 _IN_VAIN = 12  # turns that change no heading: a body that does not say how it turns is not driven
 _LOOK_S, _CREEP_M = 0.1, 0.01  # a body that moves by more within that time of its stop does not stand
@@ -111,20 +102,16 @@ class Holdable(Protocol):
 class DriveSettings:
     """How a `MapDriver` drives."""
 
-    mode: Literal["actions", "velocity"] = "actions"
-    """By the paper's discrete actions, or by velocities."""
     tolerance_m: float = 0.15
     """It has arrived when it stands no farther from where it is to stop."""
     most_plans: int = 40
     """It gives up a place after this many plans; each contact takes one."""
     most_movements: int = 5_000
-    """It gives up a place after this many actions, or ticks of a velocity."""
+    """It gives up a place after this many actions."""
     costs: CostSettings = field(default_factory=CostSettings)
     """Cost of a path."""
     planning: PlanSettings = field(default_factory=PlanSettings)
     """Search of a path."""
-    velocities: VelocitySettings = field(default_factory=VelocitySettings)
-    """Bounds of the velocities."""
 
 
 @dataclass(slots=True)
@@ -222,7 +209,7 @@ class MapDriver:
         left_rad = self._turned(angle_rad, trip)
         if trip.fault or abs(left_rad) > _TURNED_RAD:
             return self._arrival(trip, False, trip.fault or f"the turn ended {np.rad2deg(abs(left_rad)):.0f}° off")
-        small = self.settings.mode == "actions" and not trip.actions and abs(angle_rad) > 0.01
+        small = not trip.actions and abs(angle_rad) > 0.01
         return self._arrival(trip, True, "it turns by 5° at a time, so that it did not turn" if small else "")
 
     def forward(self, distance_m: float) -> Arrival:
@@ -235,13 +222,7 @@ class MapDriver:
         if distance_m < 0.0 and abs(self._turned(pi, trip)) > _TURNED_RAD:
             return self._arrival(trip, False, trip.fault or "it could not turn round")
         start, distance_m = self.pose, abs(distance_m)
-        if self.settings.mode == "velocity":
-            known_m = self._known_m(distance_m)
-            end = start.ahead(known_m)
-            arrived = known_m == 0.0 or self._follow(np.array([self._xy, [end.x_m, end.y_m]]), trip)
-            arrived &= known_m >= distance_m
-        else:
-            arrived = self._stepped(round(distance_m / FORWARD_M), trip)
+        arrived = self._stepped(round(distance_m / FORWARD_M), trip)
         gone_m = start.distance_m(self.pose)
         if not arrived:
             known = self._known_m(1.5 * FORWARD_M) >= 1.5 * FORWARD_M
@@ -252,7 +233,7 @@ class MapDriver:
             return self._arrival(
                 trip, False, f"the body stands {off_m:.2f} m from where {distance_m:.2f} m ahead is (check its pose)"
             )
-        small = self.settings.mode == "actions" and not trip.actions and distance_m > 0.01
+        small = not trip.actions and distance_m > 0.01
         return self._arrival(trip, True, "it drives 0.1 m at a time, so that it did not move" if small else "")
 
     def stop(self) -> Arrival:
@@ -359,8 +340,6 @@ class MapDriver:
 
     def _follow(self, points: Float[np.ndarray, "n 2"], trip: _Trip) -> bool:
         """Follow a path until its end; return False where an obstacle stopped it, which it then knows of."""
-        if self.settings.mode == "velocity":
-            return self._follow_smoothly(points, trip)
         controller = ActionController(points, self._safe)
         watch = StallDetector(controller.route)
         while trip.movements < self.settings.most_movements:
@@ -375,33 +354,6 @@ class MapDriver:
             if not self._take(action, trip):
                 return False
         return False
-
-    def _follow_smoothly(self, points: Float[np.ndarray, "n 2"], trip: _Trip) -> bool:
-        settings = self.settings.velocities
-        controller, idle = VelocityController(points, settings, self._safe), 0
-        watch = StallDetector(controller.route)
-        while trip.movements < self.settings.most_movements and idle * settings.tick_s < _PATIENCE_S:
-            trip.fault = watch.fault(self.pose)
-            if trip.fault:
-                return False
-            costmap = self.planner.costmap
-            reach = (costmap.radius_m + settings.slow_room_m) / costmap.cell_size_m
-            room = float(rooms(costmap.in_cells(self._xy)[None], costmap.occupied, reach)[0]) * costmap.cell_size_m
-            speed = controller.speed_m_s + settings.speed_m_s2 * settings.tick_s
-            ahead_m = speed * settings.tick_s + 0.5 * speed**2 / settings.speed_m_s2
-            along = self.pose.turned(0.5 * controller.turn_rad_s * ahead_m / max(speed, 0.05))
-            command = controller.command(
-                self.pose, room - costmap.radius_m, not self._safe(self.pose, along.ahead(ahead_m))
-            )
-            if command is None:
-                return True
-            before = self.pose
-            if not self._drive(*command, trip):
-                return False
-            idle = idle + 1 if still(before, self.pose) else 0
-            if idle * settings.tick_s >= _PATIENCE_S and max(command[0], abs(command[1])) > 0.01:
-                trip.fault = "the body does not move when commanded"
-        return controller.route.to_end_m(self.pose) <= self.settings.tolerance_m
 
     def _stepped(self, steps: int, trip: _Trip) -> bool:
         for step in range(steps):
@@ -419,37 +371,22 @@ class MapDriver:
 
     def _turned(self, angle_rad: float, trip: _Trip) -> float:
         """Turn, and return by how much it is still off."""
-        start, left_rad, heading_rad, idle = self.pose, angle_rad, self.pose.heading_rad, 0
-        controller = VelocityController(np.array([self._xy]), self.settings.velocities)
-        planned, most = turns_for(angle_rad), trip.movements + self._most_turns(angle_rad)
-        while trip.movements < most and idle * self.settings.velocities.tick_s <= _PATIENCE_S:
-            before = self.pose
-            if (gone_m := start.distance_m(before)) > _BEYOND_M:
+        start, left_rad, heading_rad = self.pose, angle_rad, self.pose.heading_rad
+        planned = turns_for(angle_rad)
+        for _ in range(len(planned) + _EXTRA_TURNS):
+            if (gone_m := start.distance_m(self.pose)) > _BEYOND_M:
                 trip.fault = f"the body moved by {gone_m:.2f} m where it was to turn on the spot (check its pose)"
             if self._is_held(trip) or trip.fault:
                 break
-            if self.settings.mode == "actions":
-                # Those that were planned first, so that an exact body takes no other; then what is still off.
-                if not planned and abs(left_rad) > _TURNED_RAD:
-                    planned = turns_for(left_rad)[:1]
-                if not planned:
-                    break
-                self._take(planned.pop(), trip)
-            else:
-                command = controller.turn(left_rad)
-                if command is None:
-                    break
-                self._drive(*command, trip)
+            # Those that were planned first, so that an exact body takes no other; then what is still off.
+            if not planned and abs(left_rad) > _TURNED_RAD:
+                planned = turns_for(left_rad)[:1]
+            if not planned:
+                break
+            self._take(planned.pop(), trip)
             left_rad -= wrap_angle(self.pose.heading_rad - heading_rad)
             heading_rad = self.pose.heading_rad
-            idle = idle + 1 if still(before, self.pose) else 0
         return left_rad
-
-    def _most_turns(self, angle_rad: float) -> int:
-        if self.settings.mode == "actions":
-            return len(turns_for(angle_rad)) + _EXTRA_TURNS
-        velocities = self.settings.velocities
-        return int((2.0 * abs(angle_rad) / velocities.turn_rad_s + _PATIENCE_S) / velocities.tick_s)
 
     def _take(self, action: Action, trip: _Trip) -> bool:
         """Take an action; return False where something stopped it."""
@@ -459,15 +396,6 @@ class MapDriver:
         moved = self._of_body("move", lambda: _moved(self.body.act(action)))
         trip.actions.append(action)
         planned = before.after(action)
-        return self._noted(trip, before, planned, moved)
-
-    def _drive(self, speed_m_s: float, turn_rad_s: float, trip: _Trip) -> bool:
-        """Drive for a tick; return False where something stopped it."""
-        if self._is_held(trip):
-            return False
-        tick_s, before = self.settings.velocities.tick_s, self.pose
-        moved = self._of_body("move", lambda: _moved(self.body.drive(speed_m_s, turn_rad_s, tick_s)))
-        planned = before.driven(speed_m_s, turn_rad_s, tick_s)
         return self._noted(trip, before, planned, moved)
 
     def _is_held(self, trip: _Trip) -> bool:

@@ -36,11 +36,6 @@ class FreeBody:
         self.pose = self.pose.after(action)
         return Moved(self.pose)
 
-    def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
-        """Drive along an arc for a while."""
-        self.pose = self.pose.driven(speed_m_s, turn_rad_s, duration_s)
-        return Moved(self.pose)
-
 
 class _StandingDriver:
     """Says of every movement that it is done, and moves nothing: what the map knows is queried without a robot."""

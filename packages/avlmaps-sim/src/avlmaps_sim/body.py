@@ -21,8 +21,6 @@ from avlmaps_sim.scene import Scene
 
 _FINE_M = 0.05  # cells of the grids of room and of floor
 _BLOCK_M = 1.0  # outlines are looked up by blocks of this size
-_CHORD_M = 0.02  # a curve is driven in straight pieces of at most this length
-_CHORD_RAD = 0.1  # ... and turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,10 +200,6 @@ class SimulatedBody:
             return Moved(self._pose)
         return self._moved(0.0, TURN_RAD if action is Action.LEFT else -TURN_RAD)
 
-    def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
-        """Move at a velocity for a while, along an arc; a touch ends the movement, not the turn."""
-        return self._moved(speed_m_s * duration_s, turn_rad_s * duration_s)
-
     def _moved(self, ahead_m: float, turn_rad: float) -> Moved:
         if self._rng is not None:
             drift = self._noise.drift_rad_per_m * np.sqrt(abs(ahead_m))
@@ -213,18 +207,10 @@ class SimulatedBody:
             ahead_m *= 1.0 + self._noise.forward * errors[0]
             turn_rad += turn_rad * self._noise.turn * errors[1] + drift * errors[2]
         pose, touched = self._pose, False
-        x_m, y_m, heading = pose.x_m, pose.y_m, pose.heading_rad
-        pieces = 1
-        if ahead_m and turn_rad:
-            pieces = max(int(abs(ahead_m) / _CHORD_M), int(abs(turn_rad) / _CHORD_RAD)) + 1
-        slides = self.on_contact == "slide"
-        for _ in range(pieces if ahead_m else 0):
-            along = heading + 0.5 * turn_rad / pieces
-            (x_m, y_m), hit = self._straight((x_m, y_m), along, ahead_m / pieces, slides)
-            touched |= hit
-            heading += turn_rad / pieces
-            if hit and not slides:
-                break
+        x_m, y_m = pose.x_m, pose.y_m
+        if ahead_m:
+            along = pose.heading_rad + 0.5 * turn_rad
+            (x_m, y_m), touched = self._straight((x_m, y_m), along, ahead_m, self.on_contact == "slide")
         self._pose = GroundPose(float(x_m), float(y_m), pose.heading_rad + turn_rad)
         self.contacts += touched
         self.travelled_m += hypot(x_m - pose.x_m, y_m - pose.y_m)

@@ -356,9 +356,6 @@ class _Wall:
         self.pose = ahead if action is Action.FORWARD else self.pose
         return Moved(self.pose)
 
-    def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
-        return self.act(Action.FORWARD)
-
 
 @pytest.mark.parametrize(("wall_x_m", "told"), [(2.05, 1), (2.5, 0), (None, 0)])
 def test_a_touch_is_foretold_where_the_map_shows_something_within_the_radius(wall_x_m: float | None, told: int):

@@ -51,19 +51,6 @@ def test_nothing_gets_into_it_by_actions(actions, heading, on_contact, seed):
             assert moved.contact == (action is Action.FORWARD and before.distance_m(robot.pose) < FORWARD_M - 1e-6)
 
 
-@given(
-    commands=st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(-3, 3), st.floats(0.0, 0.7)), max_size=25),
-    on_contact=st.sampled_from(["stop", "slide"]),
-)
-def test_nothing_gets_into_it_by_velocities(commands, on_contact):
-    robot = body(on_contact=on_contact)
-    for speed, turn, duration in commands:
-        before = robot.pose
-        robot.drive(speed, turn, duration)
-        assert HALL.clearance_m(robot.pose.x_m, robot.pose.y_m) >= RADIUS_M - TOLERANCE_M
-        assert before.distance_m(robot.pose) <= abs(speed) * duration + 1e-9
-
-
 def test_in_the_open_an_action_is_exact_and_a_whole_turn_comes_back():
     robot = body(GroundPose(0.5, 0.5, 0.3))
     moved = robot.act(Action.FORWARD)
@@ -75,17 +62,6 @@ def test_in_the_open_an_action_is_exact_and_a_whole_turn_comes_back():
     assert robot.pose.heading_rad == pytest.approx(0.3)
     assert robot.contacts == 0
     assert robot.travelled_m == pytest.approx(FORWARD_M)
-
-
-@given(speed=st.floats(0.05, 0.8), turn=st.floats(-2.0, 2.0))
-def test_it_drives_along_an_arc(speed, turn):
-    robot = body(GroundPose(0.9, 2.3, 0.2))
-    robot.drive(speed, turn, 0.5)
-    swept = 0.5 * turn
-    chord = 0.5 * speed * (np.sin(swept / 2) / (swept / 2) if abs(swept) > 1e-9 else 1.0)
-    expected = GroundPose(0.9, 2.3, 0.2 + swept / 2).ahead(chord)
-    assert robot.pose.distance_m(expected) < 1e-3
-    assert robot.pose.heading_rad == pytest.approx(0.2 + swept)
 
 
 @pytest.mark.parametrize("heading", [0.0, pi / 2, pi, -pi / 2])

@@ -262,9 +262,7 @@ class SceneNetwork:
         if augmentation.mirrored:
             category = category[:, ::-1]
         known = cv2.resize((depth_m > 0.0).astype(np.uint8), (w, h), interpolation=cv2.INTER_AREA) > 0
-        return Seen(
-            _softmax(category / self.notes.temperature), known, _softmax(room[0] / self.notes.room_temperature)
-        )
+        return Seen(_softmax(category / self.notes.temperature), known, _softmax(room[0] / self.notes.room_temperature))
 
 
 @cache

@@ -68,11 +68,6 @@ class WatchedBody:
         aimed = self.pose.ahead(FORWARD_M) if action is Action.FORWARD else self.pose
         return self._counted(aimed, self._body.act(action))
 
-    def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
-        """Move at a velocity for a while."""
-        aimed = self.pose.ahead(speed_m_s * duration_s)
-        return self._counted(aimed, self._body.drive(speed_m_s, turn_rad_s, duration_s))
-
     def _counted(self, aimed: GroundPose, moved: Moved) -> Moved:
         if moved.contact:
             self.contacts += 1
