@@ -1,6 +1,7 @@
 """Each verb from end to end, held to the JSON contract that scripts depend on, and to its errors."""
 
 import json
+import shlex
 import shutil
 from pathlib import Path
 
@@ -228,6 +229,19 @@ def test_info_and_build_end_with_what_to_do_next_in_three_lines(built: Path, wal
         assert len(details) > len(lines) - 3 and not [line for line in details if line.startswith("next:")]
         for words in following:  # each can be run
             assert run(*words[1:3], "--help")[0] == 0
+
+
+def test_info_takes_the_options_by_which_build_reads_a_recording(walk: Path, answer, run, tmp_path: Path) -> None:
+    soundfile.write(tmp_path / "other.wav", np.full(16_000, 0.1), 16_000)
+    array = tmp_path / "array.json"
+    array.write_text('{"positions_m": [[0, 0, 0]]}')
+    words = ["--audio", str(tmp_path / "other.wav"), "--microphones", str(array), "--depth-unit", "0.001"]
+    found = answer("info", str(walk), *words)
+    assert found["audio"]["file"] == "other.wav" and found["options"] == words
+    _, printed, _ = run("info", str(walk), *words)
+    assert f"avlmaps build {shlex.join([str(walk), *words])} --out" in printed
+    code, _, told = run("info", str(walk), "--topics", "audio_pcm=16000,6")
+    assert code == 1 and "has no topics" in told
 
 
 def test_another_day_is_merged_and_its_changes_are_told(dated: Path, built: Path, tmp_path: Path, answer, run) -> None:

@@ -74,6 +74,24 @@ def test_a_copy_keeps_the_array_and_files_of_channels(tmp_path: Path) -> None:
         assert np.allclose(read_channels(track, 0.0, 2.0).samples, noise(2), atol=1e-4)
 
 
+def test_channels_without_a_microphone_are_left_out_and_the_sound_is_kept(tmp_path: Path) -> None:
+    heard = np.concatenate([np.zeros((1, 2 * RATE_HZ), np.float32), noise(2), 1e-3 * noise(1)])
+    first = recorded(tmp_path / "one", ChannelSound(heard, RATE_HZ), None)
+    for file in (first, write_recording(open_recording(first), tmp_path / "two")):
+        array = tmp_path / "array.json"
+        array.write_text('{"positions_m": [[0, 0.1, 0], [0, -0.1, 0]], "channels": [2, 3]}')
+        track = open_recording(file, microphones=array).audio
+        assert track is not None and np.allclose(read_channels(track, 0.0, 2.0).samples, noise(2), atol=1e-4)
+        assert np.allclose(track.read().samples, noise(2)[0], atol=1e-4)
+    array.write_text('{"positions_m": [[0, 0, 0], [0, 0.1, 0], [0, -0.1, 0], [0, 0.2, 0]]}')
+    track = open_recording(first, microphones=array).audio
+    assert track is not None and np.allclose(track.read().samples, noise(2)[0], atol=1e-4)
+    for channels in ("", ', "channels": [2, 2]', ', "channels": [2, 9]', ', "channels": [0, 1]'):
+        array.write_text('{"positions_m": [[0, 0.1, 0], [0, -0.1, 0]]' + channels + "}")
+        with pytest.raises(RecordingError, match="counted from 1"):
+            open_recording(first, microphones=array)
+
+
 def test_a_recording_of_one_microphone_says_nothing_of_microphones(tmp_path: Path) -> None:
     folder = recorded(tmp_path / "rec", Sound(noise(1)[0], RATE_HZ), None)
     assert "microphones" not in json.loads((folder / "recording.json").read_text())
@@ -170,7 +188,12 @@ def test_an_unknown_array_is_refused_with_what_to_write(tmp_path: Path) -> None:
 def unchecked(position_m: object, delay_s: object = None) -> Microphones:
     """Make an array as a program does, whose types nobody checks."""
     made = object.__new__(Microphones)
-    for name, value in (("position_m", position_m), ("camera_from_robot", np.eye(4)), ("delay_s", delay_s)):
+    for name, value in (
+        ("position_m", position_m),
+        ("camera_from_robot", np.eye(4)),
+        ("delay_s", delay_s),
+        ("channels", ()),
+    ):
         object.__setattr__(made, name, value)
     made.__post_init__()
     return made

@@ -1,12 +1,15 @@
 """Files of other hands, each with its right value: what people who do this job really have."""
 
+import json
 import tarfile
 from pathlib import Path
+from tempfile import gettempdir
 
 import numpy as np
 import pytest
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.maps.audio.segmentation import segment
 from avlmaps.recordings.consistency.suspicions import examine_recording
 from avlmaps.recordings.consistency.verdict import Grade
 from avlmaps.recordings.open import open_recording
@@ -30,6 +33,24 @@ def test_six_channels_are_not_believed_to_be_one() -> None:
     assert track.duration_s == pytest.approx(12.0, abs=0.2)
     power = [float(np.square(track.read(at_s, at_s + 0.2).samples).mean()) for at_s in np.arange(0.0, 11.0, 0.2)]
     assert 0.2 * int(np.argmax(power)) == pytest.approx(8.2, abs=0.61)
+
+
+def test_the_bark_stays_where_microphones_are_described(tmp_path: Path) -> None:
+    """The first of the six channels is the device's own processing, the last its playback: both are all but silent."""
+    places = [[0.03, 0.03, 0], [0.03, -0.03, 0], [-0.03, -0.03, 0], [-0.03, 0.03, 0]]
+    for described in (
+        {"positions_m": places, "channels": [2, 3, 4, 5]},
+        {"positions_m": [[0, 0, 0], *places, [0, 0, 0.1]]},
+    ):
+        array = tmp_path / "array.json"
+        array.write_text(json.dumps(described))
+        recording = open_recording(ROUND4 / "respeaker_6ch.bag", topics={"audio_pcm": "16000,6"}, microphones=array)
+        assert recording.audio is not None
+        (bark,) = segment(recording.audio)
+        assert bark.onset_s == pytest.approx(8.2, abs=0.3)
+    with pytest.raises(RecordingError, match=r"^/audio has 6 channel") as refused:
+        open_recording(ROUND4 / "respeaker_6ch.bag", topics={"audio_pcm": "16000,6"}, microphones="square4")
+    assert gettempdir() not in str(refused.value)
 
 
 def test_the_sound_of_an_archive_is_its_sound() -> None:

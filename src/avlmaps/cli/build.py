@@ -1,17 +1,17 @@
 """`avlmaps build` and `calibrate`: a map from a recording, and where the microphones of its robot are."""
 
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from tyro.conf import OmitArgPrefixes, Positional, arg
+from tyro.conf import Positional, arg
 
 from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import UsageError, emit, table_lines
-from avlmaps.cli.verb import Building, Reading, Verb
+from avlmaps.cli.verb import Building, OfRecording, Verb
 from avlmaps.core.files import user_path
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
@@ -52,8 +52,6 @@ class Build(Building):
     cache folder), off, or a folder (all models)."""
     feature_cache_gb: Annotated[float, arg(metavar="GB")] = 20.0
     """Size of the feature cache, GB; the features unused for the longest time go first."""
-    audio: Annotated[Path | None, arg(metavar="FILE")] = None
-    """Sound file to use instead of the recording's own track."""
     submaps: bool = False
     """Store the sums of every 32 frames as well, so that the map can follow corrected poses later; it takes three to
     four times the room."""
@@ -192,25 +190,18 @@ def _openings(verb: "Build") -> "list[Callable[[], Recording]]":
     """Return what opens each recording, here and on any machine that sees it at the same place."""
     from avlmaps.recordings.open import open_recording
 
-    files, topics = [verb.recording, *verb.more], verb.named_topics()
-    audio, microphones, groups = verb.audio, verb.microphones, [files]
+    files, given = [verb.recording, *verb.more], verb.opening()
+    groups = [files]
     if verb.ray is not None:  # a path that is relative means another place on another machine
         groups = [[path.absolute()] for path in files]
-        audio, microphones = audio and audio.absolute(), microphones and microphones.absolute()
-        if Path(topics.get("pose", "")).is_file():
-            topics["pose"] = str(Path(topics["pose"]).absolute())
-    if len(groups) > 1 and (given := [name for name in _OF_ONE_RECORDING if getattr(verb, name)]):
+        for where, name in ((given, "audio"), (given, "microphones"), (given["topics"], "pose")):
+            if where.get(name) and Path(where[name]).is_file():
+                where[name] = str(Path(where[name]).absolute())
+    if len(groups) > 1 and (idle := [name for name in _OF_ONE_RECORDING if getattr(verb, name)]):
         raise UsageError(
-            f"--{given[0].replace('_', '-')} is of one recording; build a map of each, then `avlmaps merge` them."
+            f"--{idle[0].replace('_', '-')} is of one recording; build a map of each, then `avlmaps merge` them."
         )
-    open_one = partial(
-        open_recording,
-        format=verb.format,
-        audio=audio,
-        topics=topics,
-        corrections=verb.reading.corrections(),
-        microphones=microphones,
-    )
+    open_one = partial(open_recording, **given)
     openings: list[Callable[[], Recording]] = [partial(open_one, group) for group in groups]
     if verb.same_device is None:
         return openings
@@ -235,7 +226,7 @@ def _pool(verb: "Build") -> "Generator[RayPool | None]":
 
 
 @dataclass(frozen=True, kw_only=True)
-class Calibrate(Verb):
+class Calibrate(OfRecording, Verb):
     """Refine where the microphones of a robot are and how late each channel is, from a drive past one still source.
 
     Let something tick or click at one place, and drive past it in curves, 1 to 3 m away, for half a minute. The
@@ -248,16 +239,10 @@ class Calibrate(Verb):
     """Recording with an array, or with several channels and --microphones."""
     out: Annotated[Path, arg(metavar="FILE")]
     """File to write: the refined microphones, as --microphones and `microphones` of recording.json take them."""
-    microphones: Annotated[Path | None, arg(metavar="FILE")] = None
-    """Geometry to begin with, instead of the recording's own."""
     between: Annotated[tuple[float, float] | None, arg(metavar="BEGIN END")] = None
     """Time when the one source sounds, seconds of the recording. Default: all of it."""
     overwrite: bool = False
     """Replace --out where it is there already."""
-    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
-    """Format of the recording, if its files do not show it."""
-    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
-    """What you know better than the recording's files."""
 
     def run(self) -> None:
         answer = calibrate_array(self)
@@ -295,9 +280,7 @@ def calibrate_array(verb: "Calibrate") -> dict[str, Any]:
         raise RecordingError(
             f"{verb.out} is there already; give another {option('out')}, or replace it with {option('overwrite')}."
         )
-    recording = open_recording(
-        verb.recording, format=verb.format, microphones=verb.microphones, corrections=verb.reading.corrections()
-    )
+    recording = open_recording(verb.recording, **verb.opening())
     if recording.audio is None:
         raise RecordingError(f"{verb.recording} has no sound track, so that there is no array to calibrate.")
     found = calibrate(recording.audio, recording.walk, verb.between)

@@ -2,15 +2,15 @@
 
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from tyro.conf import OmitArgPrefixes, Positional, arg
+from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit, ground_lines, size_of
-from avlmaps.cli.verb import Reading, Verb
+from avlmaps.cli.verb import OfRecording, Verb
 from avlmaps.core.errors import AvlmapsError, MapError
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
@@ -29,7 +29,7 @@ _MOST_NAMED = 6  # sounds, without --verbose
 
 
 @dataclass(frozen=True, kw_only=True)
-class Info(Verb):
+class Info(OfRecording, Verb):
     """List the contents of a recording or a map, and every fault in it.
 
     Example: avlmaps info home.avlmap --plot map.png
@@ -39,34 +39,31 @@ class Info(Verb):
     """Recording or map folder."""
     more: Annotated[Positional[tuple[Path, ...]], arg(metavar="[BAG ...]")] = ()
     """Further files of a bag that was split."""
-    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
-    """Format of the recording, if its files do not show it."""
     verify: bool = False
     """Check every file of a map against its checksum, or every picture of a recording."""
     verbose: bool = False
     """Print every detail."""
     plot: Annotated[Path | None, arg(metavar="FILE")] = None
     """Draw a top-down view with the path, the sounds, and the names of things and rooms into this picture."""
-    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
-    """What you know better than the recording's files (REC)."""
 
     def run(self) -> None:
-        given = self.reading.corrections()
-        answer = describe_path(
-            self.path, self.format, verify=self.verify, plot=self.plot, corrections=given, more=self.more
-        )
+        answer = describe_path(self.path, verify=self.verify, plot=self.plot, more=self.more, **self.opening())
+        if words := self.opening_words():
+            answer["options"] = words
         emit(answer, info_lines(answer, verbose=self.verbose), self.json)
 
 
 def describe_path(
     path: Path,
-    format: str,
-    verify: bool,
-    plot: Path | None,
-    corrections: "Corrections | None" = None,
+    format: str = "auto",
+    *,
+    verify: bool = False,
+    plot: Path | None = None,
     more: Sequence[Path] = (),
+    corrections: "Corrections | None" = None,
+    **given: Any,
 ) -> dict[str, Any]:
-    """Describe a map or a recording."""
+    """Describe a map or a recording; what is given further says how ``open_recording`` reads it."""
     if (path / MAP_MANIFEST).exists() or path.suffix == ".avlmap":
         return _describe_map(path, verify, plot)
     if plot is not None:
@@ -75,9 +72,9 @@ def describe_path(
     from avlmaps.recordings.validate import validate
 
     find_format(path, format)  # a place that holds no recording has no faults to list
-    faults = [str(fault) for fault in validate(path, format, None if verify else DECODED_BY_INFO, more)]
+    faults = [str(fault) for fault in validate(path, format, None if verify else DECODED_BY_INFO, more, **given)]
     try:
-        recording = open_recording([path, *more], format=format, corrections=corrections)
+        recording = open_recording([path, *more], format, corrections=corrections, **given)
     except AvlmapsError:
         for fault in faults:
             say(f"fault: {fault}")
@@ -175,7 +172,7 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
         "audio": None
         if audio is None
         else {
-            "file": audio.path.name,
+            "file": audio.label or audio.path.name,
             "rate_hz": audio.rate_hz,
             "duration_s": audio.duration_s,
             "start_s": audio.start_s,
@@ -201,7 +198,7 @@ def info_lines(answer: dict[str, Any], *, verbose: bool) -> list[str]:
 
 def next_lines(answer: dict[str, Any]) -> list[str]:
     """Return what to do next with a map or a recording; one that contradicts itself is not to be built."""
-    path = shlex.join([str(answer["path"]), *answer.get("more", ())])
+    path = shlex.join([str(answer["path"]), *answer.get("more", ()), *answer.get("options", ())])
     if "voxels" in answer:
         words = "something red" if answer.get("profile") == "colours" else "where is the chair?"
         query = [f'avlmaps query {path} "{words}"'] if "pixels" in answer["models"] else []

@@ -143,7 +143,9 @@ def _recording(verb: Live) -> _Source:
                 "--depth-unit, --intrinsics and the like are of a finished recording, and this one is being written; "
                 "leave them out, or play it when it is finished."
             )
-        for note in idle(verb, ["rate", "as_fast_as_possible", "format", "topics"], "the recording is being written"):
+        for note in idle(
+            verb, ["rate", "as_fast_as_possible", "format", "topics", "audio"], "the recording is being written"
+        ):
             say(f"note: {note}")
         up_in_world = decode_description(path / UNFINISHED).up_in_world
         return _Source(
@@ -154,13 +156,7 @@ def _recording(verb: Live) -> _Source:
         )
     for note in idle(verb, ["give_up_s"], "the recording is finished"):
         say(f"note: {note}")
-    recording = open_recording(
-        path,
-        format=verb.format,
-        topics=verb.named_topics(),
-        corrections=verb.reading.corrections(),
-        microphones=microphones,
-    )
+    recording = open_recording(path, **verb.opening())
     if verb.same_device is not None:
         take_device(recording, verb.same_device)
     for notice in recording.notices:
@@ -182,9 +178,9 @@ def _robot(verb: Live) -> _Source:
         raise UsageError(
             "--source ros2 takes what a robot publishes now: leave REC, --rate, --format and the like out."
         )
-    if verb.reading != Reading():
+    if verb.reading != Reading() or verb.audio is not None:
         raise UsageError(
-            "--depth-unit, --intrinsics and the like are of a recording; leave them out with --source ros2."
+            "--audio, --depth-unit, --intrinsics and the like are of a recording; leave them out with --source ros2."
         )
     topics = verb.named_topics()
     if verb.same_device is not None and "directions" not in topics:

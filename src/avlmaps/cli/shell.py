@@ -202,7 +202,7 @@ class ShellSession:
 
     def _info(self, rest: str) -> Reply:
         verb = read_verb(Info, [str(self.given.map), *_split(rest)], "info")
-        answer = describe_path(verb.path, verb.format, verify=verb.verify, plot=verb.plot)
+        answer = describe_path(verb.path, verify=verb.verify, plot=verb.plot)
         return Reply(answer, info_lines(answer, verbose=verb.verbose))
 
     def _plot(self, rest: str) -> Reply:

@@ -179,7 +179,57 @@ def _direction(words: str) -> tuple[float, float, float]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Building(ModelVerb):
+class OfRecording:
+    """Options of every verb that opens a recording: how it is read."""
+
+    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
+    """Format of the recording, if its files do not show it."""
+    audio: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Sound file to use instead of the recording's own track."""
+    microphones: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Places of the microphones instead of the recording's own: a JSON file, as `avlmaps calibrate` writes it."""
+    topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
+    """Topics of ROS that their type does not identify: rgb=, depth=, pose= or audio=TOPIC; audio=none leaves the sound
+    out; audio_pcm=16000,1 says how plain samples are coded; directions=TOPIC, azimuths that a device says of sounds;
+    pose=FILE, a table of stamp tx ty tz qx qy qz qw."""
+    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
+    """What you know better than the recording's files."""
+
+    def named_topics(self) -> dict[str, str]:
+        """Return what ``--topics`` says: names by what they are for.
+
+        Raises:
+            UsageError: a word is not of its form.
+        """
+        for word in self.topics:
+            if not all(word.partition("=")):
+                raise UsageError(f"--topics takes words like rgb=/camera/color/image_raw, not {word!r}.")
+        return dict(word.split("=", 1) for word in self.topics)
+
+    def opening(self) -> dict[str, Any]:
+        """Return the arguments of ``open_recording`` behind them."""
+        return {
+            "format": self.format,
+            "audio": self.audio,
+            "topics": self.named_topics(),
+            "corrections": self.reading.corrections(),
+            "microphones": self.microphones,
+        }
+
+    def opening_words(self) -> list[str]:
+        """Return the options that were given, as another verb takes them."""
+        words: list[str] = []
+        for kind, options in ((OfRecording, self), (Reading, self.reading)):
+            for each in fields(kind):
+                given = getattr(options, each.name)
+                if each.name != "reading" and given != each.default:
+                    values = given if isinstance(given, tuple) else [given]
+                    words += [f"--{each.name.replace('_', '-')}", *map(str, values)]
+        return words
+
+
+@dataclass(frozen=True, kw_only=True)
+class Building(OfRecording, ModelVerb):
     """Options of every verb that makes a map."""
 
     compiles: ClassVar[bool] = True
@@ -192,18 +242,8 @@ class Building(ModelVerb):
     """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
     voxel_size_m: Annotated[float, arg(metavar="METRES")] = 0.05
     """Edge of a voxel, metres."""
-    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
-    """Format of the recording, if its files do not show it."""
-    microphones: Annotated[Path | None, arg(metavar="FILE")] = None
-    """Places of the microphones instead of the recording's own: a JSON file, as `avlmaps calibrate` writes it."""
     same_device: Annotated[Path | None, arg(metavar="MAP")] = None
     """Map of an earlier recording with the same device that says directions: its offset is known from there."""
-    topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
-    """Topics of ROS that their type does not identify: rgb=, depth=, pose= or audio=TOPIC; directions=TOPIC, azimuths
-    that a device says of sounds; pose=FILE, a table of stamp tx ty tz qx qy qz qw; for `live` also audio=none, and
-    audio_pcm=16000,1, how plain samples are coded."""
-    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
-    """What you know better than the recording's files."""
     overwrite: bool = False
     """Replace a finished map at --out that was built from another recording or with other settings."""
 
@@ -220,14 +260,3 @@ class Building(ModelVerb):
         except ValueError as problem:
             raise UsageError(f"--model {problem}") from None
         return encoders_of(profile(self.profile).choosing(choices))
-
-    def named_topics(self) -> dict[str, str]:
-        """Return what ``--topics`` says: names by what they are for.
-
-        Raises:
-            UsageError: a word is not of its form.
-        """
-        for word in self.topics:
-            if not all(word.partition("=")):
-                raise UsageError(f"--topics takes words like rgb=/camera/color/image_raw, not {word!r}.")
-        return dict(word.split("=", 1) for word in self.topics)

@@ -96,7 +96,7 @@ def audio_key(recording: Recording) -> list[str | float] | None:
     if track.microphones is not None:
         array = track.microphones
         known += [*array.position_m.ravel().tolist(), *array.camera_from_robot.ravel().tolist()]
-        known += [] if array.delay_s is None else array.delay_s.tolist()
+        known += [*array.channels, *([] if array.delay_s is None else array.delay_s.tolist())]
         known += [sampled_digest(path, LARGEST_BUDGET_BYTES).hex() for path in track.files[1:]]
     return known
 

@@ -75,6 +75,7 @@ class AudioTrack:
             them all).
         files: one for each channel, where they are not channels of one file.
         directions: what a device said of where its sounds came from, where there is one.
+        label: what sentences call it, where its file is not one that a user knows.
     """
 
     path: Path
@@ -85,14 +86,16 @@ class AudioTrack:
     microphones: Microphones | None = None
     files: tuple[Path, ...] = ()
     directions: DirectionTrack | None = None
+    label: str = ""
 
     @classmethod
-    def open(cls, path: Path | str, start_s: float = 0.0) -> "AudioTrack":
+    def open(cls, path: Path | str, start_s: float = 0.0, label: str = "") -> "AudioTrack":
         """Find out what an audio file holds, without reading it whole.
 
         Args:
             path: a sound file, or a video with sound.
             start_s: the recording's time at which its first sample sounds.
+            label: what sentences call it instead of its file.
 
         Raises:
             AudioError: there is no such file, it cannot be read, has no audio stream or no samples, or is truncated.
@@ -105,7 +108,13 @@ class AudioTrack:
             raise AudioError(
                 f"{path} has {rate_hz} samples a second, too few for sounds; at least {LOWEST_RATE_HZ} are needed."
             )
-        return cls(path, rate_hz, count / rate_hz, start_s, containers.cancelling_channel(path, count, rate_hz))
+        channel = containers.cancelling_channel(path, count, rate_hz)
+        return cls(path, rate_hz, count / rate_hz, start_s, channel, label=label)
+
+    @property
+    def name(self) -> str:
+        """What sentences call it."""
+        return self.label or str(self.path)
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -113,7 +122,7 @@ class AudioTrack:
         if self.channel is None or self.microphones is not None:
             return ()
         return (
-            f"The channels of {self.path} cancel one another when they are mixed (one is wired the other way round); "
+            f"The channels of {self.name} cancel one another when they are mixed (one is wired the other way round); "
             f"channel {self.channel + 1} is used alone.",
         )
 
@@ -152,7 +161,7 @@ class AudioTrack:
         return _checked(piece, self.path, self.rate_hz, begin)
 
     def every_channel(self, begin: int, end: int) -> Float[np.ndarray, "n m"]:
-        """Return samples of all channels, as they are stored; fewer where the track ends before.
+        """Return samples of all channels that hold microphones, as they are stored; fewer where the track ends before.
 
         Args:
             begin: the first sample, from the track's beginning.
@@ -165,7 +174,8 @@ class AudioTrack:
 
         parts = [read_all_channels(path, begin, end, self.rate_hz) for path in self.files or (self.path,)]
         length = min(len(part) for part in parts)
-        return np.concatenate([part[:length] for part in parts], axis=1)
+        samples = np.concatenate([part[:length] for part in parts], axis=1)
+        return samples[:, self.microphones.channels] if self.microphones and self.microphones.channels else samples
 
     def blocks(self, seconds: float = 10.0) -> Iterator[Sound]:
         """Go through the whole track in pieces of one length (the last may be shorter), one in memory at a time.

@@ -13,10 +13,12 @@ from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.numbers import as_number
 from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, Sound, require_rate
+from avlmaps.recordings.containers import channel_power
 from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
 
 _LOOKS, _LOOK_S = 24, 0.5
 _DEAD_DB = 40.0  # a channel this much below the loudest holds nothing of use
+_QUIET = 0.01  # share of the loudest's power; a fainter channel is not the one that is heard
 _PAUSE_S, _PAUSES = 0.05, 200  # of digital silence; the number that is read at once
 _FULL_SCALE, _CLIPPED = 0.999, 1e-3
 _WAV = ".wav"
@@ -50,7 +52,10 @@ class ChannelSound:
 
 
 def with_microphones(track: AudioTrack, microphones: Microphones, files: tuple[Path, ...] = ()) -> AudioTrack:
-    """Return a track that knows where its channels' microphones are; as one channel it sounds as its first.
+    """Return a track that knows where its channels' microphones are.
+
+    As one channel it sounds as its first, or as the first that is not far quieter than others: devices give channels
+    of their own processing, or of nothing, beside those of the microphones.
 
     Args:
         track: the sound file, or the first of several.
@@ -78,12 +83,17 @@ def with_microphones(track: AudioTrack, microphones: Microphones, files: tuple[P
                         f"The channels disagree: {track.path} has {here} {name}, {path} has {there}; export them "
                         "together, from one clock."
                     )
-    elif (count := track.every_channel(0, 1).shape[1]) != len(microphones):
+        return replace(track, channel=0, microphones=microphones, files=files)
+    power, _ = channel_power(track.path, round(track.duration_s * track.rate_hz), track.rate_hz)
+    used = microphones.channels or range(len(power))
+    if len(used) != len(microphones) or max(used) >= len(power):
         raise RecordingError(
-            f"{track.path} has {count} channel(s), but the recording describes {len(microphones)} microphone(s); give "
-            "one position for each channel."
+            f"{track.name} has {len(power)} channel(s), and {len(microphones)} microphone(s) are described; give one "
+            'position for each, or say which channels they are where others hold no microphone ("channels": [2, 3] '
+            "beside positions_m, counted from 1)."
         )
-    return replace(track, channel=0, microphones=microphones, files=files)
+    heard = next((channel for channel in used if power[channel] > _QUIET * power[list(used)].max()), used[0])
+    return replace(track, channel=heard, microphones=microphones, files=())
 
 
 def tracked(track: AudioTrack, given: MicrophoneNumbers, folder: Path) -> AudioTrack:
@@ -108,7 +118,7 @@ def read_channels(track: AudioTrack, onset_s: float, offset_s: float) -> Channel
     inside_begin, inside_end = min(max(begin, 0), count), min(max(end, 0), count)
     piece = track.every_channel(inside_begin, inside_end)
     if not np.isfinite(piece).all():
-        raise AudioError(f"{track.path} holds samples that are not finite numbers; convert it again from its source.")
+        raise AudioError(f"{track.name} holds samples that are not finite numbers; convert it again from its source.")
     samples = np.zeros((piece.shape[1], max(end - begin, 0)), np.float32)
     if len(piece):
         samples[:, inside_begin - begin : inside_begin - begin + len(piece)] = piece.T
@@ -184,7 +194,13 @@ def _looked_at(track: AudioTrack) -> Float[np.ndarray, "k m n"]:
 
 
 def _named(track: AudioTrack, channel: int, name: str = "") -> str:
-    return str(track.files[channel]) if track.files else f"Channel {channel + 1} of {name or track.path}"
+    return str(track.files[channel]) if track.files else f"Channel {_number(track, channel)} of {name or track.name}"
+
+
+def _number(track: AudioTrack, channel: int) -> int:
+    """Return the number of a microphone's channel in the track, counted from 1."""
+    channels = track.microphones.channels if track.microphones else ()
+    return 1 + (channels[channel] if channels else channel)
 
 
 def _silent(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str) -> list[str]:
@@ -196,7 +212,7 @@ def _silent(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str) -
         return []
     still = np.ptp(samples, axis=2).max(axis=1) == 0.0
     if still.all() and not any(np.ptp(block.samples) for block in track.blocks()):
-        return [f"{name or track.path} is silent throughout: every sample is {samples[0, 0, 0]:g}."]
+        return [f"{name or track.name} is silent throughout: every sample is {samples[0, 0, 0]:g}."]
     where = np.flatnonzero(still)
     if still.all() or len(where) < len(still) / 2 or where[-1] - where[0] >= len(where):
         return []
@@ -208,7 +224,7 @@ def _silent(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str) -
     edges_s = track.start_s + np.linspace(0.0, track.duration_s, len(still) + 1)
     from_s, to_s = edges_s[[where[0], where[-1] + 1]].tolist()
     return [
-        f"{name or track.path} is silent in one piece from about {from_s:.0f} to {to_s:.0f} s "
+        f"{name or track.name} is silent in one piece from about {from_s:.0f} to {to_s:.0f} s "
         f"({len(where) / len(still):.0%}): every sample is {samples[where[0], 0, 0]:g} there, and not elsewhere."
     ]
 
@@ -235,16 +251,19 @@ def _dead(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str = ""
 
 def _copied(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str = "") -> list[str]:
     power = (samples**2).mean(axis=(0, 2))
-    said: list[str] = []
+    said: dict[int, str] = {}
     for one, other in itertools.combinations(range(len(power)), 2):
+        if one in said or other in said:
+            continue
         scale = float((samples[:, one] * samples[:, other]).mean()) / max(float(power[one]), 1e-20)
         rest = float(((samples[:, other] - scale * samples[:, one]) ** 2).mean())
         if power[one] > 0.0 and 10.0 * np.log10((rest + 1e-20) / (float(power[other]) + 1e-20)) < -_DEAD_DB:
-            said.append(
-                f"{_named(track, other, name)} holds the same sound as channel {one + 1}, as of one microphone that "
-                "was copied, so that both together show no direction; record each microphone's own channel."
+            said[other] = (
+                f"{_named(track, other, name)} holds the same sound as channel {_number(track, one)}, as of one "
+                "microphone that was copied, so that both together show no direction; record each microphone's own "
+                "channel."
             )
-    return said
+    return list(said.values())
 
 
 def _clipped(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str]:

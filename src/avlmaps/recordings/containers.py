@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from avlmaps.core.arrays import Float32
+from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import AudioError, NoAudioStreamError
 from avlmaps.core.files import SOUND_BYTES, RefusedFileError, checked_size
 from avlmaps.core.wording import option
@@ -117,21 +117,27 @@ def stream(path: Path, count: int, rate_hz: int, channel: int | None = None) -> 
 def cancelling_channel(path: Path, count: int, rate_hz: int) -> int | None:
     """Return the loudest channel of a file whose channels cancel one another when they are mixed, else None.
 
-    Looks at ``_LOOKS`` pieces spread over the file. Channels cancel where their mean has less than a hundredth of
-    their own power, as with two wires of one microphone, or a plug that is wired wrongly.
+    Channels cancel where their mean has less than a hundredth of their own power, as with two wires of one microphone,
+    or a plug that is wired wrongly.
     """
-    power = np.zeros(0)
-    mixed = 0.0
+    power, mixed = channel_power(path, count, rate_hz)
+    if len(power) < 2 or not np.isfinite(power).all() or power.max() <= _AUDIBLE_POWER:
+        return None
+    return int(np.argmax(power)) if mixed < _CANCELLED * power.max() else None
+
+
+def channel_power(path: Path, count: int, rate_hz: int) -> tuple[Float[np.ndarray, " c"], float]:
+    """Return the mean power of each channel, and of their mean, in ``_LOOKS`` pieces spread over a file."""
+    power, mixed = np.zeros(0), 0.0
     length = min(count, round(_LOOK_S * rate_hz))
     for begin in np.linspace(0, count - length, min(_LOOKS, max(1, count // max(length, 1)))).astype(int).tolist():
         piece = read_all_channels(path, begin, begin + length, rate_hz)
         if piece.shape[1] < 2:
-            return None
+            return (piece**2).mean(axis=0), 0.0
         power = (power if len(power) == piece.shape[1] else np.zeros(piece.shape[1])) + (piece**2).sum(axis=0)
         mixed += float((piece.mean(axis=1) ** 2).sum())
-    if len(power) < 2 or not np.isfinite(power).all() or power.max() <= _AUDIBLE_POWER * _LOOKS * length:
-        return None
-    return int(np.argmax(power)) if mixed < _CANCELLED * power.max() else None
+    looked_at = _LOOKS * max(length, 1)
+    return power / looked_at, mixed / looked_at
 
 
 def read_all_channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, "n channels"]:

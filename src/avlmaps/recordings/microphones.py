@@ -31,12 +31,14 @@ class MicrophoneNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True,
         camera_from_robot: 4x4; by default the robot's frame has its origin at the camera, and the camera looks level.
         files: one sound file for each channel, where they are not channels of one file.
         delays_s: by how much each channel is late, seconds; none is if None.
+        channels: which channels of the track they are, counted from 1, where others hold no microphone.
     """
 
     positions_m: list[list[float]]
     camera_from_robot: list[list[float]] | None = None
     files: list[str] | None = None
     delays_s: list[float] | None = None
+    channels: list[int] | None = None
 
     def microphones(self) -> "Microphones":
         """Return them as the package works with them.
@@ -58,7 +60,8 @@ class MicrophoneNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True,
                 f"microphones.files names {len(self.files)} files for {len(position_m)} positions; give one for each."
             )
         turn = LEVEL_CAMERA_FROM_ROBOT if given is None else np.array(given, np.float64)
-        return Microphones(position_m, turn, None if self.delays_s is None else np.array(self.delays_s, np.float64))
+        late_s = None if self.delays_s is None else np.array(self.delays_s, np.float64)
+        return Microphones(position_m, turn, late_s, tuple(number - 1 for number in self.channels or ()))
 
     @staticmethod
     def of(microphones: "Microphones") -> "MicrophoneNumbers":
@@ -68,6 +71,7 @@ class MicrophoneNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True,
             microphones.position_m.tolist(),
             None if level else microphones.camera_from_robot.tolist(),
             delays_s=None if microphones.delay_s is None else microphones.delay_s.tolist(),
+            channels=[channel + 1 for channel in microphones.channels] or None,
         )
 
 
@@ -79,11 +83,13 @@ class Microphones:
         position_m: (m, 3) places in the robot's frame (x forward, y left, z up), metres.
         camera_from_robot: 4x4, from the robot's frame to the depth camera's.
         delay_s: (m,) by how much each channel is late, seconds; None where none is.
+        channels: which channels of the track they are, from 0; empty where they are all of them.
     """
 
     position_m: Float[np.ndarray, "m 3"]
     camera_from_robot: Float[np.ndarray, "4 4"] = field(default_factory=lambda: LEVEL_CAMERA_FROM_ROBOT)
     delay_s: Float[np.ndarray, " c"] | None = None
+    channels: tuple[int, ...] = ()
 
     @property
     def longest_m(self) -> float:
@@ -107,6 +113,7 @@ class Microphones:
             raise RecordingError(
                 f"There are delays of {self.delay_s.size} channels for {len(place)} microphones; give one for each."
             )
+        self._require_channels()
         late = np.zeros(0) if self.delay_s is None else self.delay_s
         if not (np.abs(late) <= MOST_DELAY_S).all():  # NaN is not
             raise RecordingError(
@@ -127,6 +134,15 @@ class Microphones:
                     f"{MOST_APART_M:g} m of a robot; give positions in metres (not in cm or mm)."
                 )
 
+    def _require_channels(self) -> None:
+        known = set(self.channels)
+        if known and not (len(known) == len(self.channels) == len(self) and min(known) >= 0):
+            numbers = ", ".join(str(channel + 1) for channel in self.channels)
+            raise RecordingError(
+                f"microphones.channels are {numbers}; name {len(self)} different ones, counted from 1, one for each "
+                "position."
+            )
+
     def __len__(self) -> int:
         return len(self.position_m)
 
@@ -141,7 +157,7 @@ class Microphones:
         return turned + world_from_camera[:, None, :3, 3]
 
     def take(self, channels: Sequence[int]) -> "Microphones":
-        """Return some of them."""
+        """Return some of them, as those of a track that has no other channels."""
         late_s = None if self.delay_s is None else self.delay_s[list(channels)]
         return Microphones(self.position_m[list(channels)], self.camera_from_robot, late_s)
 

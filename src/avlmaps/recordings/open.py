@@ -103,19 +103,19 @@ def settle_sound(recording: Recording) -> None:
     track = recording.audio
     if track is None:
         return
-    notices = track.notices
+    notices, name = track.notices, track.label or track.path.name
     if len(recording):
         first_s, last_s = float(recording.stamps_s[0]), float(recording.stamps_s[-1])
         span = f"from {track.start_s:.2f} to {track.end_s:.2f} s, and the frames from {first_s:.2f} to {last_s:.2f} s"
         shared_s = min(track.end_s, last_s) - max(track.start_s, first_s)
         if shared_s < 0.0:
             raise RecordingError(
-                f"The sound track {track.path.name} of {recording.path} goes {span}, so that no sound has a place; "
+                f"The sound track {name} of {recording.path} goes {span}, so that no sound has a place; "
                 "give the recording's time at which it begins (audio_start_s of recording.json), another track "
                 f"({option('audio')}), or none."
             )
         if shared_s < _LEAST_SHARED * (last_s - first_s):
-            notices = (*notices, f"The sound track {track.path.name} goes {span}; the rest has no sound.")
+            notices = (*notices, f"The sound track {name} goes {span}; the rest has no sound.")
     recording.notices = (*recording.notices, *notices)
 
 
@@ -389,6 +389,7 @@ def open_recording(
     topics: Mapping[str, str] | None = None,
     corrections: Corrections | None = None,
     microphones: Path | str | None = None,
+    report: Report = stop_at_first,
 ) -> Recording:
     """Open a recording in place: nothing is copied, and no picture is read before it is needed.
 
@@ -400,6 +401,7 @@ def open_recording(
         corrections: what someone knows better than the files; a notice repeats it.
         microphones: where those of the track's channels are, instead of the recording's own: a JSON file, or a name
             (``microphones.PRESETS``); a notice repeats it.
+        report: called with every fault.
 
     Raises:
         RecordingError: there is nothing there, it is of no known format, or it cannot be used.
@@ -413,7 +415,7 @@ def open_recording(
     found = find_format(path, format)
     if audio is not None and found.has_topics and not (topics or {}).get("audio"):
         topics = {**(topics or {}), "audio": "none"}  # its own sound need not be readable
-    recording = found.open(lasting_path(path), topics=topics, more=[lasting_path(one) for one in more])
+    recording = found.open(lasting_path(path), report, topics, [lasting_path(one) for one in more])
     if audio is not None:
         directions = None if recording.audio is None else recording.audio.directions
         recording.audio = replace(AudioTrack.open(lasting_path(audio)), directions=directions)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -15,7 +16,7 @@ from avlmaps.recordings.corrections import uncorrected
 from avlmaps.recordings.faults import Fault, Report
 from avlmaps.recordings.formats.file_recording import FileRecording
 from avlmaps.recordings.formats.tables import text_lines
-from avlmaps.recordings.open import find_format
+from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
 
 # The last frame may be taken a little after the sound track's end: encoders cut to whole blocks.
@@ -23,7 +24,7 @@ _MAX_AUDIO_LACK_S = 0.5
 
 
 def validate(
-    path: Path | str, format: str = "auto", max_decoded: int | None = None, more: Sequence[Path] = ()
+    path: Path | str, format: str = "auto", max_decoded: int | None = None, more: Sequence[Path] = (), **given: Any
 ) -> list[Fault]:
     """Return every fault of a recording; an empty list says that there is none.
 
@@ -35,11 +36,12 @@ def validate(
         format: as for ``open_recording``.
         max_decoded: how many frames to decode, spread evenly; all of them if None.
         more: further files of a bag that was split.
+        given: how it is read; further arguments of ``open_recording``.
     """
     path = user_path(path)
     faults: list[Fault] = []
     try:
-        recording = uncorrected(find_format(path, format).open(path, faults.append, more=more))
+        recording = uncorrected(open_recording([path, *more], format, report=faults.append, **given))
     except AvlmapsError as error:
         if not any(str(error) == fault.sentence for fault in faults):
             faults.append(Fault(str(error)))
@@ -63,7 +65,7 @@ def _check_audio(recording: Recording, report: Report) -> None:
     lack_s = float(recording.stamps_s[-1]) - recording.audio.end_s
     if lack_s > _MAX_AUDIO_LACK_S:
         sentence = (
-            f"{recording.audio.path} ends at {recording.audio.end_s:.2f} s, but the frames continue to "
+            f"{recording.audio.name} ends at {recording.audio.end_s:.2f} s, but the frames continue to "
             f"{recording.stamps_s[-1]:.2f} s; the sound of the last {lack_s:.2f} s is missing."
         )
         report(Fault(sentence, recording.audio.path, fatal=False))

@@ -343,7 +343,8 @@ def _other_rate(evidence: Evidence) -> Iterator[Said]:
     meant = [hz for hz in _RATES_HZ if hz != track.rate_hz and abs(longer * track.rate_hz / hz - 1.0) < _AS_LONG]
     if meant and abs(late_s) < _AS_LONG * drive_s:
         as_if = f"as if {meant[0]} samples a second were called {track.rate_hz}"
-        remedy = f"If so, write {track.path.name} again with its true rate; else its sounds lie at wrong places."
+        again = f"write {track.label or track.path.name} again with its true rate"
+        remedy = f"If so, {again}; else its sounds lie at wrong places."
         yield Said(f"The sound lasts {track.duration_s:.1f} s and the drive {drive_s:.1f} s, {as_if}.", remedy)
 
 

@@ -264,7 +264,7 @@ def _sampled(
                 stream.write(more)
     except (soundfile.SoundFileError, AssertionError) as error:  # it asserts that all samples were taken
         raise _cannot_write(topic, target, error) from None
-    track = AudioTrack.open(target, start_s=start_s)
+    track = AudioTrack.open(target, start_s=start_s, label=topic)
     if pcm.channels > 1 and track.channel is None:
         notices = (
             *notices,
@@ -347,7 +347,7 @@ def _compressed(
     begins = [0, *cuts.tolist()]
     start_s = float(times_s[0])
     if len(parts) == 1:
-        track = AudioTrack.open(parts[0], start_s=start_s)
+        track = AudioTrack.open(parts[0], start_s=start_s, label=sound.name)
         came_s = float(np.ptp(times_s)) + usual_s
         if len(times_s) >= _FEWEST_MESSAGES and came_s >= _SHORTEST_S and track.duration_s > _AGREES * came_s:
             raise RecordingError(
@@ -381,7 +381,8 @@ def _joined(
 
     write_flac(target, blocks())
     lengths_s = np.array([track.duration_s for track in tracks])
-    return AudioTrack.open(target, start_s=start_s), (*notices, *_gap_notice(topic, start_s, lengths_s, silence_s))
+    track = AudioTrack.open(target, start_s=start_s, label=topic)
+    return track, (*notices, *_gap_notice(topic, start_s, lengths_s, silence_s))
 
 
 def _coding_of(sound: SoundTopic, beginning: bytes, said: str, times_s: Float[np.ndarray, " n"]) -> str:
