@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -187,18 +187,22 @@ def packed(depth_m: np.ndarray, floats: bool) -> tuple[str, bytes]:
     return form, struct.pack("<iff", 0, a, b) + size + rvl(picture)
 
 
-def write_ros1(path: Path, events: Iterator[Event], ros: Messages) -> Path:
+def write_ros1(path: Path, events: Iterator[Event], ros: Messages, compression: str = "") -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     writer = Writer1(path.with_suffix(".bag"))
+    if compression:
+        writer.set_compression(Writer1.CompressionFormat[compression.upper()])
     with writer:
         _write(writer, events, ros)
     return path.with_suffix(".bag")
 
 
-def write_ros2(path: Path, events: Iterator[Event], ros: Messages, mcap: bool = False) -> Path:
+def write_ros2(path: Path, events: Iterator[Event], ros: Messages, mcap: bool = False, compression: str = "") -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     plugin = StoragePlugin.MCAP if mcap else StoragePlugin.SQLITE3
     writer = Writer2(path, version=9, storage_plugin=plugin)
+    if compression:
+        writer.set_compression(CompressionMode[compression.upper()], CompressionFormat.ZSTD)
     with writer:
         _write(writer, events, ros)
     return path

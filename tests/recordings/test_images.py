@@ -2,19 +2,16 @@
 
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from PIL import Image
 from recording_scenes import CAMERA, metres, save_depth, save_rgb, shot
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.formats.ros_messages import colour_of
 from avlmaps.recordings.images import check_picture, check_whole, picture_size, read_colour, read_depth
 
 PNG = cv2.imencode(".png", shot(1).rgb)[1].tobytes()
@@ -128,51 +125,3 @@ def test_depth_arrays_that_cannot_be_used_are_named(tmp_path: Path):
         read_depth(tmp_path / "flat.npy", CAMERA, 1000.0)
     with pytest.raises(RecordingError, match=r"gone.npy is missing"):
         read_depth(tmp_path / "gone.npy", CAMERA, 1000.0)
-
-
-# Pictures of other codings: HEIC of phones; Bayer and YUV of cameras' raw topics.
-
-SHADE = np.full((48, 64, 3), (200, 120, 40), np.uint8)
-
-
-@pytest.mark.parametrize("suffix", ["png", "jpg", "webp", "tiff", "bmp"])
-def test_each_format_of_pictures_is_read(tmp_path: Path, suffix: str):
-    Image.fromarray(SHADE).save(tmp_path / f"p.{suffix}")
-    assert picture_size(tmp_path / f"p.{suffix}") == (64, 48)
-    assert np.abs(read_colour(tmp_path / f"p.{suffix}", CAMERA).astype(int) - SHADE).max() <= 6
-
-
-def test_a_heic_picture_is_read_like_any_other(tmp_path: Path):
-    heif = pytest.importorskip("pillow_heif", reason="HEIC needs avlmaps[heic]")
-    heif.from_bytes("RGB", (64, 48), SHADE.tobytes()).save(str(tmp_path / "p.heic"), quality=95)
-    assert picture_size(tmp_path / "p.heic") == (64, 48)
-    assert np.abs(read_colour(tmp_path / "p.heic", CAMERA).astype(int) - SHADE).max() <= 6
-
-
-def as_message(encoding: str, pixels: np.ndarray) -> SimpleNamespace:
-    data = np.ascontiguousarray(pixels)
-    step = data.nbytes // len(data)
-    return SimpleNamespace(
-        encoding=encoding, height=48, width=64, step=step, data=data.reshape(-1).view(np.uint8), is_bigendian=0
-    )
-
-
-@pytest.mark.parametrize(("pattern", "bits"), [("rggb", 8), ("bggr", 8), ("gbrg", 8), ("grbg", 16)])
-def test_a_bayer_mosaic_has_its_colours(pattern: str, bits: int):
-    mosaic = np.zeros((48, 64), np.uint8 if bits == 8 else np.uint16)
-    for at, letter in enumerate(pattern):
-        value = int(SHADE[0, 0]["rgb".index(letter)])
-        mosaic[at // 2 :: 2, at % 2 :: 2] = value if bits == 8 else value << 8
-    found = colour_of(as_message(f"bayer_{pattern}{bits}", mosaic), "x").astype(int)
-    assert np.abs(found[2:-2, 2:-2] - SHADE[2:-2, 2:-2]).max() <= 1
-
-
-@pytest.mark.parametrize(("encoding", "order"), [("yuv422", "uyvy"), ("uyvy", "uyvy"), ("yuyv", "yuyv")])
-def test_yuv_of_two_bytes_a_pixel_has_its_colours(encoding: str, order: str):
-    r, g, b = SHADE[0, 0] / 255.0
-    y = 0.299 * r + 0.587 * g + 0.114 * b  # BT.601, as cameras send it: 16 to 235, and 16 to 240
-    level = {"y": 16 + 219 * y, "u": 128 + 224 * (b - y) / 1.772, "v": 128 + 224 * (r - y) / 1.402}
-    packed = np.tile(np.array([level[letter] for letter in order]).round().astype(np.uint8), (48, 32))
-    found = colour_of(as_message(encoding, packed), "x").astype(int)
-    assert found.shape == (48, 64, 3) and np.ptp(found.reshape(-1, 3), axis=0).max() == 0
-    assert np.abs(found - SHADE).max() <= 4

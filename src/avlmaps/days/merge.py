@@ -442,8 +442,8 @@ def joined_sources(
     if len(known) < len(parts):
         of = next(of for of in (stored, other) if len(of.data.sounds) and of.data.sources is None)
         return None, (
-            f"{NO_SOURCES}: {of.path.name} was built without the places of its microphones; give them (microphones in "
-            "recording.json), build it again and merge again."
+            f"{NO_SOURCES}: {of.path.name} was built without the places of its microphones; build it again with "
+            f"them ({option('microphones', 'FILE')}) and merge again."
         )
     counts = [int(evidence.channels[0]) for evidence, _ in known]
     if len(set(counts)) > 1:

@@ -15,6 +15,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.wording import option
 from avlmaps.maps.sources.candidates import CandidateGrid, Density, Spread, log_same_place
 from avlmaps.maps.sources.correlation import SourceSettings
 from avlmaps.maps.types import SourceEvidence
@@ -41,12 +42,12 @@ def unknown_sources(stored: "AVLMap") -> str:
     if stored.data.info.visits:
         return (
             f"{what}: it is of several days, and not all of them say where the microphones are, or they have other "
-            "microphones. Build each day's map from a recording that says it (microphones in recording.json) and merge "
-            "them again."
+            f"microphones. Build each day's map with their places ({option('microphones', 'FILE')}) and merge them "
+            "again."
         )
     return (
         f"{what}: its recording does not say where the microphones are, or it was made without its recording. Give "
-        "their places (microphones in recording.json) and build the map of the recording again."
+        f"their places when you build the map ({option('microphones', 'FILE')})."
     )
 
 

@@ -109,10 +109,10 @@ def settle_sound(recording: Recording) -> None:
         span = f"from {track.start_s:.2f} to {track.end_s:.2f} s, and the frames from {first_s:.2f} to {last_s:.2f} s"
         shared_s = min(track.end_s, last_s) - max(track.start_s, first_s)
         if shared_s < 0.0:
+            begins = "its beginning (audio_start_s of recording.json), " if recording.format == FORMATS[0].name else ""
             raise RecordingError(
-                f"The sound track {name} of {recording.path} goes {span}, so that no sound has a place; "
-                "give the recording's time at which it begins (audio_start_s of recording.json), another track "
-                f"({option('audio')}), or none."
+                f"The sound track {name} of {recording.path} goes {span}, so that no sound has a place; give "
+                f"{begins}another track ({option('audio')}), or none."
             )
         if shared_s < _LEAST_SHARED * (last_s - first_s):
             notices = (*notices, f"The sound track {name} goes {span}; the rest has no sound.")

@@ -91,8 +91,8 @@ def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float
     array = track.microphones
     if array is None or len(array) < 2:
         raise RecordingError(
-            "There is no array to calibrate: the recording gives no places of two or more microphones "
-            f"(microphones of recording.json, or {option('microphones', 'FILE')})."
+            "There is no array to calibrate: the recording gives no places of two or more microphones; give them "
+            f"({option('microphones', 'FILE')})."
         )
     begin_s, end_s = _span(track, walk, between_s)
     found = _frames(track, array, begin_s, end_s)
