@@ -23,6 +23,7 @@ _PURE = {
     "get_contour",
     "get_nearest_pos",
     "get_all_pos",
+    "get_nth_pos",
     "exists",
     "get_distance",
 }

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import AvlmapsError, LanguageError
 from avlmaps.language.commands import read_command
-from avlmaps.language.intents import Clarify, Go, Refuse, Target, TargetKind, targets_of
+from avlmaps.language.intents import Clarify, Go, If, Pick, Refuse, Return, Target, TargetKind, targets_of
 from avlmaps.language.learned_translator import LearnedTranslator, UnclearError, command_to_program
 from avlmaps.language.program import parse_program
 from avlmaps.language.program.writing import write_program
@@ -98,8 +98,71 @@ def test_a_reference_is_one_instance_in_the_program() -> None:
 
 def test_the_other_one_is_another_instance() -> None:
     program = command_to_program("go to the sofa near the window, then to the other sofa")
-    assert "robot.get_all_pos" in program
-    assert "[1]" in program
+    assert "robot.get_nth_pos(heat1, 2)" in program or 'robot.get_nth_pos("sofa", 2)' in program
+
+
+def thing(name: str, pick: Pick = Pick.ANY, number: int = 1, *near: Target) -> Target:
+    return Target(TargetKind.OBJECT, name, near, pick, number)
+
+
+KITCHEN = Target(TargetKind.AREA, "kitchen")
+
+
+@pytest.mark.parametrize(
+    ("command", "meant"),
+    [
+        ("Drive to the left one of the two chairs", thing("chair", Pick.LEFT)),
+        ("go to the chair furthest to the left", thing("chair", Pick.LEFT)),
+        ("go to the chair that is furthest to the right", thing("chair", Pick.RIGHT)),
+        ("Go to the second nearest window", thing("window", Pick.NEAREST, 2)),
+        ("go to the second chair from the left", thing("chair", Pick.LEFT, 2)),
+        ("go to the third farthest blue chair in the kitchen", thing("blue chair", Pick.FARTHEST, 3, KITCHEN)),
+        ("go to the northernmost lamp", thing("lamp", Pick.NORTH)),
+    ],
+)
+def test_one_of_several_is_chosen_by_its_order(command: str, meant: Target) -> None:
+    read = read_command(command)
+    assert read.intents == (Go(meant),)
+    assert parse_program(write_program(read.intents)).skills[-2:-1] == ("get_nth_pos",)
+
+
+NEAREST_SOFA = Go(thing("sofa", Pick.NEAREST))
+
+
+@pytest.mark.parametrize(
+    ("command", "meant"),
+    [
+        ("If there is a sofa go to it, otherwise go to the kitchen",
+         If(thing("sofa"), (NEAREST_SOFA,), (Go(KITCHEN),))),
+        ("when there is no chair in the kitchen come back",
+         If(thing("chair", Pick.ANY, 1, KITCHEN), (), (Return(),))),
+        ("unless there is a sofa, go to the kitchen", If(thing("sofa"), (), (Go(KITCHEN),))),
+        ("go to the kitchen unless there is no sofa", If(thing("sofa"), (Go(KITCHEN),))),
+        ("go to the sofa if there is one, else come back", If(thing("sofa"), (Go(thing("sofa")),), (Return(),))),
+        ("Check whether we have a sofa and if so go to it", If(thing("sofa"), (NEAREST_SOFA,))),
+        ("is there a sofa? if so go there", If(thing("sofa"), (NEAREST_SOFA,))),
+    ],
+)  # fmt: skip
+def test_a_command_may_depend_on_whether_there_is_a_thing(command: str, meant: If) -> None:
+    read = read_command(command)
+    assert read.intents == (meant,)
+    assert parse_program(write_program(read.intents)).skills
+    assert verbalise(read.intents).startswith("I will, if there is ")
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["if there is a person in the kitchen go to the sofa", "if it rains go to the sofa", "if the door is open go there",
+     "if there is a sofa drive through the wall", "go to the kitchen unless there is no fridge there",
+     "if there is a sofa stop going to the kitchen", "when you have been to the kitchen, no sofa"],
+)  # fmt: skip
+def test_what_a_map_cannot_say_is_no_condition(command: str) -> None:
+    assert read_command(command).stops is not None
+
+
+def test_steps_behind_a_condition_look_their_things_up_again() -> None:
+    program = command_to_program("if there is a sofa, circle the table twice, otherwise circle the table")
+    assert program.count("robot.get_contour") == 2
 
 
 def test_a_question_has_choices_and_no_program() -> None:

@@ -98,7 +98,9 @@ def test_the_farthest_is_not_the_nearest() -> None:
     assert intents("go to the chair farthest from here") == (
         Go(Target(TargetKind.OBJECT, "chair", pick=Pick.FARTHEST)),
     )
-    stops("go to the second farthest chair")
+    assert intents("go to the second farthest chair") == (
+        Go(Target(TargetKind.OBJECT, "chair", pick=Pick.FARTHEST, number=2)),
+    )
 
 
 def test_a_distance_in_metres_may_be_kept() -> None:
@@ -144,7 +146,7 @@ def test_a_question_does_not_drive(command: str) -> None:
     ["go to my room", "go to her room", "go to the object most likely to bark", "go to the quietest room",
      "go to the darkest corner", "drive along the wall", "follow the wall", "follow the corridor",
      "go somewhere safe", "go to a safe place", "go to a quiet room", "go to a random room",
-     "go to the thing", "go to the chair 2 m left of the table in 3 m", "go to the second nearest chair"],
+     "go to the thing", "go to the chair 2 m left of the table in 3 m", "go to the nearest chair but one"],
 )  # fmt: skip
 def test_what_the_map_cannot_know_is_asked(command: str) -> None:
     stops(command)
@@ -447,7 +449,7 @@ def test_another_thing_beside_it_is_that_thing() -> None:
         "go to the window and the one beside the sofa", "go to the nearest lamp but one", "go north, east 2 m",
         "turn left 30 degrees 30 minutes", "move forward 1 m 5", "step forward 30 cm and left 1 m 5", "go 2 m 3 steps",
         "go two metres, then one to the left", "look at half past two o'clock", "turn to quarter past 3 o'clock",
-        "go to the second nearest chair", "go to the chair but not the one near the door",
+        "go to the nearest chair but one", "go to the chair but not the one near the door",
         "visit every lamp except the one in the kitchen", "go between the two chairs",
     ],
 )  # fmt: skip

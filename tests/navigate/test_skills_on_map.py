@@ -180,6 +180,29 @@ def test_a_program_can_ask_whether_something_is_there(score: float, there: bool)
     assert trace.ok and trace.steps[-1].arguments == {"angle_deg": 90 if there else -90}
 
 
+@pytest.mark.parametrize("order", ["nearest", "farthest", "left", "right", "north", "south", "east", "west"])
+def test_things_are_counted_in_an_order(order: str) -> None:
+    robot = furnished_robot()
+    every = [xy(place) for place in robot.get_all_pos("chair")]
+    counted = [xy(robot.get_nth_pos("chair", number, order)) for number in range(1, len(every) + 1)]
+    assert sorted(counted) == sorted(every) and len(every) > 1
+    x, y = np.array(counted).T
+    ahead = np.mean(counted, axis=0) - (3.0, 2.0)
+    keys = {
+        "left": ahead[1] * x - ahead[0] * y, "right": ahead[0] * y - ahead[1] * x, "north": -y, "south": y, "east": -x,
+        "west": x,
+    }  # fmt: skip
+    wanted = {"nearest": every, "farthest": every[::-1]}
+    assert counted == wanted[order] if order in wanted else (np.diff(keys[order]) >= 0.0).all()
+
+
+def test_a_thing_that_there_are_too_few_of_is_not_found() -> None:
+    with pytest.raises(GoalNotFoundError, match="number 9 is not found"):
+        furnished_robot().get_nth_pos("chair", 9)
+    with pytest.raises(ProgramError, match="counts from nearest"):
+        furnished_robot().get_nth_pos("chair", 1, "prettiest")
+
+
 def test_distances_of_things_are_between_their_nearest_points() -> None:
     robot = furnished_robot()
     assert robot.get_distance("chair", "chair") == 0.0

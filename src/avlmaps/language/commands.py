@@ -4,13 +4,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from avlmaps.core.errors import LanguageError
+from avlmaps.core.errors import LanguageError, QueryError
 from avlmaps.language.claims import claimed_words, forbidden
 from avlmaps.language.gate import NoOrder, no_order
 from avlmaps.language.intents import (
+    Ask,
     Beside,
     Clarify,
     Face,
+    If,
     Intent,
     Pick,
     RefusalReason,
@@ -26,6 +28,9 @@ from avlmaps.language.intents import (
 from avlmaps.language.learned.decision import EXAMPLE, REFUSALS, NameResolver, Weighed, decided, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
+from avlmaps.language.names import is_entry
+from avlmaps.language.questions import read_question
+from avlmaps.language.rephrase import conditions
 from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, language_of, stand_ins
 from avlmaps.language.storey_words import SaidStorey, said_storeys
 from avlmaps.language.verbalise import verbalise
@@ -96,9 +101,58 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
         LanguageError: the command is empty or too long.
     """
     _check_length(text)
+    branched = _branched(text, given)
+    if branched is not None:
+        return branched
     read = _read(text, given)
     closed = None if read.stops is not None or is_stop(tokenise(text)) else no_order(text)
     return read if closed is None else replace(read, intents=(_asked(closed, read.intents),), why="gate")
+
+
+def _branched(text: str, given: Attachments | None) -> Command | None:
+    """Return a command whose steps depend on whether the map has a thing; None for any other."""
+    said = " ".join(token.text for token in tokenise(text))
+    found = next(filter(None, (row.fullmatch(said) for row in conditions())), None)
+    parts = {} if found is None else found.groupdict()
+    what = parts.get("what") or ""
+    thing = _thing(what, given) if what else None
+    if found is None or (what and (thing is None or is_entry(f"{what} {parts['then'].split()[0]}"))):
+        return None
+    clauses = (_named(parts[name], what) if parts.get(name) else "" for name in ("before", "then", "otherwise"))
+    reads = [read_command(clause, given) if clause else Command((), (), (), "words") for clause in clauses]
+    notes = tuple(dict.fromkeys(note for read in reads for note in read.notes))
+    stopped = next((read for read in reads if read.intents and read.stops is not None), None)
+    if stopped is not None:
+        return replace(stopped, notes=notes)
+    before, then, otherwise = (read.intents for read in reads)
+    if thing is None:  # "go to the piano if there is one"
+        thing = next((target for step in then for target in targets_of(step)), None)
+    if thing is None:
+        return None
+    if bool(parts.get("none")) != bool(parts.get("unless")):
+        then, otherwise = otherwise, then
+    return Command((*before, If(replace(thing, pick=Pick.ANY), then, otherwise)), notes, (), "words")
+
+
+def _thing(what: str, given: Attachments | None) -> Target | None:
+    """Return the thing or room that a condition is about; None for what no map holds, such as a person."""
+    try:
+        inquiry = read_question(f"is there a {what}", given).inquiry
+    except QueryError:
+        return None
+    alive = claimed_words("persons") | claimed_words("living") | claimed_words("passing")
+    thing = inquiry.of[0]
+    is_thing = thing.kind in (TargetKind.OBJECT, TargetKind.AREA) and what.startswith(thing.name)
+    alone = inquiry.ask is Ask.EXISTS and len(inquiry.of) == 1 and alive.isdisjoint(what.split())
+    return thing if is_thing and alone else None
+
+
+def _named(clause: str, what: str) -> str:
+    """Return the steps of a condition with its thing in the place of "it", "one" and "there"."""
+    if not what:
+        return clause
+    named = re.sub(r"\b(?:it|them|one of them|that one|one)\b", f"a {what}", clause)
+    return re.sub(r"^((?:go|drive|move|head|run|come) (?:over |straight )?)(?:to )?there\b", rf"\1to a {what}", named)
 
 
 def is_stop(tokens: Sequence[Token]) -> bool:
@@ -133,9 +187,9 @@ def _asked(closed: NoOrder, intents: Sequence[Intent]) -> Clarify:
 
 def _read(text: str, given: Attachments | None) -> Command:
     """Return the meaning of a command, taken as an order."""
-    stand = stand_ins(text, () if given is None else given.own)
-    if stand.own and given is not None:
-        read = _read(stand.text, replace(given, own=()))
+    stand = stand_ins(text, () if given is None else given.own, orders=True)
+    if stand.own:
+        read = _read(stand.text, replace(given or Attachments(), own=()))
         intents = tuple(_back(on_targets(one, stand.target), stand) for one in read.intents)
         return replace(read, intents=intents, notes=tuple(map(stand.back, read.notes)))
     language = language_of(text)

@@ -24,12 +24,18 @@ class TargetKind(StrEnum):
 
 
 class Pick(StrEnum):
-    """Which one of several things of a name."""
+    """Which one of several things of a name: from which end they are counted, for a robot that looks at them."""
 
     ANY = ""
     NEAREST = "nearest"
     FARTHEST = "farthest"
     OTHER = "other"
+    LEFT = "left"
+    RIGHT = "right"
+    NORTH = "north"
+    SOUTH = "south"
+    EAST = "east"
+    WEST = "west"
 
 
 class Side(StrEnum):
@@ -80,6 +86,7 @@ class Target:
         near: what it is near, in, on, or between, in the order of the words; a chain ("the lamp on the table by the
             sofa") is made flat, since a program multiplies all heats.
         pick: which one of several.
+        number: of that one, from 1: 2 with `Pick.NEAREST` is the second nearest.
         at: the place of a sound or a clip that is meant; None: where it was heard, or what the settings say.
     """
 
@@ -87,6 +94,7 @@ class Target:
     name: str = ""
     near: "tuple[Target, ...]" = ()
     pick: Pick = Pick.ANY
+    number: int = 1
     at: HeardAt | None = None
 
     def __post_init__(self) -> None:
@@ -111,6 +119,8 @@ class Target:
             told["near"] = [one.to_json() for one in self.near]
         if self.pick:
             told["pick"] = str(self.pick)
+        if self.number > 1:
+            told["number"] = self.number
         if self.at:
             told["at"] = self.at
         return told
@@ -220,6 +230,16 @@ class Repeat:
 
 
 @dataclass(frozen=True, slots=True)
+class If:
+    """Do one thing where the map has a target, and another where it has none; one of them may be nothing."""
+
+    do: ClassVar[str] = "if"
+    of: Target
+    body: "tuple[Intent, ...]" = ()
+    otherwise: "tuple[Intent, ...]" = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Refuse:
     """The robot does nothing; ``said`` is the sentence that says why."""
 
@@ -238,7 +258,21 @@ class Clarify:
 
 
 Intent = (
-    Go | Face | Turn | Move | Between | Beside | StopAt | Circle | VisitEach | Wait | Return | Repeat | Refuse | Clarify
+    Go
+    | Face
+    | Turn
+    | Move
+    | Between
+    | Beside
+    | StopAt
+    | Circle
+    | VisitEach
+    | Wait
+    | Return
+    | Repeat
+    | If
+    | Refuse
+    | Clarify
 )
 
 
@@ -290,8 +324,23 @@ def targets_of(intent: Intent) -> tuple[Target, ...]:
 
 
 def steps_of(intents: Sequence[Intent]) -> list[Intent]:
-    """Return intents with the bodies of those that are repeated in their places."""
-    return [step for intent in intents for step in (intent.body if isinstance(intent, Repeat) else (intent,))]
+    """Return intents with the bodies of those that have some in their places."""
+    found: list[Intent] = []
+    for intent in intents:
+        inner = blocks_of(intent)
+        found += steps_of(inner) if inner else [intent]
+    return found
+
+
+def blocks_of(intent: Intent) -> tuple[Intent, ...]:
+    """Return the intents inside an intent: of a repeated one its body, of a conditional one both branches."""
+    match intent:
+        case Repeat():
+            return intent.body
+        case If():
+            return (*intent.body, *intent.otherwise)
+        case _:
+            return ()
 
 
 class Ask(StrEnum):

@@ -7,10 +7,11 @@ written out, "turn one and a half times" is "turn 540 degrees".
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
@@ -34,13 +35,11 @@ def rewritten(text: str, *, only_robot: bool = False) -> tuple[str, list[str]]:
         only_robot: whether only what is said of the robot is said to it.
     """
     notes: list[str] = []
-    for is_robot, says, to, note in _rows():
-        if only_robot and not is_robot:
-            continue
-        found = says.search(text)
+    for row in _book()["row"]:
+        found = None if only_robot and not row.get("robot") else row["says"].search(text)
         if found is not None:
-            notes += [found.expand(note)] if note else []
-            text = says.sub(to, text)
+            notes += [found.expand(row["note"])] if "note" in row else []
+            text = row["says"].sub(row["to"], text)
     return text if only_robot else _sounding().sub(_whatever, text), notes
 
 
@@ -67,20 +66,29 @@ def _whatever(found: re.Match[str]) -> str:
 
 
 @cache
-def _rows() -> Sequence[tuple[bool, re.Pattern[str], str, str]]:
+def _book() -> dict[str, list[dict[str, Any]]]:
+    """Return the tables of rows, with their regular expressions compiled."""
     book = tomllib.loads(files("avlmaps.language").joinpath("rewrites.toml").read_text(encoding="utf-8"))
     words = {"order": f"(?:{'|'.join(sorted(_order_words()))})"}
 
     def filled(text: str) -> str:
         return re.sub(r"\{([a-z]+)\}", lambda found: words[found[1]], text)
 
-    for name, text in book["words"].items():
+    for name, text in book.pop("words").items():
         words[name] = filled(text)
-    rows = book["row"]
-    return [
-        (row.get("robot", False), re.compile(filled(row["says"]), re.IGNORECASE), row["to"], row.get("note", ""))
-        for row in rows
-    ]
+    for row in (row for rows in book.values() for row in rows):
+        row["says"] = re.compile(filled(row["says"]), re.IGNORECASE)
+    return book
+
+
+def picks() -> Iterator[re.Pattern[str]]:
+    """Yield what finds a thing that is chosen by its order."""
+    return (row["says"] for row in _book()["pick"])
+
+
+def conditions() -> Iterator[re.Pattern[str]]:
+    """Yield what takes a command apart whose steps depend on whether there is a thing."""
+    return (row["says"] for row in _book()["condition"])
 
 
 def _order_words() -> frozenset[str]:

@@ -7,18 +7,20 @@ in the place of each, since what was learnt reads such words best; what was read
 import re
 import tomllib
 import unicodedata
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.resources import files
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
+from avlmaps.core.words import singulars_of
 from avlmaps.language.claims import claimed_words
-from avlmaps.language.intents import Target
+from avlmaps.language.intents import Pick, Target, TargetKind
 from avlmaps.language.lexer import WORDS, Token, in_figures, tokenise
-from avlmaps.language.names import class_words, is_known, respelt, sounding_words
-from avlmaps.language.rephrase import in_degrees, rewritten
+from avlmaps.language.names import class_words, is_entry, is_known, respelt, sounding_words
+from avlmaps.language.rephrase import in_degrees, picks, rewritten
+from avlmaps.language.verbalise import phrase
 from avlmaps.perception.embedded.words import is_word
 
 OwnName = tuple[str, bool]
@@ -36,6 +38,14 @@ _PICTURE = frozenset({
     "selfie", "screenshot", "polaroid",
 })  # fmt: skip
 _SOUND = frozenset({"recording", "recorded", "clip", "sound", "audio", "noise", "tape", "recordings", "memo"})
+_ORDERS = {
+    "closest": "nearest", "furthest": "farthest", "northern": "north", "southern": "south", "eastern": "east",
+    "western": "west",
+}  # fmt: skip
+_NUMBERS = {
+    word: number for number, words in enumerate(("second 2nd", "third 3rd", "fourth 4th", "fifth 5th"), 2)
+    for word in words.split()
+}  # fmt: skip
 _SIDE = re.compile(
     r"\b((?:left|right|north|south|east|west|in front) of|behind|opposite|"
     r"across from|underneath|under|beneath|below|above|over)\b"
@@ -110,25 +120,30 @@ class Sentence:
 
 @dataclass(frozen=True, slots=True)
 class StandIns:
-    """A sentence with known words in the place of own names.
+    """A sentence with known words in the place of own names, and of things that are chosen by their order.
 
     Attributes:
         text: the sentence.
-        own: the own name of each word.
+        own: what each word stands for: "my charging dock", the second nearest chair.
     """
 
     text: str
-    own: dict[str, str] = field(default_factory=dict)
+    own: dict[str, Target] = field(default_factory=dict)
 
     def back(self, text: str) -> str:
-        """Return words with the own names."""
-        for word, name in self.own.items():
+        """Return words with what they stand for."""
+        for word, own in self.own.items():
+            name = phrase(own).removeprefix("the ")
             text = re.sub(rf"\b{word}\b", lambda _, name=name: name, text, flags=re.IGNORECASE)
         return text
 
     def target(self, target: Target) -> Target:
-        """Return a target with its own name."""
-        return replace(target, name=self.own.get(target.name, target.name), near=tuple(map(self.target, target.near)))
+        """Return a target with what its name stands for."""
+        own, near = self.own.get(target.name), tuple(map(self.target, target.near))
+        if own is None:
+            return replace(target, near=near)
+        pick = own.pick or target.pick
+        return replace(target, name=own.name, pick=pick, number=own.number, near=near)
 
 
 def is_reserved(name: str) -> bool:
@@ -141,9 +156,12 @@ def is_reserved(name: str) -> bool:
     )
 
 
-def stand_ins(text: str, names: Sequence[OwnName]) -> StandIns:
-    """Return a sentence with a known word for each own name in it that the lexicon does not have."""
-    out, own = text, dict[str, str]()
+def stand_ins(text: str, names: Sequence[OwnName], *, orders: bool = False) -> StandIns:
+    """Return a sentence with a known word for each own name in it that the lexicon does not have.
+
+    ``orders``: also for each thing that is chosen by its order ("the second nearest chair").
+    """
+    out, own = text, dict[str, Target]()
     for name, is_room in sorted(names, key=lambda one: -len(one[0])):
         if is_reserved(name) or lexicon().find(name, EntryKind.ROOM if is_room else EntryKind.THING) is not None:
             continue
@@ -155,8 +173,33 @@ def stand_ins(text: str, names: Sequence[OwnName]) -> StandIns:
         if word is None:
             break
         out = said.sub(f"the {word}", out)
-        own[word] = name
+        own[word] = Target(TargetKind.AREA if is_room else TargetKind.OBJECT, name)
+    free = (one for one in _THINGS if one not in own and one not in text.casefold())
+    for words, target in chosen_things(out) if orders else ():
+        word = next(free, None)
+        if word is None:
+            break
+        out = out.replace(words, f"the {word}")
+        own[word] = target
     return StandIns(out, own)
+
+
+def chosen_things(text: str) -> Iterator[tuple[str, Target]]:
+    """Yield the things of a sentence that are chosen by their order, each with its words."""
+    for row in picks():
+        for found in row.finditer(text):
+            said = found.groupdict()
+            words = found["name"].lower().split()
+            names = [" ".join(words[:end]) for end in range(len(words), 0, -1)]
+            name = next(filter(is_entry, names if found.end("name") == found.end() else names[:1]), "")
+            if not name:
+                continue
+            *before, last = name.split()
+            name = " ".join([*before, next(filter(is_entry, singulars_of(last)), last)])
+            order, number = said["order"].lower(), _NUMBERS.get((said.get("number") or "").lower(), 1)
+            pick = Pick(_ORDERS.get(order, order))
+            whole = found[0].removesuffix(found["name"][len(" ".join([*before, last])) :])
+            yield whole, Target(TargetKind.OBJECT, name, pick=pick, number=number)
 
 
 def language_of(text: str) -> str | None:

@@ -10,6 +10,7 @@ from avlmaps.language.intents import (
     Clarify,
     Face,
     Go,
+    If,
     Intent,
     Move,
     Pick,
@@ -44,6 +45,7 @@ _SHORT = 3  # letters; shorter words are spelt like too many others
 _THESE = frozenset({"this", "that", "the", "my", "attached", "these"})
 _COMPASS = {0: "north", 45: "north-east", 90: "east", 135: "south-east", 180: "south", 225: "south-west", 270: "west",
             315: "north-west"}  # fmt: skip
+_ORDINALS = {2: "second", 3: "third", 4: "fourth", 5: "fifth"}
 _TIMES = {1: "once", 2: "twice"}
 _SIDES = {
     Side.LEFT: "to the left of", Side.RIGHT: "to the right of", Side.FRONT: "in front of", Side.BEHIND: "behind",
@@ -60,11 +62,11 @@ def verbalise(intents: Sequence[Intent]) -> str:
         return intents[0].question
     if tuple(intents) == (Wait(),):
         return "I will stop and stay here."
-    return f"I will {_steps(intents)}."
+    return f"I will {_steps(intents)}.".replace(" ,", ",")
 
 
 def _steps(intents: Sequence[Intent]) -> str:
-    return ", then ".join(map(_step, intents))
+    return ", then ".join(map(_step, intents)).replace(" ,", ",")
 
 
 def _step(intent: Intent) -> str:
@@ -106,6 +108,12 @@ def _other(intent: Intent) -> str:
             return "come back here"
         case Repeat(times=times, body=body):
             return f"{_TIMES.get(times, f'{times} times')}: {_steps(body)}"
+        case If(of=target, body=body, otherwise=otherwise):
+            there = phrase(target).removeprefix("the ")
+            if not body:
+                return f", if there is no {there}, {_steps(otherwise)}"
+            also = f"; otherwise {_steps(otherwise)}" if otherwise else ""
+            return f", if there is a {there}, {_steps(body)}{also}"
         case _:
             return str(intent)
 
@@ -118,10 +126,9 @@ def _turn(degrees: float) -> str:
 
 def phrase(target: Target) -> str:
     """Return a target in words: "the chair nearest to where breathing was heard"."""
-    pick = f"{target.pick} " if target.pick is not Pick.ANY else ""
     match target.kind:
         case TargetKind.OBJECT | TargetKind.AREA:
-            own = f"the {pick}{target.name}"
+            own = f"the {_picked(target)}"
         case TargetKind.SOUND:
             at_source = target.at == "source"
             own = f"where the sound of {target.name} comes from" if at_source else f"where {target.name} was heard"
@@ -136,6 +143,18 @@ def phrase(target: Target) -> str:
     beside = "near" if target.pick is Pick.NEAREST else "nearest to"
     near = f" {beside} {' and '.join(phrase(one) for one in others)}" if others else ""
     return own + near + "".join(f" in {phrase(one)}" for one in areas)
+
+
+def _picked(target: Target) -> str:
+    """Return the name of a thing, and which one of that name: "second nearest chair", "chair furthest to the left"."""
+    nth = f"{_ORDINALS[target.number]} " if target.number > 1 else ""
+    match target.pick:
+        case Pick.ANY:
+            return target.name
+        case Pick.NEAREST | Pick.FARTHEST | Pick.OTHER:
+            return f"{nth}{target.pick} {target.name}"
+        case _:
+            return f"{nth}{target.name} from the {target.pick}" if nth else f"{target.name} furthest {target.pick}"
 
 
 def is_strange(word: str) -> bool:

@@ -50,6 +50,7 @@ def kind_of(value: object) -> str:
     return f"a {type(value).__name__.lower()}"
 
 
+_SIDES = {"north": (0.0, 1.0), "south": (0.0, -1.0), "east": (1.0, 0.0), "west": (-1.0, 0.0)}  # of the level frame
 _MOST_LISTED = 9  # things that fit equally, in the sentence that asks which
 Heats = dict[tuple[object, ...], Heatmap]
 """The answers of one map, as it was opened, by the query."""
@@ -322,6 +323,27 @@ class Seeker:
         things, one = self._candidates(target)
         chosen = likely(things, one) if not one else things
         return sorted(chosen, key=lambda thing: float(np.linalg.norm(thing.outline.nearest_to(here) - here)))
+
+    def nth(self, target: Target, here: Float[np.ndarray, "2"], number: int, order: str) -> Destination:
+        """Return a thing that a target may mean by its number, from 1, in an order; see `get_nth_pos`.
+
+        Raises:
+            GoalNotFoundError: there are not so many.
+            ProgramError: there is no such order.
+        """
+        things = self.every(target, here)
+        ahead = np.mean([thing.outline.centre for thing in things], axis=0) - here
+        sides = {"left": (-ahead[1], ahead[0]), "right": (ahead[1], -ahead[0])} | _SIDES
+        if order in sides:
+            things.sort(key=lambda thing: -float(thing.outline.centre @ np.array(sides[order])))
+        elif order == "farthest":
+            things.reverse()
+        elif order != "nearest":
+            raise ProgramError(f"get_nth_pos counts from nearest, farthest, {', '.join(sides)}, not {order!r}.")
+        if not 1 <= number <= len(things):
+            name = things[0].name or "place"
+            raise GoalNotFoundError(f"The map has {len(things)} of {name}, so that number {number} is not found.")
+        return self._chosen(things[number - 1], len(things))
 
     def _handed(self, thing: Destination) -> Place:
         x, y, z = (float(value) for value in self.avlmap.space.world(thing.place))

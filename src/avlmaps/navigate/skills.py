@@ -159,6 +159,15 @@ class Robot:
         except GoalNotFoundError:
             return []
 
+    def get_nth_pos(self, target: Target, number: float = 1, order: str = "nearest") -> Place:
+        """Return the place of a thing of that name by its number, from 1, in an order.
+
+        The order is "nearest" or "farthest" (first), "left" or "right" as the robot sees them, "north", "south", "east"
+        or "west".
+        """
+        which = number_of(number, "get_nth_pos", _MOST_M, "things")
+        return self.seeker.place_of_thing(self.seeker.nth(target, self._here, int(which), order))
+
     def exists(self, target: Target) -> bool:
         """Return whether the map is confident of something of that name, or of a heatmap's best place."""
         return self.seeker.finds(target)

@@ -269,7 +269,8 @@ def _plain(target: Target) -> Target:
     else:
         name = " ".join([*own[:-1], next(iter(singulars_of(own[-1])), own[-1])]) if own else ""
     kind = TargetKind.OBJECT if target.kind is TargetKind.AREA else target.kind
-    return Target(kind, name, near, act.Pick.ANY if target.pick is act.Pick.NEAREST else target.pick)
+    pick = act.Pick.ANY if target.pick is act.Pick.NEAREST and target.number == 1 else target.pick
+    return Target(kind, name, near, pick, target.number)
 
 
 def _flat_near(target: Target) -> list[Target]:

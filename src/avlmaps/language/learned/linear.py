@@ -135,7 +135,7 @@ ROWS = (
 )
 ASKS = {f"ask_{ask}": ask for ask in intents.Ask}
 KINDS = tuple(str(kind) for kind in intents.TargetKind)
-PICKS = {f"pick_{pick}": pick for pick in intents.Pick if pick}
+PICKS = {f"pick_{pick}": pick for pick in (Pick.NEAREST, Pick.FARTHEST, Pick.OTHER)}
 STOPS = tuple(row.symbols[0] for row in ROWS if row.slots == (Slot.END,))
 STARTS = tuple(dict.fromkeys(row.symbols[0] for row in ROWS if row.slots != (Slot.END,)))
 SYMBOLS = (
@@ -464,4 +464,4 @@ class _Line:
         pick = PICKS[self.take(*PICKS)] if symbol in PICKS else Pick.ANY
         name = " ".join(self.tokens[word].text for word in words)
         place = "source" if kind in ("sound", "clip") and self.at_source(words) else None
-        return Target(TargetKind(kind), name, (), pick, place)
+        return Target(TargetKind(kind), name, (), pick, at=place)

@@ -155,6 +155,14 @@ class RobotSkills(Protocol):
         """Return the places of all objects of that name that the map is confident of, the nearest first; [] of none."""
         ...
 
+    def get_nth_pos(self, target: Target, number: float = 1, order: str = "nearest") -> Place:
+        """Return the place of a thing of that name by its number, from 1, in an order.
+
+        The order is "nearest" or "farthest" (first), "left" or "right" as the robot sees them, "north", "south", "east"
+        or "west".
+        """
+        ...
+
     def exists(self, target: Target) -> bool:
         """Return whether the map is confident of something of that name, or of a heatmap's best place."""
         ...

@@ -13,6 +13,7 @@ from avlmaps.language.intents import (
     Circle,
     Face,
     Go,
+    If,
     Intent,
     Move,
     Pick,
@@ -26,6 +27,7 @@ from avlmaps.language.intents import (
     TurnSense,
     VisitEach,
     Wait,
+    blocks_of,
     targets_of,
 )  # fmt: skip
 
@@ -58,8 +60,7 @@ class _Writer:
     def __post_init__(self) -> None:
         self.repeats = _counted(self.intents)
         for intent in self.intents:
-            if isinstance(intent, Repeat):
-                self.repeats.update(_counted(intent.body))
+            self.repeats.update(_counted(blocks_of(intent)))
         for intent in _flat(self.intents):
             twice = isinstance(intent, StopAt) or (isinstance(intent, Beside) and intent.side is Side.FRONT)
             if isinstance(intent, StopAt | Beside | Circle) and (twice or getattr(intent, "views", None)):
@@ -112,6 +113,8 @@ class _Writer:
                 self.add("robot.move_to(start)")
             case Repeat():
                 self.repeat(intent)
+            case If():
+                self.branch(intent)
             case _:
                 raise ValueError(f"{intent!r} has no program")
 
@@ -171,27 +174,37 @@ class _Writer:
             if target.kind is not TargetKind.HERE and target not in visited:
                 self.value(target)
         self.add(f"for {self.variable('i')} in range({intent.times}):")
+        self.indented(intent.body)
+
+    def branch(self, intent: If) -> None:
+        """Write both branches; what one of them looks up has no name behind it."""
+        named, thing = dict(self.names), self.query(intent.of)
+        self.add(f"if {'' if intent.body else 'not '}robot.exists({thing}):")
+        for block in filter(None, (intent.body, intent.otherwise)):
+            if intent.body and block is intent.otherwise:
+                self.add("else:")
+            self.indented(block)
+            self.names = dict(named)
+
+    def indented(self, block: Sequence[Intent]) -> None:
         self.indent += "    "
-        self.block(intent.body)
+        self.block(block)
         self.indent = self.indent[:-4]
 
     def bound(self, target: Target) -> str:
         """Return the variable that holds the place of a target, written where it is first needed."""
         if target not in self.names:
-            if target.pick in (Pick.OTHER, Pick.FARTHEST):
-                every = self.variable(f"{target.name.split()[-1]}s")
-                query = self.query(Target(target.kind, target.name, target.near))
-                self.add(f"robot.get_nearest_pos({query})")
-                self.add(f"{every} = robot.get_all_pos({query})")
-                at = "1" if target.pick is Pick.OTHER else f"len({every}) - 1"
-                name = self.variable(target.name.split()[-1])
-                self.add(f"{name} = {every}[{at}]")
-            else:
-                query = self.query(target)
-                name = self.variable(target.name.split()[-1] if not target.is_file else "place")
+            query = self.query(target)
+            name = self.variable(target.name.split()[-1] if not target.is_file else "place")
+            number = 2 if target.pick is Pick.OTHER else target.number
+            if target.pick is Pick.ANY:
                 one = "get_pos" if target.kind is TargetKind.OBJECT else "get_max_pos_3d"
-                skill = "get_nearest_pos" if target.pick is Pick.NEAREST else one
-                self.add(f"{name} = robot.{skill}({query})")
+            elif target.pick is Pick.NEAREST and number == 1:
+                one = "get_nearest_pos"
+            else:
+                one = "get_nth_pos"
+                query += f", {number}" if target.pick in (Pick.OTHER, Pick.NEAREST) else f', {number}, "{target.pick}"'
+            self.add(f"{name} = robot.{one}({query})")
             self.names[target] = name
         return self.names[target]
 
@@ -238,8 +251,7 @@ def _counted(intents: Sequence[Intent]) -> Counter[Target]:
 def _flat(intents: Sequence[Intent]) -> Iterator[Intent]:
     for intent in intents:
         yield intent
-        if isinstance(intent, Repeat):
-            yield from _flat(intent.body)
+        yield from _flat(blocks_of(intent))
 
 
 def _quoted(text: str) -> str:

@@ -238,14 +238,14 @@ def _target(target: Any) -> Any:
         target = {"object": target}
     kind = next(name for name in ("object", "sound", "area", "image", "clip", "here") if name in target)
     target = _storey_apart(target, kind)
-    pick = target.get("pick", "")
+    pick, number = target.get("pick", ""), target.get("number", 1)
     name = _name(kind, target[kind])
     if kind in ("object", "area") and _is_both(str(target[kind])):
         kind, name = "area", _name("area", target[kind])  # "the closet": a list may call it a thing or a room
     # A chain counts alike whether a list has it nested or flat: the program multiplies all heats.
     near = [_target(one) for one in target.get("near", ())]
     flat = frozenset(each for one in near for each in ((*one[:2], frozenset(), one[3]), *one[2]))
-    return kind, name, flat, "" if pick == "nearest" else pick
+    return kind, name, flat, f"{pick} {number}" if number > 1 else "" if pick == "nearest" else pick
 
 
 def _storey_apart(target: Any, kind: str) -> Any:
@@ -308,7 +308,11 @@ def _share(hits: int, count: int) -> str:
 
 
 def sealed() -> dict[str, Any]:
-    """Return for each shipped list its hash and its counts at first use."""
+    """Return for each shipped list its hash and its counts at first use.
+
+    ``possible since`` holds the intents of sentences that no program could do when their list was sealed, and the list
+    says are to be asked back: "the third door from the right".
+    """
     return json.loads(files("avlmaps_sim.bench").joinpath("data/language/sealed.json").read_text(encoding="utf-8"))
 
 
@@ -321,7 +325,9 @@ def shipped(name: str) -> list[Row]:
     content = files("avlmaps_sim.bench").joinpath(f"data/language/{name}.jsonl").read_bytes()
     if hashlib.sha256(content).hexdigest() != sealed()[name]["sha256"]:
         raise ValueError(f"the list {name} is not the one that was sealed")
-    return [json.loads(line) for line in content.decode("utf-8").splitlines() if line.strip()]
+    since: Mapping[str, Any] = sealed()[name].get("possible since", {})
+    rows = (json.loads(line) for line in content.decode("utf-8").splitlines() if line.strip())
+    return [{**row, "also": [*row.get("also", []), since[row["say"]]]} if row["say"] in since else row for row in rows]
 
 
 def run() -> dict[str, dict[str, list[Any]]]:
