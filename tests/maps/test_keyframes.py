@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.columns import concat
 from avlmaps.core.poses import apply, from_quaternion, inverse, rotation_angle_rad
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.keyframes.album import (
@@ -14,7 +15,6 @@ from avlmaps.maps.keyframes.album import (
     lift_keypoints,
     middle_of_view,
     perceive_keyframes,
-    stack_keyframes,
 )
 from avlmaps.maps.keyframes.choose import KeyframeSettings, keyframes_by_motion, select_keyframes
 from avlmaps.perception.encoders import Encoders
@@ -213,7 +213,7 @@ def test_a_profile_with_views_gives_area_features_and_one_without_keypoints_none
     register(Backend(Kind.VIEWS, "brightness", f"{__name__}:Brightness"))
     frame = RoomWalk().frame(0)
     seen = describe_keyframe(frame, Encoders("bare", views="brightness"))
-    keyframes = stack_keyframes([seen, seen])
+    keyframes = concat([seen, seen])
     np.testing.assert_allclose(keyframes.view, [[frame.rgb.mean(), 1.0]] * 2, rtol=1e-5)
     assert keyframes.place.shape == (2, 0)
     np.testing.assert_array_equal(keyframes.offsets, [0, 0, 0])

@@ -9,7 +9,7 @@ import pytest
 
 from avlmaps.core.columns import concat
 from avlmaps.core.poses import inverse, rotation_angle_rad
-from avlmaps.maps.keyframes.album import describe_keyframe, stack_keyframes
+from avlmaps.maps.keyframes.album import describe_keyframe
 from avlmaps.maps.keyframes.choose import KeyframeSettings
 from avlmaps.perception.embedded.keypoints import RootSift
 from avlmaps.perception.encoders import Encoders
@@ -95,8 +95,8 @@ def test_keypoints_without_scores_reach_a_matcher_without_any_and_with_the_size_
 
 def test_a_map_of_pictures_with_and_without_scores_has_none() -> None:
     seen = [describe_keyframe(WALK.frame(i), encoders_of(Scored(told=i > 0), None)) for i in range(3)]
-    assert stack_keyframes(seen).score.shape == (0,)
-    pieces = [stack_keyframes(seen[:1]), stack_keyframes(seen[1:])]
+    assert concat(seen).score.shape == (0,)
+    pieces = [seen[0], concat(seen[1:])]
     assert len(pieces[1].score) == len(pieces[1].xy) > 0
     whole = concat(pieces)
     assert whole.score.shape == (0,) and len(whole.xy) == sum(len(piece.xy) for piece in pieces)
@@ -104,9 +104,9 @@ def test_a_map_of_pictures_with_and_without_scores_has_none() -> None:
 
 def test_scores_stay_with_their_keypoints_when_lots_are_joined() -> None:
     seen = [describe_keyframe(WALK.frame(i), encoders_of(Scored(), None)) for i in range(3)]
-    blank = replace(seen[0], local=LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)))
-    blank = replace(blank, points_world=np.zeros((0, 3), np.float32))
-    whole = concat([stack_keyframes([seen[0]]), stack_keyframes([blank]), stack_keyframes(seen[1:])])
+    nothing = {name: getattr(seen[0], name)[:0] for name in ("xy", "descriptors", "points_world", "score")}
+    blank = replace(seen[0], offsets=np.zeros(2, np.int64), **nothing)
+    whole = concat([seen[0], blank, *seen[1:]])
     np.testing.assert_array_equal(whole.score, score_of(whole.xy).astype(np.float16))
 
 
@@ -133,11 +133,13 @@ def test_planted_matches_of_few_or_many_keypoints_are_believed_by_the_same_rules
     good = np.flatnonzero(np.isfinite(seen.points_world[:, 0]))[:count]
     seen = replace(
         seen,
-        local=LocalFeatures(xy[good], kept.descriptors[good]),
+        offsets=np.array([0, len(good)]),
+        xy=xy[good],
+        descriptors=seen.descriptors[good],
         points_world=seen.points_world[good],
-        place=np.ones(1, np.float32),
+        place=np.ones((1, 1), np.float32),
     )
-    stored = LocatableMap(stack_keyframes([seen]), {}, used, WALK.rig)
+    stored = LocatableMap(seen, {}, used, WALK.rig)
     whole_pixels = np.floor(xy[good]) + 0.5  # as DISK and SuperPoint tell them
     found = locate_features(
         stored,

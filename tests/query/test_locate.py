@@ -9,7 +9,7 @@ from PIL import Image
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse, rotation_angle_rad
-from avlmaps.maps.keyframes.album import stack_keyframes
+from avlmaps.maps.keyframes.album import NO_KEYFRAMES
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query import locate as locate_module
 from avlmaps.query.locate import Located, LocateSettings, alike, camera_of_35mm, focal_35mm_of, locate, nearest
@@ -213,7 +213,7 @@ def test_a_blank_picture_is_not_located(stored: LocatableMap, value: int) -> Non
 
 
 def test_a_map_without_keyframes_locates_nothing(stored: LocatableMap, photo: np.ndarray) -> None:
-    empty = replace(stored, keyframes=stack_keyframes([]))
+    empty = replace(stored, keyframes=NO_KEYFRAMES)
     assert locate(empty, photo, None, rng()).world_from_camera is None
 
 

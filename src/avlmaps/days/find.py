@@ -21,6 +21,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.timeline import is_in_future
 from avlmaps.days.evidence import THROUGH_VIEWS, DayViews
 from avlmaps.days.surfaces import Occupied, refine
+from avlmaps.maps.keyframes.album import local_features
 from avlmaps.maps.store.manifest import RecordingInfo, Visit
 from avlmaps.perception.protocols import LocalFeatures
 from avlmaps.query.avlmap import AVLMap
@@ -116,7 +117,7 @@ def gather_votes(stored: AVLMap, other: AVLMap, rng: np.random.Generator) -> Vot
     rows = spread_out(len(other.data.keyframes), MOST_TRIED)
     for row in progress(rows.tolist(), "locating", total=len(rows), unit="keyframe"):
         tried += 1
-        local, rgb = local_features(other, row), thumbnail(other, row)
+        local, rgb = features_of(other, row), thumbnail(other, row)
         place = stored.encoders.place.encode(rgb, local, stored.data.place_state)
         found = locate_features(here, local, place, other.data.rig.rgb, rng, chosen)
         if found.world_from_camera is None:
@@ -133,16 +134,10 @@ def gather_votes(stored: AVLMap, other: AVLMap, rng: np.random.Generator) -> Vot
     return Votes(np.stack(votes) if votes else none, np.stack(cameras) if cameras else none, tried)
 
 
-def local_features(stored: AVLMap, row: int) -> LocalFeatures:
+def features_of(stored: AVLMap, row: int) -> LocalFeatures:
     """Return the keypoints of a keyframe as they were found."""
-    keyframes, camera = stored.data.keyframes, stored.data.rig.rgb
-    rows = slice(keyframes.offsets[row], keyframes.offsets[row + 1])
-    return LocalFeatures(
-        xy=np.asarray(keyframes.xy[rows]),
-        descriptors=np.asarray(keyframes.descriptors[rows]).astype(np.float32),
-        score=np.asarray(keyframes.score[rows]).astype(np.float32),
-        size=(camera.width, camera.height),
-    )
+    camera = stored.data.rig.rgb
+    return local_features(stored.data.keyframes, row, (camera.width, camera.height))
 
 
 def thumbnail(stored: AVLMap, row: int) -> np.ndarray:

@@ -19,7 +19,7 @@ from avlmaps.core.columns import concat, take
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import from_rotation, inverse, mean_rotation, rotation_angle_rad, rotation_to_level
 from avlmaps.core.progress import progress
-from avlmaps.days.find import NEEDED, local_features, spread_out
+from avlmaps.days.find import NEEDED, features_of, spread_out
 from avlmaps.maps.corrected import Corrected, correct_map, require_submaps
 from avlmaps.query.avlmap import AVLMap, with_findings
 from avlmaps.query.locate import LocatableMap, LocateSettings, locate_features
@@ -247,7 +247,7 @@ def _closures(stored: AVLMap, poses: Float[np.ndarray, "k 4 4"]) -> tuple[Edges,
             continue
         tried += 1
         alike = earlier[np.argsort(-(place[earlier] @ place[row]), kind="stable")[:CANDIDATES]]
-        local = local_features(stored, row)
+        local = features_of(stored, row)
         for other in alike.tolist():
             there = replace(every, keyframes=keyframes.take(np.array([other])))
             chosen = LocateSettings(refine_focal=False)

@@ -23,8 +23,8 @@ from avlmaps.days import life as lives
 from avlmaps.days.evidence import THROUGH_VIEWS, Day, DayViews
 from avlmaps.days.find import (
     clock_s,
+    features_of,
     find_other,
-    local_features,
     require_another_drive,
     thumbnail,
     views_of,
@@ -402,7 +402,7 @@ def joined_keyframes(stored: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 
     ]
     encoder = stored.encoders.place
     state = stored.data.place_state
-    place = [encoder.encode(thumbnail(other, row), local_features(other, row), state) for row in range(len(new))]
+    place = [encoder.encode(thumbnail(other, row), features_of(other, row), state) for row in range(len(new))]
     turned = replace(
         new,
         stamp_s=np.asarray(new.stamp_s) + shift_s,

@@ -23,12 +23,13 @@ from avlmaps.maps.fusion.free_space import FreeViews, clean, count_where_it_matt
 from avlmaps.maps.fusion.sensor import NONE
 from avlmaps.maps.fusion.submaps import MovedSubmaps
 from avlmaps.maps.hearing import locate_sources
+from avlmaps.maps.keyframes.album import moved_keyframes
 from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.manifest import MapBounds, Removed, Timings, UpInfo
 from avlmaps.maps.store.map_data import Finds, MapData, encoders_of_map, find_nothing
 from avlmaps.maps.store.tables import lock_folder
-from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps
+from avlmaps.maps.types import HeardSounds, SourceEvidence, Submaps
 from avlmaps.recordings.types import Recording
 
 MOVED = "Its poses were corrected after it was built"
@@ -144,35 +145,14 @@ def _moved(data: MapData, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> 
     )  # fmt: skip
     if not kept.any():
         raise MapError("With the corrected poses every voxel is seen through or a speck; check the poses.")
-    keyframes = moved_keyframes(data.keyframes, np.asarray(submaps.stamp_s), now)
+    row = np.minimum(np.searchsorted(np.asarray(submaps.stamp_s), np.asarray(data.keyframes.stamp_s)), len(now) - 1)
+    keyframes = moved_keyframes(data.keyframes, now[row] @ inverse(np.asarray(data.keyframes.world_from_camera)))
     sounds = _replaced(data.sounds, WalkedTrack(np.asarray(submaps.stamp_s), now))
     content = replace(
         data, voxels=total.voxels(kept=kept), keyframes=keyframes, sounds=sounds, sources=None,
         submaps=replace(submaps, pose=now), findings={},
     )  # fmt: skip
     return content, Removed(**removed)
-
-
-def moved_keyframes(
-    keyframes: Keyframes, stamps_s: Float[np.ndarray, " f"], now: Float[np.ndarray, "f 4 4"]
-) -> Keyframes:
-    """Return keyframes at the poses that their frames have now."""
-    row = np.searchsorted(stamps_s, np.asarray(keyframes.stamp_s))
-    row = np.minimum(row, len(stamps_s) - 1)
-    pose = np.asarray(keyframes.world_from_camera, np.float64)
-    step = now[row] @ inverse(pose)
-    of_point = np.repeat(np.arange(len(keyframes)), np.diff(keyframes.offsets))
-    return replace(
-        keyframes,
-        world_from_camera=now[row],
-        centre=_apply(step, np.asarray(keyframes.centre)),
-        points_world=_apply(step[of_point], np.asarray(keyframes.points_world)),
-    )
-
-
-def _apply(step: Float[np.ndarray, "n 4 4"], points: np.ndarray) -> np.ndarray:
-    moved = np.einsum("nij,nj->ni", step[:, :3, :3], points.astype(np.float64)) + step[:, :3, 3]
-    return moved.astype(np.float32)
 
 
 def _replaced(sounds: HeardSounds, walk: WalkedTrack) -> HeardSounds:

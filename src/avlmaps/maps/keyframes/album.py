@@ -1,14 +1,14 @@
 """The keyframes of a map that is made: what is stored of each, and what its places are known by."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from avlmaps.core.arrays import Float, Float16, Float32, Int, UInt8
-from avlmaps.core.columns import offsets_of
+from avlmaps.core.arrays import Float, Float32, Int, UInt8
+from avlmaps.core.columns import concat
 from avlmaps.core.numbers import unmasked
 from avlmaps.core.poses import apply, inverse
 from avlmaps.core.progress import progress
@@ -23,113 +23,79 @@ from avlmaps.recordings.images import depth_in_colour
 from avlmaps.recordings.types import Frame, Recording
 
 
-@dataclass(frozen=True, slots=True)
-class DescribedKeyframe:
-    """All that the map stores of one keyframe.
-
-    Attributes:
-        stamp_s: when.
-        world_from_camera: pose of the depth camera.
-        centre: middle of what was seen, metres, world.
-        view: area feature; empty without a view encoder.
-        place: place descriptor; empty without a place encoder.
-        local: keypoints of the colour picture.
-        points_world: their 3D points, metres, NaN where there is no trustworthy depth.
-        thumbnail: a JPEG file.
-    """
-
-    stamp_s: float
-    world_from_camera: Float[np.ndarray, "4 4"]
-    centre: Float32[np.ndarray, "3"]
-    view: Float32[np.ndarray, " dv"]
-    place: Float32[np.ndarray, " dp"]
-    local: LocalFeatures
-    points_world: Float32[np.ndarray, "n 3"]
-    thumbnail: bytes
-
-
-def describe_keyframe(
-    frame: Frame, encoders: Encoders, settings: KeyframeSettings = DEFAULT_KEYFRAMES
-) -> DescribedKeyframe:
-    """Run encoders on one frame; its place is described later."""
+def describe_keyframe(frame: Frame, encoders: Encoders, settings: KeyframeSettings = DEFAULT_KEYFRAMES) -> Keyframes:
+    """Run encoders on one frame, and return it as the one keyframe of a map; its place is described later."""
     with perceiving("An encoder of keyframes", frame.name):
-        local = encoders.local.encode(frame.rgb.copy()) if Kind.LOCAL in encoders else _no_features()
-        local = replace(local, descriptors=local.descriptors.astype(np.float16).astype(np.float32))  # as it is stored
+        local = encoders.local.encode(frame.rgb.copy()) if Kind.LOCAL in encoders else _NOTHING
         view = np.zeros(0, np.float32)
         if Kind.VIEWS in encoders:
             (found,) = unmasked(encoders.views.encode([frame.copy()]))
             card = encoders.card(Kind.VIEWS)
             view = as_row(found, card.dim, f"The view encoder {card.id}", frame)
-    return DescribedKeyframe(
-        stamp_s=frame.stamp_s,
-        world_from_camera=frame.world_from_camera,
-        centre=middle_of_view(frame),
-        view=view,
-        place=np.zeros(0, np.float32),
-        local=local,
+    thumbnail = _thumbnail(frame.rgb, settings.thumbnail_width_px)
+    return replace(
+        NO_KEYFRAMES,
+        stamp_s=np.array([frame.stamp_s]),
+        world_from_camera=np.array(frame.world_from_camera, np.float64)[None],
+        centre=middle_of_view(frame)[None],
+        view=view[None],
+        place=np.zeros((1, 0), np.float32),
+        offsets=np.array([0, len(local.xy)]),
+        xy=local.xy.astype(np.float32),
+        descriptors=local.descriptors.astype(np.float16),
         points_world=lift_keypoints(local.xy, frame, settings.max_depth_m),
-        thumbnail=_thumbnail(frame.rgb, settings.thumbnail_width_px),
+        thumbnail_offsets=np.array([0, len(thumbnail)]),
+        thumbnails=thumbnail,
+        score=local.score.astype(np.float16),
     )
 
 
-def stack_keyframes(seen: Sequence[DescribedKeyframe]) -> Keyframes:
-    """Put keyframes, in the order of time, into the map's arrays."""
-    return Keyframes(
-        stamp_s=np.array([one.stamp_s for one in seen], np.float64),
-        world_from_camera=_stacked([one.world_from_camera for one in seen], (4, 4), np.float64),
-        centre=_stacked([one.centre for one in seen], (3,), np.float32),
-        view=_stacked([one.view for one in seen], (0,), np.float32),
-        place=_stacked([one.place for one in seen], (0,), np.float32),
-        offsets=offsets_of([len(one.local.xy) for one in seen]),
-        xy=_joined([one.local.xy for one in seen], (2,), np.float32),
-        descriptors=_joined([one.local.descriptors for one in seen], (0,), np.float16),
-        points_world=_joined([one.points_world for one in seen], (3,), np.float32),
-        thumbnail_offsets=offsets_of([len(one.thumbnail) for one in seen]),
-        thumbnails=np.frombuffer(b"".join(one.thumbnail for one in seen), np.uint8),
-        score=_scores([one.local for one in seen]),
+NO_KEYFRAMES = Keyframes(
+    stamp_s=np.zeros(0),
+    world_from_camera=np.zeros((0, 4, 4)),
+    centre=np.zeros((0, 3), np.float32),
+    view=np.zeros((0, 0), np.float32),
+    place=np.zeros((0, 0), np.float32),
+    offsets=np.zeros(1, np.int64),
+    xy=np.zeros((0, 2), np.float32),
+    descriptors=np.zeros((0, 0), np.float16),
+    points_world=np.zeros((0, 3), np.float32),
+    thumbnail_offsets=np.zeros(1, np.int64),
+    thumbnails=np.zeros(0, np.uint8),
+)
+"""Those of a map without pictures."""
+_NOTHING = LocalFeatures(NO_KEYFRAMES.xy, np.zeros((0, 0), np.float32))
+
+
+def local_features(keyframes: Keyframes, row: int, size: tuple[int, int]) -> LocalFeatures:
+    """Return the keypoints of a keyframe as they are stored; ``size`` is the width and height of the picture."""
+    rows = slice(int(keyframes.offsets[row]), int(keyframes.offsets[row + 1]))
+    descriptors, score = (np.asarray(column[rows], np.float32) for column in (keyframes.descriptors, keyframes.score))
+    return LocalFeatures(np.asarray(keyframes.xy[rows]), descriptors, size=size, score=score)
+
+
+def moved_keyframes(keyframes: Keyframes, motion: Float[np.ndarray, "k 4 4"]) -> Keyframes:
+    """Return keyframes after a motion of each, with what it saw."""
+    of_point = np.repeat(np.arange(len(keyframes)), np.diff(keyframes.offsets))
+    return replace(
+        keyframes,
+        world_from_camera=motion @ np.asarray(keyframes.world_from_camera),
+        centre=_applied(motion, keyframes.centre),
+        points_world=_applied(motion[of_point], keyframes.points_world),
     )
 
 
-def unstack_keyframes(stacked: Keyframes, size: tuple[int, int]) -> list[DescribedKeyframe]:
-    """Return the keyframes of a map's arrays, whose colour pictures have this width and height."""
-    found: list[DescribedKeyframe] = []
-    for row in range(len(stacked)):
-        own = slice(*(int(edge) for edge in stacked.offsets[row : row + 2]))
-        score = stacked.score[own].astype(np.float32) if len(stacked.score) else np.zeros(0, np.float32)
-        local = LocalFeatures(stacked.xy[own], stacked.descriptors[own].astype(np.float32), size=size, score=score)
-        found.append(
-            DescribedKeyframe(
-                float(stacked.stamp_s[row]), stacked.world_from_camera[row], stacked.centre[row], stacked.view[row],
-                stacked.place[row], local, stacked.points_world[own], stacked.jpeg(row).tobytes(),
-            )
-        )  # fmt: skip
-    return found
+def _applied(motion: Float[np.ndarray, "n 4 4"], points: Float32[np.ndarray, "n 3"]) -> Float32[np.ndarray, "n 3"]:
+    turned = np.einsum("nij,nj->ni", motion[:, :3, :3], np.asarray(points, np.float64))
+    return (turned + motion[:, :3, 3]).astype(np.float32)
 
 
-def _scores(local: Sequence[LocalFeatures]) -> Float16[np.ndarray, " m_or_0"]:
-    if any(len(one.score) != len(one.xy) for one in local):
-        return np.zeros(0, np.float16)
-    return _joined([one.score for one in local], (), np.float16)
-
-
-def _stacked(rows: Sequence[np.ndarray], shape: tuple[int, ...], dtype: type[np.generic]) -> np.ndarray:
-    return np.stack(rows).astype(dtype) if len(rows) else np.zeros((0, *shape), dtype)
-
-
-def _joined(pieces: Sequence[np.ndarray], shape: tuple[int, ...], dtype: type[np.generic]) -> np.ndarray:
-    return np.concatenate(pieces).astype(dtype) if len(pieces) else np.zeros((0, *shape), dtype)
-
-
-def _no_features() -> LocalFeatures:
-    return LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, 0), np.float32))
-
-
-def _thumbnail(rgb: UInt8[np.ndarray, "h w 3"], width_px: int) -> bytes:
+def _thumbnail(rgb: UInt8[np.ndarray, "h w 3"], width_px: int) -> UInt8[np.ndarray, " bytes"]:
     if rgb.shape[1] > width_px:
         size = (width_px, max(1, round(rgb.shape[0] * width_px / rgb.shape[1])))
         rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
     _, encoded = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 80])
-    return encoded.tobytes()
+    return encoded.reshape(-1)
 
 
 PATCH_PX = 5
@@ -196,9 +162,8 @@ def _patch_depth(xy: Float[np.ndarray, "n 2"], depth_m: Float32[np.ndarray, "h w
     return np.where(trusted, middle, np.nan)
 
 
-LEARN_FROM_KEYFRAMES = 64
-# What places are learnt from grows by this much before they are learnt again for a question.
-_GROWN = 1.25
+_LEARN_FROM = 64  # keyframes, spread evenly, that places are learnt from
+_GROWN = 1.25  # times as many, before they are learnt again for a question
 
 
 class KeyframeAlbum:
@@ -206,42 +171,45 @@ class KeyframeAlbum:
 
     def __init__(self, encoders: Encoders, settings: KeyframeSettings) -> None:
         self._encoders, self._settings = encoders, settings
-        self._seen: list[DescribedKeyframe] = []  # their places are in _places
+        self._parts: list[Keyframes] = []  # without places that are learnt
+        self._size = 0, 0  # of their pictures
         self._places: list[Float32[np.ndarray, " d"]] = []
+        self._has_places = Kind.PLACE in encoders and Kind.LOCAL in encoders
         self._learns: bool | None = None  # whether the place encoder learns from the map's keyframes
         self._state: dict[str, np.ndarray] = {}
         self._learnt_from = 0
         self._stacked: Keyframes | None = None
 
-    def __len__(self) -> int:
-        return len(self._seen)
-
     def add(self, frame: Frame) -> None:
         """Describe a frame."""
-        seen = describe_keyframe(frame, self._encoders, self._settings)
-        if Kind.PLACE in self._encoders and Kind.LOCAL in self._encoders:
+        seen, self._size = describe_keyframe(frame, self._encoders, self._settings), frame.rgb.shape[1::-1]
+        if self._has_places:
             with perceiving("The place encoder", frame.name):
-                encoder = self._encoders.place
+                encoder, local = self._encoders.place, local_features(seen, 0, self._size)
                 if self._learns is None:
-                    self._learns = bool(encoder.fit([seen.local], np.random.default_rng(0)))
+                    self._learns = bool(encoder.fit([local], np.random.default_rng(0)))
                 if not self._learns:
-                    seen = replace(seen, place=np.asarray(unmasked(encoder.encode(frame.rgb.copy(), seen.local, {}))))
-        self._seen.append(seen)
+                    place = np.asarray(unmasked(encoder.encode(frame.rgb.copy(), local, {})), np.float32)
+                    seen = replace(seen, place=place[None])
+        self._parts.append(seen)
         self._stacked = None
 
     def add_stacked(self, keyframes: Keyframes, size: tuple[int, int]) -> None:
         """Add keyframes that were described before; ``size`` is the width and height of their pictures."""
-        self._seen += unstack_keyframes(keyframes, size)
-        self._stacked = None
+        self._parts += [keyframes] if len(keyframes) else []
+        self._size, self._stacked = size, None
 
     def move(self, step: PoseCorrection) -> None:
         """Move the keyframes by a correction of their poses."""
-        self._seen = [_moved(one, step) for one in self._seen]
+        before = self.plain()
+        self._parts = [moved_keyframes(before, step.at(before.stamp_s))] if len(before) else []
         self._stacked = None
 
     def plain(self) -> Keyframes:
         """Return the keyframes without places that are learnt."""
-        return stack_keyframes(self._seen)
+        if len(self._parts) > 1:
+            self._parts = [concat(self._parts)]
+        return self._parts[0] if self._parts else NO_KEYFRAMES
 
     def keyframes(self, rng: np.random.Generator, *, final: bool = True) -> tuple[Keyframes, dict[str, np.ndarray]]:
         """Return the keyframes, and what places are known by: the same objects as before where nothing came.
@@ -250,26 +218,25 @@ class KeyframeAlbum:
             rng: for what the place encoder learns.
             final: learn places again; else only where enough has come since.
         """
-        known = final and self._learnt_from != len(self._seen)
-        if self._stacked is not None and not known:
-            return self._stacked, self._state
-        seen = self._seen
-        if Kind.PLACE in self._encoders and Kind.LOCAL in self._encoders and not (seen and len(seen[0].place)):
-            seen = [replace(one, place=place) for one, place in zip(seen, self._placed(rng, final), strict=True)]
-        self._stacked = stack_keyframes(seen)
+        plain = self.plain()
+        if self._stacked is None or (final and self._learnt_from != len(plain)):
+            if self._has_places and not plain.place.shape[1]:
+                self._learn(plain, rng, final)
+                plain = replace(plain, place=np.stack(self._places)) if self._places else plain
+            self._stacked = plain
         return self._stacked, self._state
 
-    def _placed(self, rng: np.random.Generator, final: bool) -> list[Float32[np.ndarray, " d"]]:
-        encoder, count = self._encoders.place, len(self._seen)
+    def _learn(self, plain: Keyframes, rng: np.random.Generator, final: bool) -> None:
+        encoder, count, size = self._encoders.place, len(plain), self._size
         with perceiving(f"The place encoder {encoder.card.id}", "the keyframes"):
             few = not self._learnt_from or count >= _GROWN * self._learnt_from
             if few or (final and count != self._learnt_from):
-                self._state = encoder.fit([self._seen[int(at)].local for at in learn_from(count)], rng)
-                self._learnt_from, self._places = count, []
-            for one in self._seen[len(self._places) :]:
-                found = encoder.encode(_picture(one), one.local, self._state)
+                spread = np.unique(np.linspace(0, count - 1, min(count, _LEARN_FROM)).round().astype(int))
+                some = [local_features(plain, at, size) for at in spread.tolist()]
+                self._state, self._learnt_from, self._places = encoder.fit(some, rng), count, []
+            for row in range(len(self._places), count):
+                found = encoder.encode(_picture(plain.jpeg(row), size), local_features(plain, row, size), self._state)
                 self._places.append(np.asarray(unmasked(found), np.float32))
-        return self._places
 
 
 def perceive_keyframes(
@@ -286,22 +253,7 @@ def perceive_keyframes(
     return album.keyframes(rng)
 
 
-def learn_from(keyframes: int) -> Int[np.ndarray, " k"]:
-    """Return the numbers of the keyframes that places are learnt from: up to 64, spread evenly."""
-    return np.unique(np.linspace(0, keyframes - 1, min(keyframes, LEARN_FROM_KEYFRAMES)).round().astype(int))
-
-
-def _picture(one: DescribedKeyframe) -> UInt8[np.ndarray, "h w 3"]:
-    small = cv2.imdecode(np.frombuffer(one.thumbnail, np.uint8), cv2.IMREAD_COLOR_RGB)
+def _picture(jpeg: UInt8[np.ndarray, " bytes"], size: tuple[int, int]) -> UInt8[np.ndarray, "h w 3"]:
+    small = cv2.imdecode(jpeg, cv2.IMREAD_COLOR_RGB)
     assert small is not None
-    return small if one.local.size in ((0, 0), small.shape[1::-1]) else cv2.resize(small, one.local.size)
-
-
-def _moved(one: DescribedKeyframe, step: PoseCorrection) -> DescribedKeyframe:
-    motion = step.at(np.array([one.stamp_s]))[0]
-    return replace(
-        one,
-        world_from_camera=motion @ one.world_from_camera,
-        centre=apply(motion, one.centre.astype(np.float64)).astype(np.float32),
-        points_world=apply(motion, one.points_world.astype(np.float64)).astype(np.float32),
-    )
+    return small if size == small.shape[1::-1] else cv2.resize(small, size)
