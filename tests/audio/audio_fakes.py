@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.audio import events
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.types import HeardSounds
@@ -63,7 +64,7 @@ def detect_events(walk: FakeWalk, encoder: SoundEncoder, settings: HearingSettin
     """Return the sounds of a walk's track."""
     if walk.audio is None:
         return events.collect([], encoder.card.dim)
-    walked = events.WalkedTrack(walk.stamps_s, walk.world_from_camera)
+    walked = Trajectory(walk.stamps_s, walk.world_from_camera)
     return events.detect_events(walk.audio, walked, encoder, settings, clips)
 
 

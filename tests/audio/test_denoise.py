@@ -4,10 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from audio_fakes import RATE_HZ, quiet, tone
-from hypothesis import given
-from hypothesis import strategies as st
 
-from avlmaps.maps.audio.background import NoiseProfile, denoise, denoise_blocks, is_swell, noise_profile
+from avlmaps.maps.audio.background import NoiseProfile, denoise, is_swell, noise_profile
 from avlmaps.recordings.audio import Sound
 from avlmaps_sim.mixing.background import background
 from avlmaps_sim.mixing.clips import amplify, audible_part, find_clips, loudness_db
@@ -44,16 +42,6 @@ def test_a_clean_sound_comes_out_as_it_went_in() -> None:
     np.testing.assert_allclose(denoise(sound, silent).samples, sound.samples, atol=1e-6)
 
 
-@given(count=st.integers(1, 20_000), cuts=st.lists(st.integers(0, 20_000), max_size=6))
-def test_how_it_is_cut_into_blocks_changes_nothing(count: int, cuts: list[int]) -> None:
-    samples = noise(2, "white")[:count]
-    at_once = denoise(Sound(samples, RATE_HZ), profile()).samples
-    pieces = [Sound(piece, RATE_HZ) for piece in np.split(samples, sorted(min(cut, count) for cut in cuts))]
-    joined = np.concatenate([block.samples for block in denoise_blocks(pieces, profile())])
-    assert len(at_once) == len(joined) == count
-    np.testing.assert_allclose(joined, at_once, atol=1e-6)
-
-
 def test_too_little_quiet_tells_nothing() -> None:
     assert noise_profile([]) is None
     assert noise_profile([Sound(noise(1, "white")[:1000], RATE_HZ)]) is None
@@ -65,11 +53,6 @@ def test_a_click_in_the_quiet_does_not_count() -> None:
     found, plain = noise_profile([Sound(clicked, RATE_HZ)]), profile("white")
     assert found is not None
     np.testing.assert_allclose(found.power, plain.power, rtol=0.25)
-
-
-def test_another_rate_than_the_profiles_is_refused() -> None:
-    with pytest.raises(ValueError, match="a block has 8000 samples a second, the profile is for 16000"):
-        denoise(Sound(quiet(1.0), 8_000), profile())
 
 
 @pytest.mark.shared

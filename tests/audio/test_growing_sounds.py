@@ -11,12 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError
-from avlmaps.maps.audio import events
-from avlmaps.maps.audio.background import PowerStream, band_powers
-from avlmaps.maps.audio.events import ENDED_S, GrowingSounds, detect_events
+from avlmaps.core.timeline import Trajectory
+from avlmaps.maps import hearing
+from avlmaps.maps.audio.events import detect_events
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.audio.settings import HearingSettings
+from avlmaps.maps.frame_sums import Walked
+from avlmaps.maps.hearing import ENDED_S, Hearing
 from avlmaps.maps.types import HeardSounds
+from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import GAP_S, ChannelSound, GrowingTrack, read_channels
 
@@ -43,11 +46,20 @@ def require_same(one: HeardSounds, other: HeardSounds) -> None:
     assert len(one.clips) == len(other.clips)
 
 
-def grown(cuts: list[int], samples: np.ndarray = SAMPLES) -> GrowingSounds:
-    sounds = GrowingSounds(FakeEncoder(), PLAIN)
-    for piece in np.split(samples, sorted(cuts)):
-        sounds.add(Sound(piece, RATE_HZ))
-    return sounds
+def ears() -> Hearing:
+    return Hearing(Encoders(sounds=FakeEncoder()), PLAIN, None, name_first=False)
+
+
+def add(sounds: Hearing, samples: np.ndarray) -> None:
+    sounds.add(Sound(samples, RATE_HZ), None, Walked())
+
+
+def walked(walk: FakeWalk) -> Trajectory:
+    return Trajectory(walk.stamps_s, walk.world_from_camera)
+
+
+def heard_by(sounds: Hearing, walk: FakeWalk) -> HeardSounds:
+    return sounds.sounds(walked(walk), final=False)
 
 
 @pytest.fixture(scope="module")
@@ -61,52 +73,44 @@ def test_however_the_track_is_cut_the_sounds_are_those_of_the_whole_track(
     track: AudioTrack, tmp_path_factory: pytest.TempPathFactory, cuts: list[int], asked: int
 ) -> None:
     walk = straight_walk(30.0, 0.3, track)
-    whole = detect_events(track, walk, FakeEncoder(), PLAIN, tmp_path_factory.mktemp("clips"))
-    sounds = GrowingSounds(FakeEncoder(), PLAIN)
+    whole = detect_events(track, walked(walk), FakeEncoder(), PLAIN, tmp_path_factory.mktemp("clips"))
+    sounds = ears()
     for number, piece in enumerate(np.split(SAMPLES, sorted(cuts))):
-        sounds.add(Sound(piece, RATE_HZ))
+        add(sounds, piece)
         if number == asked:
-            sounds.heard(walk)  # a question changes nothing
+            heard_by(sounds, walk)  # a question changes nothing
     assert sounds.track is not None
-    require_same(detect_events(sounds.track, walk, FakeEncoder(), PLAIN, tmp_path_factory.mktemp("clips")), whole)
+    require_same(sounds.sounds(walked(walk), final=True), whole)
     assert segment(sounds.track) == segment(track) and len(whole) == 4
 
 
-@given(cuts=st.lists(st.integers(0, len(SAMPLES)), max_size=20))
-def test_powers_do_not_depend_on_the_pieces(cuts: list[int]) -> None:
-    stream = PowerStream()
-    known = [stream.add(Sound(piece, RATE_HZ)) for piece in np.split(SAMPLES, sorted(cuts))]
-    streamed = np.concatenate([*known, stream.end()])
-    np.testing.assert_allclose(streamed, np.concatenate(list(band_powers([Sound(SAMPLES, RATE_HZ)]))), rtol=1e-4)
-
-
 def test_a_sound_is_listed_within_a_second_of_its_end() -> None:
-    walk, sounds, step = straight_walk(30.0, 0.3), GrowingSounds(FakeEncoder(), PLAIN), RATE_HZ // 2
+    walk, sounds, step = straight_walk(30.0, 0.3), ears(), RATE_HZ // 2
     listed: dict[int, float] = {}
     for at in range(0, len(SAMPLES), step):
-        sounds.add(Sound(SAMPLES[at : at + step], RATE_HZ))
-        heard = sounds.heard(walk)
+        add(sounds, SAMPLES[at : at + step])
+        heard = heard_by(sounds, walk)
         for number, end_s in enumerate((3.5, 10.0, 21.0)):
             if np.any(np.abs(heard.offset_s - end_s) < 0.1):
                 listed.setdefault(number, (at + step) / RATE_HZ - end_s)
     assert sorted(listed) == [0, 1, 2]  # the second, before the third tone made it longer
     assert all(ENDED_S <= late_s <= 1.0 for late_s in listed.values())
-    assert sounds.heard(walk).offset_s[1] == pytest.approx(11.0, abs=0.1)
+    assert heard_by(sounds, walk).offset_s[1] == pytest.approx(11.0, abs=0.1)
 
 
 @pytest.mark.nightly
 def test_the_window_of_a_long_track_moves_on_and_keeps_what_was_heard(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(events, "_WINDOW_S", 45.0)
+    monkeypatch.setattr(hearing, "_WINDOW_S", 45.0)
     samples = noisy(240.0, [(float(at), 0.5, 0.3) for at in range(5, 240, 10)])
-    walk, sounds, encoder = straight_walk(240.0, 0.1), GrowingSounds(FakeEncoder(), PLAIN), FakeEncoder()
+    walk, sounds = straight_walk(240.0, 0.1), ears()
     for at in range(0, len(samples), 5 * RATE_HZ):
-        sounds.add(Sound(samples[at : at + 5 * RATE_HZ], RATE_HZ))
-        live = sounds.heard(walk)
-    held_s = 0.01 * sum(map(len, sounds._powers))
-    assert held_s < 100.0 and len(live) == 24
-    whole = detect_events(track_of(tmp_path / "a.flac", samples), walk, encoder, PLAIN, tmp_path / "clips")
+        add(sounds, samples[at : at + 5 * RATE_HZ])
+        live = heard_by(sounds, walk)
+    assert sounds._window > 140 * RATE_HZ and len(live) == 24
+    track = track_of(tmp_path / "a.flac", samples)
+    whole = detect_events(track, walked(walk), FakeEncoder(), PLAIN, tmp_path / "clips")
     np.testing.assert_allclose(live.onset_s, whole.onset_s, atol=0.03)
 
 
@@ -201,8 +205,9 @@ def test_channels_stay_beside_one_another_however_the_track_is_cut(
     )
 
 
-def test_a_track_alone_on_a_walk_without_sounds_has_none(tmp_path: Path) -> None:
+def test_a_track_alone_on_a_walk_without_sounds_has_none() -> None:
     walk = FakeWalk(np.array([0.0, 1.0]), np.zeros((2, 3)))
-    assert len(GrowingSounds(FakeEncoder(), PLAIN).heard(walk)) == 0
-    silent = grown([], np.zeros(RATE_HZ, np.float32))
-    assert len(silent.heard(walk)) == 0
+    sounds = ears()
+    assert len(heard_by(sounds, walk)) == 0
+    add(sounds, np.zeros(RATE_HZ, np.float32))
+    assert len(heard_by(sounds, walk)) == 0

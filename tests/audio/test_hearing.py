@@ -27,7 +27,7 @@ def test_every_sound_has_its_time_its_places_its_feature_and_its_clip(tmp_path: 
         np.testing.assert_allclose(places[[0, -1], 0], 0.5 * np.array([heard.onset_s[i], heard.offset_s[i]]), atol=1e-5)
         written = AudioTrack.open(clip)
         assert written.duration_s == pytest.approx(heard.offset_s[i] - heard.onset_s[i], abs=1e-3)
-    assert heard.clips[0].name == "000001.970.flac"
+    assert heard.clips[0].name == "000001.970-3.030.flac"
     assert np.diff(heard.feature_offsets).tolist() == [1, 7]
     np.testing.assert_allclose(np.linalg.norm(heard.feature, axis=1), 1.0, atol=1e-6)
 
@@ -67,7 +67,7 @@ def test_sounds_outside_the_frames_get_the_nearest_place_and_a_notice(
 @given(onset=st.floats(-2.0, 6.0), length=st.floats(1e-3, 4.0))
 def test_there_is_always_a_place_and_it_is_on_the_walk(onset: float, length: float) -> None:
     walk = straight_walk(4.0, 0.5)
-    places = places_of(walk, Segment(onset, onset + length))
+    places = places_of(walk.walk, Segment(onset, onset + length))
     assert len(places) >= 1
     assert (np.diff(places[:, 0]) > 0).all()
     expected = 0.5 * np.clip([onset, onset + length], 0.0, 4.0)
@@ -75,7 +75,7 @@ def test_there_is_always_a_place_and_it_is_on_the_walk(onset: float, length: flo
 
 
 def test_a_robot_that_stands_still_hears_at_one_place(tmp_path: Path) -> None:
-    assert len(places_of(straight_walk(4.0, 0.0), Segment(1.0, 3.0))) == 1
+    assert len(places_of(straight_walk(4.0, 0.0).walk, Segment(1.0, 3.0))) == 1
 
 
 def test_noise_is_reduced_before_the_encoder_but_not_in_the_clip(tmp_path: Path) -> None:

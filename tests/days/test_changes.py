@@ -7,11 +7,12 @@ import msgspec
 import numpy as np
 import pytest
 
+from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
 from avlmaps.language.list_questions import Listed, read_list
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.life import Life, Stay
-from avlmaps.maps.store.manifest import CameraInfo, RecordingInfo, RigInfo, Visit
+from avlmaps.maps.store.manifest import RecordingInfo, RigInfo, Visit
 from avlmaps.query.changes import (
     Days,
     changes_answer,
@@ -28,7 +29,7 @@ from avlmaps.query.changes import (
 from avlmaps.query.goals import Goal
 from avlmaps.query.lists import lies
 
-CAMERA = CameraInfo(fx=1.0, fy=1.0, cx=0.5, cy=0.5, width=1, height=1)
+CAMERA = Pinhole(fx=1.0, fy=1.0, cx=0.5, cy=0.5, width=1, height=1)
 ROWS = tuple(tuple(float(value) for value in row) for row in np.eye(4))
 DATES = ("2026-11-23", "2026-11-24", "2026-11-26")
 

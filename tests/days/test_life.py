@@ -1,7 +1,6 @@
 """What became of things: matched, gone, unknown, new, moved."""
 
 from dataclasses import replace
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -123,26 +122,6 @@ def test_a_life_is_stored_whole_and_a_damaged_one_is_said() -> None:
         with pytest.raises(MapError, match="damaged"):
             read_life({**arrays, name: broken}, "life")
     assert msgspec.structs.replace(life.stays[0], name="person").is_person
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"confidence": 1.5}, "has a confidence of 1.5"),
-        ({"confidence": float("nan")}, "cannot be read|damaged"),
-        ({"position": (1e300, 0.0, 0.0)}, "the place of stay 0 .* is none"),
-        ({"first": 3}, "has visits"),
-        ({"gone": 7}, "has visits .* of 2"),
-        ({"moved_to": 9}, "moved to stay 9, which did not come from there"),
-        ({"moved_to": 0, "moved_from": 0}, "moved to stay 0"),
-        ({"moved_from": 1}, "moved from stay 1, which did not go there"),
-    ],
-)
-def test_a_stay_that_cannot_be_is_damage(change: dict[str, Any], words: str) -> None:
-    life = after(begun([thing()]), [thing(BOX + AWAY, "chair")], views(FRONT, MIDDLE, 4.0))
-    stays = (msgspec.structs.replace(life.stays[0], **change), *life.stays[1:])
-    with pytest.raises(MapError, match=words):
-        read_life(life_arrays(replace(life, stays=stays)), "life", 2)
 
 
 def test_each_day_that_looked_is_counted_and_no_other() -> None:

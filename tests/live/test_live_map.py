@@ -17,14 +17,13 @@ from live_frames import CAMERA, ENCODERS, EVERY, UP, Ones, add, frame, recorded,
 
 import avlmaps
 from avlmaps.core.errors import AudioError, BackendError, MapError, RecordingError
-from avlmaps.live import live_map
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import tell_doubts
-from avlmaps.live.status import LiveSettings, Tally
+from avlmaps.live.status import LiveSettings
 from avlmaps.maps.build import build_map
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.settings import BuildSettings, FrameSettings, GravitySettings
-from avlmaps.maps.sources.find import GrowingSources
+from avlmaps.maps.sources.find import SourceFinder
 from avlmaps.maps.store.folder import read
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.types import SourceEvidence
@@ -197,12 +196,13 @@ def test_a_fault_of_ours_ends_the_waiting_and_is_raised(tmp_path: Path) -> None:
 def test_maps_that_are_closed_at_any_moment_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(0)
 
-    def of_a_slow_thread(tally: Tally, what: str) -> int:
-        if threading.current_thread().name == "avlmaps-behind":
-            time.sleep(0.01)  # between two steps of the hand-over, where a map may be closed
-        return tally._counts[what]
+    show = LiveMap._show
 
-    monkeypatch.setattr(Tally, "of", of_a_slow_thread)
+    def slowly(live: LiveMap, *of: Any) -> None:
+        time.sleep(0.01)  # between two steps of the hand-over, where a map may be closed
+        show(live, *of)
+
+    monkeypatch.setattr(LiveMap, "_show", slowly)
     chosen = LiveSettings(gates=False, snapshot_s=0.0, save_s=1e9)
     settings = BuildSettings(frames=FrameSettings(per_part=10))
     few = avlmaps.Encoders()  # neither keyframes nor pixels: the threads do little else than hand over
@@ -279,15 +279,6 @@ def test_an_end_that_breaks_is_a_sentence_and_what_was_saved_stays(
     assert live.close().data.info.counts.frames == 3
 
 
-def test_a_process_does_not_end_while_questions_are_prepared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    prepares: list[threading.Thread] = []
-    monkeypatch.setattr(live_map, "_warm", lambda made: prepares.append(threading.current_thread()))
-    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=LiveSettings(first_frames=1, snapshot_s=0.0)) as live:
-        add(live, frame(0))
-        wait_for(lambda: len(prepares) == 1)
-    assert prepares[0].name == "avlmaps-warm" and not prepares[0].daemon
-
-
 def test_sounds_are_in_the_map_with_the_frames(tmp_path: Path) -> None:
     ears = avlmaps.Encoders.named("colours", sounds="embedded")
     samples = np.random.default_rng(0).normal(scale=1e-3, size=64_000).astype(np.float32)
@@ -301,9 +292,9 @@ def test_sounds_are_in_the_map_with_the_frames(tmp_path: Path) -> None:
 
 
 def test_a_sound_has_its_name_before_its_source_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    may_locate, locate = threading.Event(), GrowingSources.until_now
+    may_locate, locate = threading.Event(), SourceFinder.find_next
 
-    def located_when_it_may(self: GrowingSources, *args: Any) -> SourceEvidence | None:
+    def located_when_it_may(self: SourceFinder, *args: Any) -> SourceEvidence | None:
         may_locate.wait(20.0)
         return locate(self, *args)
 
@@ -315,7 +306,7 @@ def test_a_sound_has_its_name_before_its_source_is_found(tmp_path: Path, monkeyp
             time.sleep(0.01)
         raise AssertionError("no such snapshot was published")
 
-    monkeypatch.setattr(GrowingSources, "until_now", located_when_it_may)
+    monkeypatch.setattr(SourceFinder, "find_next", located_when_it_may)
     ears = avlmaps.Encoders.named("colours", sounds="embedded")
     rng = np.random.default_rng(0)
     source = rng.normal(scale=1e-3, size=64_100)
@@ -402,7 +393,6 @@ sys.path[:0] = {path!r}
 from live_frames import ENCODERS, UP, add, frame
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.status import LiveSettings
-from avlmaps.live.status import Tally
 chosen = LiveSettings(first_frames=2, snapshot_s=0.0, save_s=0.0, new_share=0.0)
 for folder in sys.argv[1:]:
     if process := os.fork():  # it has what was imported

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.question import Modality, Part, Role
-from avlmaps.maps.audio.events import WalkedTrack, detect_events
+from avlmaps.core.timeline import Trajectory
+from avlmaps.maps.audio.events import detect_events
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import HeardSounds
@@ -105,7 +106,7 @@ def as_a_map_cuts(sounds: Sequence[Sound], work: Path) -> tuple[list[Sound], np.
     track = clean + 0.1 * 10.0 ** (NOISE_DB / 20.0) * pink / pink.std()
     work.mkdir(parents=True, exist_ok=True)
     write_flac(work / "pieces.flac", Sound((0.5 * track).astype(np.float32), rate_hz))
-    still = WalkedTrack(np.array([0.0, at]), np.stack([np.eye(4)] * 2))
+    still = Trajectory(np.array([0.0, at]), np.stack([np.eye(4)] * 2))
     listener = Listener()
     heard = detect_events(
         AudioTrack.open(work / "pieces.flac"),
@@ -134,7 +135,7 @@ def walk_of(spec: str, recorded: Recorded, clips: Path | None, work: Path) -> Wa
     assert isinstance(track, Sound)
     file = work / f"{job.folder.name}.flac"
     write_flac(file, track)
-    walked = WalkedTrack(trip.stamps_s, trip.world_from_camera)
+    walked = Trajectory(trip.stamps_s, trip.world_from_camera)
     listener = Listener()
     heard = detect_events(
         AudioTrack.open(file),

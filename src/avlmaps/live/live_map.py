@@ -2,12 +2,12 @@
 
 Two threads work on one ``Mapper``. The caller's puts frames into a short queue. One fuses them. One works behind: it
 makes snapshots (keyframes are described there, sounds found and located), and saves them. A question uses the snapshot
-that there is; nothing that comes later changes it.
+that there is; nothing that comes later changes it. One lock, the door, is held for moments by all that comes.
 """
 
 import contextlib
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from dataclasses import replace
@@ -25,7 +25,7 @@ from avlmaps.core.files import lasting_path
 from avlmaps.core.numbers import as_number
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.live.pose_check import PoseCheck
-from avlmaps.live.status import LiveSettings, LiveStatus, Tally, memory_mb
+from avlmaps.live.status import LiveSettings, LiveStatus, memory_mb
 from avlmaps.maps.build import require_place
 from avlmaps.maps.hearing import device_of
 from avlmaps.maps.keyframes.choose import KeyframeSettings
@@ -102,8 +102,8 @@ def _points(frame: Frame, farthest_m: float) -> Float[np.ndarray, "n 3"]:
 # A keyframe takes as long as three frames; with gates there are half as many as in a build.
 SPARSE = BuildSettings(keyframes=KeyframeSettings(translation_m=0.2, rotation_deg=14.0))
 _STEP_S = 0.1
-_MOST_DOUBTS = 100
-_LISTEN_S = 0.25  # from one look for sounds that ended to the next
+_MOST_DOUBTS, _MOST_TIMES = 100, 5000
+_LISTEN_S = 0.4  # from one look for sounds that ended to the next
 _REST_S = 1.0  # between two snapshots, at most, where one takes longer than that
 
 _Correction = tuple[Any, Any, "Future[tuple[float, float]]"]  # stamps, poses, and what it did
@@ -182,11 +182,13 @@ class LiveMap:
         )  # fmt: skip
         if array is not None:
             self._mapper.hearing.place_microphones(array)
-        self._mapper.hearing.sources.known_rad = known_rad
+        self._mapper.hearing.known_rad = known_rad
         self._gates = Gates(self.settings, chosen.fusion.max_depth_m)
-        self._check, self._tally = PoseCheck(), Tally()
-        self._door, self._ears = Condition(), Lock()
-        # Under the door: what came and waits, and whether that ends.
+        self._check = PoseCheck()
+        self._counts, self._dropped = Counter[str](), Counter[str]()
+        self._took_ms = deque[float](maxlen=_MOST_TIMES)
+        # Under the door: sound, what came and waits, and whether that ends.
+        self._door = Condition()
         self._queue: deque[tuple[Frame, float]] = deque()
         self._to_correct: deque[_Correction] = deque()
         self._in_hand_s: float | None = None  # when the frame arrived that is being fused
@@ -243,16 +245,16 @@ class LiveMap:
                 stamp_s = 0.0 if self._last is None else self._last.stamp_s + _STEP_S
             try:
                 last = self._last
-                frame = given_frame(self._tally.of("came"), rgb, depth_m, camera, world_from_camera, stamp_s)
+                frame = given_frame(self._counts["came"], rgb, depth_m, camera, world_from_camera, stamp_s)
                 if last is not None:
                     frame = next_of(frame, last.stamp_s, last.rig)
             except RecordingError:
-                self._tally.note("refused")
+                self._counts["refused"] += 1
                 raise
-            self._tally.note("came")
+            self._counts["came"] += 1
             self._last = frame
             if len(self._queue) >= self.settings.most_waiting:
-                self._tally.drop("late")
+                self._dropped["late"] += 1
                 late = self._queue.popleft()[0]
                 self._mapper.pass_by(late.stamp_s, late.world_from_camera)
             self._queue.append((frame, arrived_s))
@@ -263,7 +265,7 @@ class LiveMap:
     @property
     def microphones(self) -> Microphones | None:
         """Where those of the sound's channels are; None where that is not known."""
-        return self._mapper.hearing.sources.microphones
+        return self._mapper.hearing.microphones
 
     def place_microphones(self, microphones: Any) -> None:
         """Say where the microphones are, where that was not known at the beginning.
@@ -278,7 +280,7 @@ class LiveMap:
         """
         self._require_open()
         array = given_microphones(microphones)
-        with self._ears:
+        with self._door:
             self._mapper.hearing.place_microphones(array)
 
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
@@ -316,12 +318,12 @@ class LiveMap:
 
     @contextlib.contextmanager
     def _hearing(self) -> Generator[None]:
-        self._require_open()
-        with self._ears:
+        with self._door:
+            self._require_open()
             try:
                 yield
             except (AudioError, RecordingError):
-                self._tally.note("refused")
+                self._counts["refused"] += 1
                 raise
 
     def correct_poses(self, stamps_s: Any, poses: Any) -> tuple[float, float]:
@@ -353,7 +355,7 @@ class LiveMap:
         snapshot = self._snapshot
         if snapshot is None:
             raise MapError(
-                f"The live map has no surface yet ({self._tally.of('came')} frames came); ask again in a moment."
+                f"The live map has no surface yet ({self._counts['came']} frames came); ask again in a moment."
             )
         return snapshot[0]
 
@@ -375,13 +377,13 @@ class LiveMap:
         """Return how the map fares."""
         snapshot, track, now_s = self._snapshot, self._mapper.hearing.came, time.perf_counter()
         counts = snapshot[0].data.info.counts if snapshot is not None else None
-        p50_ms, p95_ms = self._tally.quantiles_ms()
+        p50_ms, p95_ms = np.percentile(list(self._took_ms) or [np.nan], [50, 95]).tolist()
         return LiveStatus(
-            frames_in=self._tally.of("came"),
-            fused=self._tally.of("fused"),
-            encoded=self._tally.of("encoded"),
-            dropped=self._tally.dropped(),
-            refused=self._tally.of("refused"),
+            frames_in=self._counts["came"],
+            fused=self._counts["fused"],
+            encoded=self._counts["encoded"],
+            dropped=dict(self._dropped),
+            refused=self._counts["refused"],
             waiting=len(self._queue),
             frame_ms_p50=p50_ms,
             frame_ms_p95=p95_ms,
@@ -462,7 +464,7 @@ class LiveMap:
 
     def __len__(self) -> int:
         """Return how many frames are in the map."""
-        return self._tally.of("fused")
+        return self._counts["fused"]
 
     def __repr__(self) -> str:
         return f"LiveMap({self.path.name!r}: {self.status()})"
@@ -527,32 +529,31 @@ class LiveMap:
         mapper, number = self._mapper, self._mapper.next_index
         try:
             track = mapper.hearing.came
-            heard = (None, 0.0) if track is None else (track.end_s, track.gap_s)
-            for doubt in self._check.add(frame, *heard, arrived_s if self._is_pressed else None):
+            for doubt in self._check.add(frame, None if track is None else track.end_s):
                 self._doubt(doubt)
                 mapper.doubt(doubt)
             reason = self._gates.reason_against(frame, mapper) if self.settings.gates else None
             if reason is not None:
                 mapper.pass_by(frame.stamp_s, frame.world_from_camera)
-                self._tally.drop(reason)
+                self._dropped[reason] += 1
             else:  # the encoder takes most of the time: where another frame waits, this one adds its surface alone
                 encode = not (self.settings.gates and self._is_pressed and self._queue)
                 mapper.add(replace(frame, index=number, name=f"{number:06d}"), encode=encode)
                 self._came(arrived_s)
-                self._tally.note("fused")
+                self._counts["fused"] += 1
                 if encode:
-                    self._tally.note("encoded")
+                    self._counts["encoded"] += 1
         except BackendError as fault:
-            self._tally.drop("wrong")
+            self._dropped["wrong"] += 1
             self._fault = fault
             if mapper.next_index == number:  # else it waits, or was listed
                 mapper.leave_out(number, str(fault))
                 mapper.pass_by(frame.stamp_s, frame.world_from_camera)
         except AvlmapsError as fault:
-            self._tally.drop("wrong")
+            self._dropped["wrong"] += 1
             self._doubt(str(fault))
         self._in_hand_s = None
-        self._tally.took(time.perf_counter() - arrived_s)
+        self._took_ms.append(1e3 * (time.perf_counter() - arrived_s))
 
     def _correct(self) -> None:
         with self._door:
@@ -565,7 +566,7 @@ class LiveMap:
                 raise
             return
         self._came(time.perf_counter())
-        self._tally.note("corrected")
+        self._counts["corrected"] += 1
         self._check = PoseCheck()  # the next pose is of the corrected world, which is no jump
         answer.set_result(moved)
 
@@ -621,15 +622,10 @@ class LiveMap:
 
     def _show(self, data: MapData, came_s: float) -> None:
         made = AVLMap(data, self._mapper.encoders, path=IN_MEMORY, settings=self._query)
-        if self._generation:
-            _warm(made)
-        else:  # it loads and compiles what every question needs, which takes longer than the next snapshot may wait
-            # No daemon: a process that ends while one is in compiled code is aborted.
-            Thread(target=_warm, args=(made,), name="avlmaps-warm", daemon=False).start()
-        self._snapshot = made, came_s
-        self._generation += 1
-
-
-def _warm(made: AVLMap) -> None:
-    with contextlib.suppress(AvlmapsError):  # a profile without names, or a map too small for rooms
-        made.ask("the chair in the kitchen")
+        if is_first := not self._generation:  # it need not wait until what every question needs is loaded
+            self._snapshot, self._generation = (made, came_s), 1
+        with contextlib.suppress(AvlmapsError):  # a profile without names, or a map too small for rooms
+            made.ask("the chair in the kitchen")
+        if not is_first:
+            self._snapshot = made, came_s
+            self._generation += 1

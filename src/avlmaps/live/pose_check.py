@@ -1,12 +1,10 @@
-"""Whether what a robot sends fits together, as it drives: poses and pictures, stamps, depth and sound.
+"""Whether what a robot sends fits together, as it drives: poses and pictures, depth and sound.
 
 Frames of the last seconds are compared in pairs: the points of one must lie on the surface that the other sees. Two
 checks in a row that find otherwise are a doubt, so that one person who walks by is none.
 """
 
-from collections import deque
 from itertools import combinations
-from math import inf
 
 import numpy as np
 
@@ -33,11 +31,7 @@ _LEAST_AGREEING = 0.85
 MOST_M_S, MOST_RAD_S = 5.0, np.radians(540.0)
 _LEAST_MEASURED = 0.01  # of the pixels of a frame; where fewer have a depth, nothing of it comes into the map
 _WITHOUT_DEPTH_S, _WITHOUT_SOUND_S = 2.0, 10.0
-_SURE_S = 1.0  # of frames, until it is plain whether sound that is behind still comes
-# Frames that came at the pace of their stamps for 2 s, within 0.3 s and a share, come by the clock; one that is 5 s
-# earlier than any frame before has another. Frames that are read too slowly fall behind, and catch up in a pause.
-_IN_STEP_S, _LATE_S, _STEADY, _EARLY_S = 2.0, 0.3, 0.05, 5.0
-_ARRIVALS = 200
+_SURE = 10  # frames, until it is plain that sound that is behind does not still come
 
 
 class PoseCheck:
@@ -50,26 +44,17 @@ class PoseCheck:
         self._bad, self._in_doubt = 0, False
         self._skips: list[float] = []  # stamps before jumps of the stamps that follow one another
         self._depth_s: float | None = None  # when a frame last had a depth; None before, and where its lack was said
-        self._behind: tuple[float, float] | None = None  # frame and sound when that first was far behind
-        self._is_told = False  # that it is, was said
-        self._sounded: tuple[float, float, float] | None = None  # frame, sound and its gaps, the last time
-        self._arrivals: deque[tuple[float, float]] = deque(maxlen=_ARRIVALS)  # stamps, and when they came
-        self._least_late_s = inf  # of all that came by this clock: when they came, less their stamps
+        self._behind = 0  # frames, one after the other, to which the sound is far behind
 
-    def add(
-        self, frame: Frame, heard_s: float | None = None, gap_s: float = 0.0, arrived_s: float | None = None
-    ) -> tuple[str, ...]:
+    def add(self, frame: Frame, heard_s: float | None = None) -> tuple[str, ...]:
         """Take the next frame, and return a sentence for each thing that is in doubt from it on.
 
         Args:
             frame: the frame.
             heard_s: the end of the sound that came; None where none did.
-            gap_s: how much of that is silence between pieces.
-            arrived_s: when the frame came, by a clock that nobody sets; None where it does not come by the clock.
         """
-        at_s = frame.stamp_s
-        found = self._depth_of(frame), self._sound_at(at_s, heard_s, gap_s), self._clock_at(at_s, arrived_s)
-        return tuple(doubt for doubt in (*found, self._pose_of(frame)) if doubt is not None)
+        found = self._depth_of(frame), self._sound_at(frame.stamp_s, heard_s), self._pose_of(frame)
+        return tuple(doubt for doubt in found if doubt is not None)
 
     def _depth_of(self, frame: Frame) -> str | None:
         some = frame.depth_m[::4, ::4]
@@ -83,61 +68,15 @@ class PoseCheck:
             )
         return None
 
-    def _sound_at(self, stamp_s: float, heard_s: float | None, gap_s: float) -> str | None:
-        if heard_s is None:
-            return None
-        before, self._sounded = self._sounded, (stamp_s, heard_s, gap_s)
-        if stamp_s - heard_s < _WITHOUT_SOUND_S:
-            self._behind, self._is_told = None, False
-            return self._sound_ahead(before, self._sounded)
-        self._behind = self._behind or (stamp_s, heard_s)
-        since_s, then_s = self._behind
-        if self._is_told or stamp_s - since_s < _SURE_S:
-            return None
-        self._is_told = True
-        if heard_s == then_s:
-            return f"No sound came since {heard_s:.1f} s, while frames came to {stamp_s:.1f} s. Check the microphone."
-        return (
-            f"The sound is {stamp_s - heard_s:.0f} s behind the frames since {since_s:.1f} s, though it still comes: "
-            "the clock of one of them was set, or the microphone lost sound. Its sounds lie at wrong places from there "
-            "on; give both stamps of one clock."
-        )
-
-    def _sound_ahead(self, before: tuple[float, float, float] | None, now: tuple[float, float, float]) -> str | None:
-        if before is None or abs(before[1] - before[0]) >= _WITHOUT_SOUND_S:
-            return None
-        stamp_s, heard_s, skipped_s = *now[:2], now[2] - before[2]
-        if heard_s - stamp_s < _WITHOUT_SOUND_S or skipped_s < _WITHOUT_SOUND_S:
+    def _sound_at(self, stamp_s: float, heard_s: float | None) -> str | None:
+        behind = heard_s is not None and stamp_s - heard_s >= _WITHOUT_SOUND_S
+        self._behind = self._behind + 1 if behind else 0
+        if self._behind != _SURE:
             return None
         return (
-            f"The stamps of the sound skip {skipped_s:.0f} s at {stamp_s:.1f} s of the frames, which do not: its clock "
-            "was set. Its sounds lie at wrong places from there on; give both stamps of one clock."
+            f"No sound came since {heard_s:.1f} s, while frames came to {stamp_s:.1f} s. Check the microphone, and "
+            "that both have stamps of one clock."
         )
-
-    def _clock_at(self, stamp_s: float, arrived_s: float | None) -> str | None:
-        if arrived_s is None:
-            self._forget_arrivals()
-            return None
-        came = (stamp_s, arrived_s)
-        first, last = (self._arrivals[0], self._arrivals[-1]) if self._arrivals else (came, came)
-        early_s = self._least_late_s - (arrived_s - stamp_s)
-        self._arrivals.append(came)
-        self._least_late_s = min(self._least_late_s, arrived_s - stamp_s)
-        lasted_s, took_s = (b - a for a, b in zip(first, last, strict=True))
-        jump_s, passed_s = (b - a for a, b in zip(last, came, strict=True))
-        in_step = lasted_s >= _IN_STEP_S and abs(took_s - lasted_s) < _LATE_S + _STEADY * lasted_s
-        if not in_step or min(early_s, jump_s - passed_s) < _EARLY_S or jump_s > LONGEST_GAP_S:
-            return None
-        self._forget_arrivals()
-        return (
-            f"Stamps jump by {jump_s:.1f} s, from {last[0]:.1f} to {stamp_s:.1f} s, while {passed_s:.1f} s "
-            "passed: the clock of the frames was set. Sounds and days that are "
-            "looked up by time are wrong; let the robot set its clock before it drives."
-        )
-
-    def _forget_arrivals(self) -> None:
-        self._arrivals.clear()
-        self._least_late_s = inf
 
     def _pose_of(self, frame: Frame) -> str | None:
         jump = self._jump_to(frame)

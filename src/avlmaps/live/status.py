@@ -1,10 +1,8 @@
 """What can be chosen about a live map, and how it fares: what came, what was dropped and why, how long it took."""
 
 import os
-from collections import Counter, deque
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -105,47 +103,6 @@ class LiveStatus:
             f"({dropped or 'none'} dropped){took}; "
             f"{self.voxels} voxels, {self.keyframes} keyframes, {self.sounds} sounds; {self.memory_mb:.0f} MB"
         )
-
-
-class Tally:
-    """Counts of a live map; several threads write them."""
-
-    def __init__(self) -> None:
-        """Begin with nothing."""
-        self._lock = Lock()
-        self._counts: Counter[str] = Counter()
-        self._dropped: Counter[str] = Counter()
-        self._took_ms: deque[float] = deque(maxlen=5000)
-
-    def note(self, what: str) -> None:
-        """Count one of ``came``, ``fused``, ``refused`` and the like."""
-        with self._lock:
-            self._counts[what] += 1
-
-    def drop(self, reason: str) -> None:
-        """Count a frame that was dropped."""
-        with self._lock:
-            self._dropped[reason] += 1
-
-    def took(self, seconds: float) -> None:
-        """Note how long a frame took from its arrival."""
-        with self._lock:
-            self._took_ms.append(1e3 * seconds)
-
-    def of(self, what: str) -> int:
-        """Return a count."""
-        return self._counts[what]
-
-    def dropped(self) -> dict[str, int]:
-        """Return how many frames were dropped, by reason."""
-        with self._lock:
-            return dict(self._dropped)
-
-    def quantiles_ms(self) -> tuple[float, float]:
-        """Return the median and the 95 % quantile of a frame's time; NaN without frames."""
-        with self._lock:
-            took = list(self._took_ms)
-        return (float("nan"), float("nan")) if not took else tuple(np.percentile(took, [50, 95]).tolist())
 
 
 def memory_mb() -> float:

@@ -16,7 +16,7 @@ from avlmaps.core.poses import inverse
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
-from avlmaps.maps.audio.events import WalkedTrack, track_of
+from avlmaps.maps.audio.events import track_of
 from avlmaps.maps.audio.segmentation import Segment
 from avlmaps.maps.finish import carving_doubts
 from avlmaps.maps.fusion.free_space import FreeViews, clean, count_where_it_matters
@@ -29,7 +29,7 @@ from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.manifest import MapBounds, Removed, Timings, UpInfo
 from avlmaps.maps.store.map_data import Finds, MapData, encoders_of_map, find_nothing
 from avlmaps.maps.store.tables import lock_folder
-from avlmaps.maps.types import HeardSounds, SourceEvidence, Submaps
+from avlmaps.maps.types import HeardSounds, Submaps
 from avlmaps.recordings.types import Recording
 
 MOVED = "Its poses were corrected after it was built"
@@ -78,8 +78,10 @@ def correct_map(
     now = motion.moved(frames_s, last)
     with lock_folder(path), silence_progress(True):
         content, removed = _moved(data, submaps, now)
-        sources, sources_s = _sources(data, content, Trajectory(frames_s, now), motion.turn, recording)
-        content = replace(content, sources=sources)
+        if recording is not None:
+            voxel_m = data.grid.centre_of(np.asarray(content.voxels.index))
+            walk, up = Trajectory(frames_s, now), motion.turn @ data.up_in_world
+            content = replace(content, sources=locate_sources(recording.audio, walk, content.sounds, voxel_m, up))
         apart_m = np.linalg.norm(now[:, :3, 3] - np.asarray(submaps.fused_pose)[:, :3, 3], axis=1)
         median_m, most_m = float(np.median(apart_m)), float(apart_m.max())
         said = f"{MOVED}: frames moved by {median_m:.2f} m (median), {most_m:.2f} m at most."
@@ -98,25 +100,10 @@ def correct_map(
             doubts=(*kept, *doubts),
             notices=(*kept, *doubts, *others, said),
             timings=Timings(finished=finished, elapsed_s=info.timings.elapsed_s + elapsed_s,
-                            stages_s={**info.timings.stages_s, "correcting": elapsed_s, **sources_s}),
+                            stages_s={**info.timings.stages_s, "correcting": elapsed_s}),
         )  # fmt: skip
         write(path, finds(replace(content, info=info), encoders_of_map(info)))
     return Corrected(median_m, most_m, data.info.counts.voxels, count, perf_counter() - begin_s)
-
-
-def _sources(
-    data: MapData,
-    content: MapData,
-    walk: Trajectory,
-    turn: Float[np.ndarray, "3 3"],
-    recording: Recording | None,
-) -> tuple[SourceEvidence | None, dict[str, float]]:
-    if recording is None:
-        return None, {}
-    found, elapsed_s = locate_sources(
-        recording, turn @ data.up_in_world, content.sounds, content.voxels, data.grid, walk
-    )
-    return found, {} if found is None else {"sources": elapsed_s}
 
 
 def require_submaps(path: Path, data: MapData) -> Submaps:
@@ -147,7 +134,7 @@ def _moved(data: MapData, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> 
         raise MapError("With the corrected poses every voxel is seen through or a speck; check the poses.")
     row = np.minimum(np.searchsorted(np.asarray(submaps.stamp_s), np.asarray(data.keyframes.stamp_s)), len(now) - 1)
     keyframes = moved_keyframes(data.keyframes, now[row] @ inverse(np.asarray(data.keyframes.world_from_camera)))
-    sounds = _replaced(data.sounds, WalkedTrack(np.asarray(submaps.stamp_s), now))
+    sounds = _replaced(data.sounds, Trajectory(np.asarray(submaps.stamp_s), now))
     content = replace(
         data, voxels=total.voxels(kept=kept), keyframes=keyframes, sounds=sounds, sources=None,
         submaps=replace(submaps, pose=now), findings={},
@@ -155,7 +142,7 @@ def _moved(data: MapData, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> 
     return content, Removed(**removed)
 
 
-def _replaced(sounds: HeardSounds, walk: WalkedTrack) -> HeardSounds:
+def _replaced(sounds: HeardSounds, walk: Trajectory) -> HeardSounds:
     if not len(sounds):
         return sounds
     tracks = [

@@ -11,7 +11,6 @@ from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.progress import say
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
-from avlmaps.maps.audio.events import WalkedTrack
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.fusion.sensor import FRAMES, MODELS, SensorModel, measure_noise, nearest_model
 from avlmaps.maps.gravity.floor import Expected, FloorEvidence, FoundFloor, find_ground
@@ -73,10 +72,10 @@ def judge(recording: Recording, useless: Sequence[str] | None = None, *, closely
     return replace(verdict, findings=findings, unchecked=(*verdict.unchecked, *unsure) if not findings else ())
 
 
-def doubts_of_walk(walk: WalkedTrack, held: Recording) -> tuple[str, ...]:
+def doubts_of_walk(walk: Trajectory, held: Recording) -> tuple[str, ...]:
     """Return what is odd about poses and stamps, and about some frames beside one another."""
     names = [f"{stamp_s:.2f} s" for stamp_s in walk.stamps_s.tolist()]
-    found = plausible_walk(walk.stamps_s, walk.world_from_camera[:, :3, 3], names, strays_are="check the poses")
+    found = plausible_walk(walk.stamps_s, walk.world_from_body[:, :3, 3], names, strays_are="check the poses")
     odd = *found.notices, found.fault, pace_fault(walk.stamps_s, "frames"), *judge(held).sentences()
     return tuple(sentence for sentence in odd if sentence)
 

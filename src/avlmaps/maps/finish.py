@@ -2,25 +2,23 @@
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain
-from time import perf_counter
 
 import numpy as np
 
 from avlmaps.core.arrays import Float, Int
-from avlmaps.core.camera import Rig
+from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
-from avlmaps.core.version import __version__
+from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
-from avlmaps.maps.audio.events import WalkedTrack
 from avlmaps.maps.estimate import Start, ground_notices
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts, clean
+from avlmaps.maps.fusion.sensor import FusionSettings, SensorModel
 from avlmaps.maps.plan import strip_folder
-from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store import manifest
 from avlmaps.maps.store.map_data import GIVEN_FEATURES
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
@@ -38,72 +36,38 @@ _ROUNDING = 1e-3  # of float16
 _STOOD = 0.05  # metres, and entries of a rotation
 
 
-@dataclass(frozen=True, slots=True)
-class Merged:
-    """The voxels of the map, what was removed from them, and the seconds that it took."""
-
-    voxels: Voxels
-    sensor: manifest.SensorInfo
-    removed: manifest.Removed
-    elapsed_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class About:
-    """What a map says of where it comes from.
-
-    Attributes:
-        recording: what was recorded.
-        rig: its cameras.
-        has_sound: whether it has a sound track.
-        profile: which models perceive.
-        models: their cards, by module.
-        settings: all that was chosen.
-        key: hash of everything that went in.
-        doubts: what is odd about the recording, one sentence each.
-    """
-
-    recording: manifest.RecordingInfo
-    rig: Rig
-    has_sound: bool
-    profile: str
-    models: dict[str, manifest.ModelInfo]
-    settings: BuildSettings
-    key: str
-    doubts: tuple[str, ...]
-
-
 def surfaces(
     total: VoxelAccumulator,
     views: Sequence[FreeViews],
-    about: About,
-    sensor: manifest.SensorInfo,
+    camera: Pinhole,
+    fusion: FusionSettings,
+    sensor: SensorModel,
     counts: ThroughCounts | None = None,
-) -> Merged:
-    """Return the voxels of the sums that are a surface.
+) -> tuple[Voxels, manifest.Removed]:
+    """Return the voxels of the sums that are a surface, and how many are not.
 
     Args:
         total: the sums.
         views: where the frames saw freely; with ``counts`` one.
-        about: of the map.
-        sensor: the depth camera.
+        camera: of the depth.
+        fusion: how they were added up.
+        sensor: the error of the depth.
         counts: of the last time, of the same map with fewer frames.
     """
-    begin, grid, name, fusion = perf_counter(), total.grid, about.recording.name, about.settings.fusion
     if len(total) == 0:
-        farthest = min(fusion.max_depth_m, sensor.model.farthest_m(grid.voxel_size_m))
+        farthest = min(fusion.max_depth_m, sensor.farthest_m(total.grid.voxel_size_m))
         raise MapError(
-            f"No pixel of {name} has a depth between {fusion.min_depth_m} and {farthest:.4g} m, so that the map would "
-            "be empty; check the recording's depth scale."
+            f"No pixel has a depth between {fusion.min_depth_m} and {farthest:.4g} m, so that the map would be empty; "
+            "check the recording's depth scale."
         )
     count = None if counts is None else partial(counts.count, views=views[0])
-    kept, removed = clean(total.evidence(), views, about.rig.depth, grid, sensor.model, count)
+    kept, removed = clean(total.evidence(), views, camera, total.grid, sensor, count)
     if not kept.any():
         raise MapError(
-            f"Every voxel of {name} is seen through or a speck, so that the map would be empty; check its poses and "
-            f"its depth scale, or use every depth as it is ({option('sensor', 'none')})."
+            "Every voxel is seen through or a speck, so that the map would be empty; check the poses and the depth "
+            f"scale, or use every depth as it is ({option('sensor', 'none')})."
         )
-    return Merged(total.voxels(kept=kept), sensor, manifest.Removed(**removed), perf_counter() - begin)
+    return total.voxels(kept=kept), manifest.Removed(**removed)
 
 
 def with_clear_views(keyframes: Keyframes, views: Sequence[FreeViews]) -> Keyframes:
@@ -113,44 +77,6 @@ def with_clear_views(keyframes: Keyframes, views: Sequence[FreeViews]) -> Keyfra
     if not found or None in found:
         return keyframes
     return replace(keyframes, clear_mm=np.stack([part.clear_mm[row] for part, row in filter(None, found)]))
-
-
-def manifest_of(
-    about: About,
-    start: Start,
-    merged: Merged,
-    keyframes: Keyframes,
-    sounds: HeardSounds,
-    timings: manifest.Timings,
-    fused: int,
-    bad: Sequence[manifest.BadFrame] = (),
-) -> manifest.MapInfo:
-    """Return the content of ``map.json`` but for its list of files."""
-    voxels = merged.voxels
-    odd = feature_doubts(voxels, keyframes, sounds, about.models)
-    found = *carving_doubts(merged.removed, len(voxels)), *odd
-    doubts, voxel_size_m = (*about.doubts, *found), about.settings.voxel_size_m
-    return manifest.MapInfo(
-        avlmaps_version=__version__,
-        build_key=about.key,
-        voxel_size_m=voxel_size_m,
-        up=start.up,
-        ground=start.floors,
-        rig=manifest.RigInfo.of(about.rig),
-        profile=about.profile,
-        models=about.models,
-        settings=about.settings,
-        sensor=merged.sensor,
-        removed=merged.removed,
-        seed=about.settings.seed,
-        recording=about.recording,
-        counts=manifest.Counts.of(fused, keyframes, voxels, sounds),
-        bounding_box_m=manifest.MapBounds.of(voxels.index, voxel_size_m),
-        bad_frames=tuple(sorted(bad, key=lambda frame: frame.index)),
-        notices=(*doubts, *_notices(about, start.up, start.floors, fused, len(bad))),
-        doubts=doubts,
-        timings=timings,
-    )
 
 
 def recording_info(recording: Recording) -> manifest.RecordingInfo:
@@ -166,15 +92,15 @@ def recording_info(recording: Recording) -> manifest.RecordingInfo:
     )
 
 
-def walked_info(walk: WalkedTrack, fused: int, begins_s: float) -> manifest.RecordingInfo:
+def walked_info(walk: Trajectory, fused: int, begins_s: float) -> manifest.RecordingInfo:
     """Return what a map says of frames that came from no file."""
-    digest = hashlib.sha256(walk.stamps_s.tobytes() + walk.world_from_camera.tobytes()).hexdigest()
+    digest = hashlib.sha256(walk.stamps_s.tobytes() + walk.world_from_body.tobytes()).hexdigest()
     return manifest.RecordingInfo(
         name="the frames",
         format="memory",
         fingerprint=digest,
         frames=fused,
-        duration_s=float(np.ptp(walk.stamps_s)) if len(walk.stamps_s) else 0.0,
+        duration_s=float(np.ptp(walk.stamps_s)),
         begins_s=begins_s,
     )
 
@@ -186,15 +112,16 @@ def given_model(dim: int) -> manifest.ModelInfo:
     )
 
 
-def _notices(about: About, up: manifest.UpInfo, ground: manifest.GroundInfo, fused: int, bad: int) -> Iterator[str]:
-    if up.known_from == "camera":
+def notices(start: Start, fused: int, bad: int, *, has_sound: bool) -> Iterator[str]:
+    """Yield a sentence for each thing worth knowing that is no doubt."""
+    if start.up.known_from == "camera":
         yield "The up direction is a guess from how the camera was held: too little smooth surface is in view."
-    elif up.support < _GUESS:
-        yield f"The up direction is a guess: only {up.support:.0%} of the surface in view agrees with it."
-    yield from ground_notices(ground)
+    elif start.up.support < _GUESS:
+        yield f"The up direction is a guess: only {start.up.support:.0%} of the surface in view agrees with it."
+    yield from ground_notices(start.floors)
     if bad:
         yield f"{bad} of {fused + bad} frames were left out (bad_frames in map.json says why)."
-    if not about.has_sound:
+    if not has_sound:
         yield "The recording has no sound track, so that the map holds no sounds."
 
 

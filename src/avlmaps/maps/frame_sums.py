@@ -1,8 +1,8 @@
 """What some frames brought to a map: their sums, where they saw freely, their submap; and that in a folder."""
 
 from dataclasses import dataclass, field
+from operator import itemgetter
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import msgspec
@@ -13,7 +13,7 @@ from avlmaps.core.columns import concat
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.files import decode_json
 from avlmaps.core.registry import Kind
-from avlmaps.maps.audio.events import WalkedTrack
+from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector, FreeViews
 from avlmaps.maps.fusion.sensor import SensorModel
@@ -87,34 +87,29 @@ def bad_frames(file: Path, key: str) -> tuple[BadFrame, ...] | None:
 
 
 class Walked:
-    """Stamps and poses that become more, from several threads."""
+    """Stamps and poses that become more; one thread may add some while another reads them."""
 
     def __init__(self) -> None:
-        self._stamps_s, self._poses, self._count = np.zeros(64), np.zeros((64, 4, 4)), 0
-        self._lock = Lock()
+        self._walk: list[tuple[float, np.ndarray]] = []
+
+    @property
+    def stamps_s(self) -> Float[np.ndarray, " n"]:
+        """Those until now, in the order in which they came."""
+        return np.array([stamp_s for stamp_s, _ in list(self._walk)])
 
     def append(self, stamp_s: float, pose: Float[np.ndarray, "4 4"]) -> None:
         """Take note of one; a frame that was dropped may come a little late."""
-        with self._lock:
-            if self._count == len(self._stamps_s):
-                self._stamps_s = np.concatenate([self._stamps_s, np.zeros(self._count)])
-                self._poses = np.concatenate([self._poses, np.zeros((self._count, 4, 4))])
-            self._stamps_s[self._count], self._poses[self._count] = stamp_s, pose
-            self._count += 1
+        self._walk.append((stamp_s, np.array(pose, np.float64)))
 
-    def until_now(self) -> WalkedTrack:
-        """Return those until now, in the order of time."""
-        with self._lock:
-            order = np.argsort(self._stamps_s[: self._count], kind="stable")
-            return WalkedTrack(self._stamps_s[order], self._poses[order])
+    def until_now(self) -> Trajectory:
+        """Return those until now, at least one, in the order of time."""
+        stamps_s, poses = zip(*sorted(self._walk, key=itemgetter(0)), strict=True)
+        return Trajectory(np.array(stamps_s), np.stack(poses))
 
     def move(self, step: PoseCorrection) -> None:
         """Move all by a correction of the poses."""
         now = self.until_now()
-        self._stamps_s[: self._count], self._poses[: self._count] = (
-            now.stamps_s,
-            step.moved(now.stamps_s, now.world_from_camera),
-        )
+        self._walk = list(zip(now.stamps_s.tolist(), step.moved(now.stamps_s, now.world_from_body), strict=True))
 
 
 class HeldFrames:
@@ -143,18 +138,29 @@ class HeldFrames:
         self._held = [moved_frame(frame, step) for frame in self._held]
 
 
-_NONE = np.zeros((0, 1, 1), np.uint16)
-
-
 @dataclass(slots=True)
-class _Open:
+class Part:
+    """Some frames, all of one submap.
+
+    Attributes:
+        number: of the submap.
+        sums: of voxels.
+        views: where the frames saw freely.
+        stamps_s: of each frame.
+        poses: of each.
+    """
+
     number: int
     sums: VoxelAccumulator
+    views: FreeViewCollector
     stamps_s: list[float] = field(default_factory=list[float])
     poses: list[np.ndarray] = field(default_factory=list[np.ndarray])
 
     def submap(self) -> Submaps:
-        return submap_of(self.sums.sums(), np.array(self.stamps_s), np.stack(self.poses), _NONE)
+        """Return the submap, without what its frames saw freely."""
+        return submap_of(
+            self.sums.sums(), np.array(self.stamps_s), np.stack(self.poses), np.zeros((0, 1, 1), np.uint16)
+        )
 
 
 class SubmapBook:
@@ -162,18 +168,16 @@ class SubmapBook:
 
     def __init__(self) -> None:
         self._whole: list[Submaps] = []
-        self._open: _Open | None = None
+        self._open: Part | None = None
 
-    def add(
-        self, number: int, sums: VoxelSums, stamps_s: list[float], poses: list[np.ndarray], empty: VoxelAccumulator
-    ) -> None:
+    def add(self, part: Part, empty: VoxelAccumulator) -> None:
         """Add frames to the submap of a number, which begins in ``empty`` if it is another one than before."""
-        if self._open is None or self._open.number != number:
+        if self._open is None or self._open.number != part.number:
             self.close()
-            self._open = _Open(number, empty)
-        self._open.sums.merge(sums)
-        self._open.stamps_s += stamps_s
-        self._open.poses += poses
+            self._open = Part(part.number, empty, part.views)
+        self._open.sums.merge(part.sums.sums())
+        self._open.stamps_s += part.stamps_s
+        self._open.poses += part.poses
 
     def add_whole(self, submap: Submaps) -> None:
         """Add a submap that was made elsewhere."""
@@ -181,25 +185,13 @@ class SubmapBook:
 
     def close(self) -> None:
         """Let the next frames begin another submap."""
-        if self._open is not None:
-            self._whole.append(self._open.submap())
-            self._open = None
+        self._whole += [] if self._open is None else [self._open.submap()]
+        self._open = None
 
     def submaps(self) -> Submaps | None:
         """Return all, with the one that is not whole; None where there is none."""
         every = self._whole + ([] if self._open is None else [self._open.submap()])
         return concat(every) if every else None
-
-
-@dataclass(slots=True)
-class Part:
-    """Some frames, all of one submap."""
-
-    sums: VoxelAccumulator
-    views: FreeViewCollector
-    submap: int
-    stamps_s: list[float] = field(default_factory=list[float])
-    poses: list[np.ndarray] = field(default_factory=list[np.ndarray])
 
 
 class FrameSums:
@@ -229,7 +221,7 @@ class FrameSums:
         part.views.add(frame)
         part.stamps_s.append(frame.stamp_s)
         part.poses.append(np.array(frame.world_from_camera, np.float64))
-        self._submap = part.submap, part.sums.frames
+        self._submap = part.number, part.sums.frames
 
     def add_features(self, frame: Frame, features: np.ndarray, sensor: SensorModel) -> None:
         """Add the features of a frame that was added without."""
@@ -264,8 +256,8 @@ class FrameSums:
     def _part_for(self, frame: Frame, sensor: SensorModel) -> Part:
         per_submap = self._settings.frames.per_submap
         number = frame.index // per_submap if per_submap else 0
-        if not self._parts or self._parts[-1].submap != number:
+        if not self._parts or self._parts[-1].number != number:
             sums = self.empty(sensor)
             sums.frames = self._submap[1] if self._submap[0] == number else 0
-            self._parts.append(Part(sums, FreeViewCollector(frame.rig.depth, sensor), number))
+            self._parts.append(Part(number, sums, FreeViewCollector(frame.rig.depth, sensor)))
         return self._parts[-1]

@@ -7,7 +7,6 @@ from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from shutil import rmtree
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -17,41 +16,43 @@ from avlmaps.core.errors import AudioError, MapError, RecordingError
 from avlmaps.core.numbers import as_number
 from avlmaps.core.registry import Kind
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.audio.events import GrowingSounds, WalkedTrack, collect, detect_events
+from avlmaps.maps.audio.background import hop_samples
+from avlmaps.maps.audio.events import SoundFinder, StoredSound, collect, detect_events
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.estimate import doubts_of_channels
-from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.sources.find import AT_ONCE, GrowingSources, require_fit
+from avlmaps.maps.frame_sums import Walked
+from avlmaps.maps.sources.find import SourceFinder, find_sources, require_fit
 from avlmaps.maps.store.folder import read
-from avlmaps.maps.types import HeardSounds, SourceEvidence, Voxels
+from avlmaps.maps.types import HeardSounds, SourceEvidence
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.channels import LONGEST_GAP_S, ChannelSound, GrowingTrack, level_faults
+from avlmaps.recordings.channels import LONGEST_GAP_S, ChannelSound, GrowingTrack, RawTrack, level_faults
 from avlmaps.recordings.directions import DirectionTrack
 from avlmaps.recordings.microphones import Microphones
 from avlmaps.recordings.plausible import date_fault
 from avlmaps.recordings.types import Recording
 
+ENDED_S = 0.25
+"""A sound is over when it has been quiet for this long; if it continues soon, it becomes longer."""
+# The last stretch of this length is segmented again each time: the background's window, and some more.
+_WINDOW_S = 60.0
+
 
 def locate_sources(
-    recording: Recording,
-    up_in_world: Float[np.ndarray, "3"],
+    track: AudioTrack | None,
+    walk: Trajectory,
     heard: HeardSounds,
-    voxels: Voxels,
-    grid: GridSpec,
-    walk: Trajectory | None = None,
-) -> tuple[SourceEvidence | None, float]:
-    """Return the evidence of each sound over the surfaces of a map, and the seconds that took; None without any."""
-    begin = perf_counter()
-    track = recording.audio
-    if track is None or (track.microphones is None and track.directions is None) or not len(heard):
-        return None, 0.0
-    from avlmaps.maps.sources.find import find_sources
+    voxel_m: Float[np.ndarray, "n 3"],
+    up_in_world: Float[np.ndarray, "3"],
+) -> SourceEvidence | None:
+    """Return the evidence of each sound over the surfaces of a map; None where nothing says where sounds come from."""
+    if track is None or not len(heard):
+        return None
+    return find_sources(track, walk, _spans(heard), voxel_m, up_in_world)
 
-    spans_s = list(zip(heard.onset_s.tolist(), heard.offset_s.tolist(), strict=True))
-    voxel_m = grid.centre_of(np.asarray(voxels.index))
-    found = find_sources(track, walk or recording.walk, spans_s, voxel_m, up_in_world)
-    return found, perf_counter() - begin
+
+def _spans(heard: HeardSounds) -> list[tuple[float, float]]:
+    return list(zip(heard.onset_s.tolist(), heard.offset_s.tolist(), strict=True))
 
 
 def open_with_device(reopen: Callable[[], Recording], path: Path) -> Recording:
@@ -81,9 +82,16 @@ def device_of(path: Path | str) -> tuple[float, float]:
 class Hearing:
     """Takes sound and what devices say of it. One thread may add sound while another asks.
 
+    No cut of a track that grows is final, as its background is measured from what comes before and after. So until the
+    end the last minutes are segmented again each time, as if the track ended now; what is older stays. At the end the
+    whole track is heard by the same functions.
+
     Attributes:
         whole: the sound of a recording, which comes as a whole; None where it comes piece by piece.
-        sources: what is known of the microphones, and of where sounds came from.
+        came: the track that came until now, None without one.
+        microphones: one for each channel; None where they are not known.
+        known_rad: of the device that says directions, as ``DirectionTrack.known_rad``.
+        sources: where sounds came from, as far as that was looked for.
     """
 
     def __init__(
@@ -97,68 +105,93 @@ class Hearing:
             whole: the sound of a recording.
             name_first: a sound has its name in one snapshot, and its place in a later one.
         """
-        self.whole, self.sources = whole, GrowingSources(AT_ONCE if name_first else None)
+        self.whole, self.came = whole, None if whole is not None else GrowingTrack(self._folder() / "track.f32")
+        self.microphones: Microphones | None = None
+        self.known_rad: tuple[float, float] | None = None
+        self.sources = SourceFinder(1 if name_first else None)
         self._encoders, self._settings, self._name_first = encoders, settings, name_first
-        self._sounds: GrowingSounds | None = None
+        self._said: DirectionTrack | None = None
+        self._said_wrong = ""
+        self._finder: SoundFinder | None = None
+        self._old: list[StoredSound] = []
+        self._window = 0  # the sample at which it begins
         self._heard: HeardSounds | None = None
         self._named = 0
 
-    @property
-    def came(self) -> GrowingTrack | None:
-        """The track that came until now, None without one."""
-        return None if self._sounds is None else self._sounds.growing
+    def _folder(self) -> Path:
+        folder = Path(tempfile.mkdtemp(prefix="avlmaps-sound-"))
+        weakref.finalize(self, rmtree, folder, ignore_errors=True)
+        return folder
 
     @property
     def track(self) -> AudioTrack | None:
         """The sound until now."""
-        return self.whole if self.whole is not None or self._sounds is None else self._sounds.track
+        return self.whole if self.came is None else self.came.track
 
     def place_microphones(self, microphones: Microphones) -> None:
         """Say where the microphones of the channels are, before the first piece of sound."""
-        if self._sounds is not None:
+        if self.track is not None:
             raise AudioError("Sound came before its microphones were described; describe them before the first piece.")
-        self.sources.microphones = microphones
+        self.microphones = microphones
 
-    def add(self, chunk: Any, stamp_s: Any, walk: Callable[[], WalkedTrack]) -> None:
+    def add(self, chunk: Any, stamp_s: Any, walk: Walked) -> None:
         """Add a piece of sound; see ``GrowingTrack.add``.
 
         Several channels become one, their mean, where nobody said where their microphones are, as in a build.
         """
+        assert self.came is not None
         if isinstance(chunk, ChannelSound):
-            require_fit(self.sources.microphones, len(chunk.samples))
-            if self.sources.microphones is None:
+            require_fit(self.microphones, len(chunk.samples))
+            if self.microphones is None:
                 chunk = Sound(chunk.samples.mean(axis=0), chunk.rate_hz)
-        if self.came is None or self.came.end_s is None:
-            _require_clock(walk().stamps_s, as_number(stamp_s))
-        if self._sounds is None:
-            encoder = self._encoders.sounds if Kind.SOUNDS in self._encoders else None
-            self._sounds = GrowingSounds(encoder, self._settings)
-        self._sounds.add(chunk, stamp_s)
+        if self.came.end_s is None:
+            _require_clock(walk.stamps_s, as_number(stamp_s))
+        self.came.add(chunk, stamp_s)
 
     def add_directions(self, said: DirectionTrack) -> None:
         """Add what a device said of where sounds come from, in the order of time."""
-        self.sources.add_directions(said)
+        last_s = float("-inf") if self._said is None else float(self._said.stamp_s[-1])
+        if not len(said):
+            return
+        if said.stamp_s[0] <= last_s:
+            raise RecordingError(
+                f"A direction has the stamp {said.stamp_s[0]:.3f} s, and one of {last_s:.3f} s came before: it is "
+                "repeated or out of order, and was left out."
+            )
+        self._said = said if self._said is None else DirectionTrack.joined([self._said, said])
 
     def forget(self) -> None:
         """Place every sound again: the poses have changed."""
         self._heard = None
         self.sources.forget()
 
-    def sounds(self, walk: WalkedTrack, *, final: bool) -> HeardSounds:
+    def sounds(self, walk: Trajectory, *, final: bool) -> HeardSounds:
         """Return the sounds that are over, or all of them as a build finds them."""
         track, has_encoder = self.track, Kind.SOUNDS in self._encoders
         dim = self._encoders.card(Kind.SOUNDS).dim if has_encoder else 0
-        if track is None or not has_encoder or not len(walk.stamps_s):
+        if track is None or not has_encoder:
             return collect([], dim)
         if final:
-            folder = Path(tempfile.mkdtemp(prefix="avlmaps-sounds-"))
-            weakref.finalize(self, rmtree, folder, ignore_errors=True)
-            return detect_events(track, walk, self._encoders.sounds, self._settings, folder)
-        assert self._sounds is not None
-        heard = self._sounds.heard(walk)
+            return detect_events(track, walk, self._encoders.sounds, self._settings, self._folder())
+        heard = collect(self._until_now(track, walk), dim)
         if self._heard is None or not np.array_equal(heard.offset_s, self._heard.offset_s):
             self._heard = heard  # else the arrays are those of before
         return self._heard
+
+    def _until_now(self, track: AudioTrack, walk: Trajectory) -> list[StoredSound]:
+        assert isinstance(track, RawTrack)
+        self._finder = self._finder or SoundFinder(self._encoders.sounds, self._settings, self._folder())
+        recent = track.since(self._window)
+        pieces, before = self._finder.find(recent, walk, track.end_s - ENDED_S), list(self._old)
+        if recent.duration_s > 2.0 * _WINDOW_S:
+            begin_s = track.end_s - _WINDOW_S
+            left = [one for one in pieces if one.segment.offset_s >= begin_s]
+            self._old += pieces[: len(pieces) - len(left)]
+            if left:
+                begin_s = min(begin_s, left[0].segment.onset_s - self._settings.segmentation.padding_s)
+            hop = hop_samples(track.rate_hz)  # so that the steps of the powers stay where they are
+            self._window = max(self._window, int((begin_s - track.start_s) * track.rate_hz) // hop * hop)
+        return [*before, *pieces]
 
     def located(
         self,
@@ -170,33 +203,33 @@ class Hearing:
         final: bool,
     ) -> SourceEvidence | None:
         """Return where sounds came from, as far as that is known by now, or at the end."""
-        track = self._placed()
+        track = self.placed_track()
         if track is None or not len(sounds):
             return None
-        spans_s = list(zip(sounds.onset_s.tolist(), sounds.offset_s.tolist(), strict=True))
         if final:
-            return self.sources.at_the_end(track, walk, spans_s, voxel_m(), up_in_world)
-        known, named = self.sources.known(spans_s), self._named
-        self._named = len(sounds)
+            self.sources.waiting = 0
+            return locate_sources(track, walk, sounds, voxel_m(), up_in_world)
+        spans_s, named = _spans(sounds), self._named
+        known, self._named = self.sources.known(spans_s), len(sounds)
         if not self.sources.waiting or (self._name_first and named != len(sounds)):
             return known
-        return self.sources.until_now(track, walk, spans_s, voxel_m(), up_in_world)
+        return self.sources.find_next(track, walk, spans_s, voxel_m(), up_in_world)
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """What is left out of the evidence of sources, and why."""
-        microphones = self.sources.microphones
+        microphones = self.microphones
         few = (
             f"The sound has one channel, and {len(microphones)} microphones are described; where sounds came from is "
             "not known: give all channels (avlmaps.ChannelSound)."
             if self.came is not None and self.came.channels == 1 and microphones is not None and len(microphones) > 1
             else ""
         )
-        return tuple(one for one in (few, self.sources.doubt) if one)
+        return tuple(one for one in (few, self._said_wrong) if one)
 
     def doubts_at_the_end(self, walk: Trajectory) -> tuple[str, ...]:
         """Check the sound, and the channels of an array along the whole drive, as a build does."""
-        track = self._placed()
+        track = self.placed_track()
         if track is not None and track.microphones is not None and len(track.microphones) > 1:
             return doubts_of_channels(track, walk, "the sound")
         if self.came is None or self.came.track is None or self.came.gaps:  # silence fills gaps
@@ -204,11 +237,20 @@ class Hearing:
         silent, _ = level_faults(self.came.track, "The sound")
         return tuple(f"{one} Check the microphone: nothing that sounded then is in the map." for one in silent)
 
-    def _placed(self) -> AudioTrack | None:
-        if self.whole is not None:
-            return None if self.whole.microphones is None and self.whole.directions is None else self.whole
-        raw = None if self._sounds is None else self._sounds.track
-        return None if raw is None else self.sources.track(raw, raw.channels)
+    def placed_track(self) -> AudioTrack | None:
+        """Return the sound with what says where it comes from; None where nothing does."""
+        heard, array, said = self.track, self.microphones, self._said
+        if self.whole is not None or heard is None:
+            return self.whole
+        try:
+            if said is not None:
+                said.require_beside(heard.start_s, heard.end_s, "What the device said")
+                said = replace(said, known_rad=self.known_rad)
+            self._said_wrong = ""
+        except RecordingError as fault:
+            said, self._said_wrong = None, self._said_wrong or str(fault)  # its numbers change with every piece
+        placed = array if array is not None and self.came is not None and len(array) == self.came.channels else None
+        return None if placed is None and said is None else replace(heard, microphones=placed, directions=said)
 
 
 def _require_clock(came_s: Float[np.ndarray, " n"], at_s: float | None) -> None:

@@ -19,14 +19,13 @@ from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.registry import Kind
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.audio.events import WalkedTrack
+from avlmaps.core.version import __version__
 from avlmaps.maps.estimate import Start, doubts_of_walk, estimate_ground, estimate_up
 from avlmaps.maps.finish import (
-    About,
-    Merged,
+    carving_doubts,
     feature_doubts,
     given_model,
-    manifest_of,
+    notices,
     recording_info,
     surfaces,
     walked_info,
@@ -44,17 +43,16 @@ from avlmaps.maps.perceived import encode_pixels, require_unit
 from avlmaps.maps.plan import BUILD_VERSION, models_of
 from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings
-from avlmaps.maps.store.manifest import BadFrame, Timings
+from avlmaps.maps.store.manifest import BadFrame, Counts, MapBounds, MapInfo, Removed, RigInfo, Timings
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.tables import key_of
-from avlmaps.maps.types import Submaps
+from avlmaps.maps.types import Submaps, Voxels
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.memory import next_of
 from avlmaps.recordings.types import Frame, Recording
 
 _PLACES = 2  # number of what learns places as a source of randomness (gravity has 1)
 _MOST_DOUBTS = 5
-_MOST_UNDESCRIBED = 8  # keyframes that wait for the thread behind
 
 
 class Mapper:
@@ -95,7 +93,7 @@ class Mapper:
         self._up, self._begins_s, self._behind = up_in_world, begins_s, behind
         self._wait = min(first_frames or settings.gravity.frames, settings.gravity.frames)
         self._recording: Recording | None = None
-        self._key, self._doubts = "", tuple[str, ...]()
+        self._key = ""
         self.began_s = perf_counter()
         # What the thread that adds frames writes, under ``_adding``.
         self._adding = RLock()
@@ -109,14 +107,14 @@ class Mapper:
         self._is_due = False  # a frame that was to be a keyframe was left out
         self._undescribed: list[Frame] = []
         self._left_out: list[BadFrame] = []
-        # What a snapshot writes, under ``finishing``; a table is read by gates, under ``_merging``.
-        self.finishing, self._merging, self._looking = RLock(), RLock(), RLock()  # the last one: at keyframes
+        # What a snapshot writes, under ``_finishing``, which it holds for seconds; frames are added meanwhile.
+        self._finishing = RLock()
         self._whole: VoxelAccumulator | None = None
         self._views: list[FreeViews] = []
         self._fused, self._stamps_s, self._poses = 0, list[float](), list[np.ndarray]()
         self._book = SubmapBook()
         self._album = KeyframeAlbum(encoders, self.settings.keyframes)
-        self._surfaces: Merged | None = None
+        self._surfaces: tuple[Voxels, Removed] | None = None
         self._through: ThroughCounts | None = None
         # How many frames had come when up and the floor were last found, and when contradictions were last looked for.
         self._looked_at = self._checked = 0
@@ -143,7 +141,7 @@ class Mapper:
         """
         mapper = cls(settings, encoders, recording.up_in_world, begins_s=recording.begins_s)
         mapper._recording, mapper._rig, mapper.start = recording, recording.rig, start
-        mapper._chosen, mapper._key, mapper._doubts = keyframes, key, doubts
+        mapper._chosen, mapper._key, mapper._told = keyframes, key, list(doubts)
         mapper.hearing = Hearing(encoders, mapper.settings.hearing, recording.audio, name_first=False)
         return mapper
 
@@ -199,8 +197,8 @@ class Mapper:
             else:
                 self._fuse(frame, features, encode)
                 self._came(frame)
-        if len(self._undescribed) > (_MOST_UNDESCRIBED if self._behind else 0):
-            self._describe()  # else frames that come faster than keyframes are looked at would pile up
+        if not self._behind:
+            self._describe()
 
     def pass_by(self, stamp_s: float, world_from_camera: Float[np.ndarray, "4 4"]) -> None:
         """Take note of where the robot was in a frame that is not added: sounds are placed by it."""
@@ -233,7 +231,7 @@ class Mapper:
 
     def views_at(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
         """Return how many frames have a pixel in each of some voxels."""
-        with self._merging:
+        with self._adding:
             views = self._sums.views_at(index)
             return views if self._whole is None else views + self._whole.views_at(index)
 
@@ -275,13 +273,13 @@ class Mapper:
 
     def add_sound(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of sound; see ``Hearing.add``. Another thread may do it."""
-        self.hearing.add(chunk, stamp_s, self._walked.until_now)
+        self.hearing.add(chunk, stamp_s, self._walked)
 
     # States
 
     def state(self) -> MapState:
         """Return what the frames brought that came."""
-        with self.finishing:
+        with self._finishing:
             self._absorb()
             assert self.start is not None
             whole = self._whole if self._whole is not None else self._sums.empty(self.start.sensor.model)
@@ -308,24 +306,21 @@ class Mapper:
             self._book.add_whole(submap_of(state.sums, state.stamp_s, state.pose, np.asarray(state.views.clear_mm)))
 
     def _describe(self) -> None:
-        with self._looking:
+        with self._finishing:
             for _ in range(len(self._undescribed)):
                 self._album.add(self._undescribed.pop(0))
 
     def _absorb(self) -> None:
         with self._adding:
-            parts = self._sums.take()
-        for part in parts:
-            assert self.start is not None
-            self._surfaces = None
-            self._views.append(part.views.views())
-            self._stamps_s += part.stamps_s
-            self._poses += part.poses
-            self._fused += len(part.stamps_s)
-            if self._recording is None and self.settings.frames.per_submap:
-                sums = part.sums.sums()
-                self._book.add(part.submap, sums, part.stamps_s, part.poses, self._sums.empty(self.start.sensor.model))
-            with self._merging:
+            for part in self._sums.take():
+                assert self.start is not None
+                self._surfaces = None
+                self._views.append(part.views.views())
+                self._stamps_s += part.stamps_s
+                self._poses += part.poses
+                self._fused += len(part.stamps_s)
+                if self._recording is None and self.settings.frames.per_submap:
+                    self._book.add(part, self._sums.empty(self.start.sensor.model))
                 if self._whole is None:
                     self._whole = part.sums
                 else:
@@ -342,7 +337,7 @@ class Mapper:
 
     def submaps(self) -> Submaps | None:
         """Return the submaps until the last snapshot, with the one that is not whole; None where it stores none."""
-        with self.finishing:
+        with self._finishing:
             every = self._book.submaps()
             if every is None or self._recording is not None:
                 return every
@@ -350,7 +345,7 @@ class Mapper:
 
     def _pose_of(self, stamps_s: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 4 4"]:
         known = self._walked.until_now()
-        return known.world_from_camera[np.searchsorted(known.stamps_s, stamps_s)]
+        return known.world_from_body[np.searchsorted(known.stamps_s, stamps_s)]
 
     def correct_poses(self, stamps_s: Any, poses: Any) -> tuple[float, float]:
         """Move what came to corrected poses of it; frames to come have poses of the corrected world.
@@ -373,21 +368,20 @@ class Mapper:
             )
         if not len(self):
             raise MapError("The map has no frame yet, whose pose could be corrected; add one.")
-        with self.finishing, self._adding, self._looking, silence_progress(True):
+        with self._finishing, self._adding, silence_progress(True):
             before = self._walked.until_now()
-            step = PoseCorrection.of(stamps_s, poses, before.stamps_s, before.world_from_camera)
+            step = PoseCorrection.of(stamps_s, poses, before.stamps_s, before.world_from_body)
             self.settle()
             self._absorb()
             for part in (self._walked, self._held, self._album):
                 part.move(step)
-            now = self._walked.until_now().world_from_camera
+            now = self._walked.until_now().world_from_body
             self._book.close()
             self._sums.end_submap()
             submaps = self._book.submaps()
             assert submaps is not None
             placed, grid = self._pose_of(submaps.stamp_s), GridSpec(self.settings.voxel_size_m)
-            with self._merging:
-                self._whole = VoxelAccumulator.of_table(MovedSubmaps(submaps, placed, grid).table(), grid)
+            self._whole = VoxelAccumulator.of_table(MovedSubmaps(submaps, placed, grid).table(), grid)
             views = self._all_views()
             self._views = [FreeViews(views.clear_mm, placed[: len(views)])]
             self._through = self._surfaces = None
@@ -395,7 +389,7 @@ class Mapper:
             self.hearing.forget()
             self._up = None if self._up is None else step.turn @ self._up
             self._look_again()
-        apart_m = np.linalg.norm(now[:, :3, 3] - before.world_from_camera[:, :3, 3], axis=1)
+        apart_m = np.linalg.norm(now[:, :3, 3] - before.world_from_body[:, :3, 3], axis=1)
         return float(np.median(apart_m)), float(apart_m.max())
 
     # Maps
@@ -414,7 +408,7 @@ class Mapper:
         """
         if not len(self):
             raise MapError("The map has no frame yet; add one.")
-        with self.finishing, silence_progress(True):
+        with self._finishing, silence_progress(True):
             faults = self.settle()
             if faults and not len(self):
                 raise faults[0]
@@ -436,7 +430,7 @@ class Mapper:
         """
         if not len(self) and self._recording is None:
             raise MapError("The map has no frame yet; add one.")
-        with self.finishing, silence_progress(self._recording is None):
+        with self._finishing, silence_progress(self._recording is None):
             if self._recording is None:
                 faults = self.settle()
                 if faults and not len(self):
@@ -446,7 +440,7 @@ class Mapper:
                         self._see(keyframe, late=self.encoders.keyframes_only)
                 self._absorb()
                 self._look_again()
-                self._at_the_end = self.hearing.doubts_at_the_end(self._walks()[1])
+                self._at_the_end = self.hearing.doubts_at_the_end(self._walked.until_now())
             return self._made(final=True)
 
     def _look_again(self) -> None:
@@ -464,58 +458,66 @@ class Mapper:
         self._found = doubts_of_walk(self._walked.until_now(), held) if len(held) > 1 else ()
 
     def _made(self, *, final: bool) -> MapData:
-        start, whole = self.start, self._whole
-        if start is None or whole is None or self._rig is None:
+        start, whole, rig, recording = self.start, self._whole, self._rig, self._recording
+        if start is None or whole is None or rig is None:
             why = "Every frame of the map was left out; add one whose features are right."
             raise MapError(why if self._left_out else "The map has no frame yet; add one.")
-        about, begin_s = self._about(), perf_counter()
+        ends = {"frames": perf_counter()}
+        if recording is not None:
+            walk, walked = recording.walk, Trajectory(recording.stamps_s, recording.world_from_camera)
+            of = recording_info(recording)
+        else:
+            walk = walked = self._walked.until_now()
+            of = walked_info(walk, self._fused, self._begins_s)
         if self._surfaces is None:
-            if self._recording is None:
-                self._through = self._through or ThroughCounts(whole.grid, self._rig.depth)
-            views = self._views if self._recording is not None else [self._all_views()]
-            self._surfaces = surfaces(whole, views, about, start.sensor, self._through)
-        merged, merged_s = self._surfaces, perf_counter()
+            if recording is None:
+                self._through = self._through or ThroughCounts(whole.grid, rig.depth)
+            views = self._views if recording is not None else [self._all_views()]
+            model = start.sensor.model
+            self._surfaces = surfaces(whole, views, rig.depth, self.settings.fusion, model, self._through)
+        voxels, removed = self._surfaces
+        ends["merging"] = perf_counter()
         rng = np.random.default_rng([self.settings.seed, _PLACES])
-        with self._looking:
-            keyframes, state = self._album.keyframes(rng, final=final)
+        keyframes, state = self._album.keyframes(rng, final=final)
         keyframes = with_clear_views(keyframes, self._views)
-        heard_s = perf_counter()
-        walked, walk = self._walks()
+        ends["keyframes"] = perf_counter()
         sounds = self.hearing.sounds(walked, final=final)
-        sources_s = perf_counter()
-        grid, index = whole.grid, merged.voxels.index
-        sources = self.hearing.located(
-            sounds, walk, lambda: grid.centre_of(np.asarray(index)), start.up.vector(), final=final
-        )
-        if final:
-            odd = feature_doubts(merged.voxels, keyframes, sounds, about.models)
-            self._at_the_end = (*self._at_the_end, *odd)
-        ends = {"frames": begin_s, "merging": merged_s, "keyframes": heard_s, "sounds": sources_s,
-                "sources": perf_counter()}  # fmt: skip
-        took = dict(zip(ends, np.diff([self.began_s, *ends.values()]).tolist(), strict=True))
-        info = manifest_of(about, start, merged, keyframes, sounds, Timings.now(took), self._fused, self._left_out)
-        wait = 0 if final else self.hearing.sources.waiting
-        submaps = self.submaps() if final else None
-        return MapData(info, merged.voxels, keyframes, sounds, state, sources, wait, submaps)
-
-    def _walks(self) -> tuple[WalkedTrack, Trajectory]:
-        if self._recording is not None:
-            return WalkedTrack(self._recording.stamps_s, self._recording.world_from_camera), self._recording.walk
-        walked = self._walked.until_now()
-        return walked, Trajectory(walked.stamps_s, walked.world_from_camera)
-
-    def _about(self) -> About:
-        assert self._rig is not None
-        models, recording, rig = models_of(self.encoders), self._recording, self._rig
+        ends["sounds"] = perf_counter()
+        up, index = start.up.vector(), voxels.index
+        sources = self.hearing.located(sounds, walk, lambda: whole.grid.centre_of(np.asarray(index)), up, final=final)
+        ends["sources"] = perf_counter()
+        took = Timings.now(dict(zip(ends, np.diff([self.began_s, *ends.values()]).tolist(), strict=True)))
+        models, name, settings = models_of(self.encoders), self.encoders.name, self.settings
         if self._sums.dim and Kind.PIXELS.value not in models:
             models[Kind.PIXELS.value] = given_model(self._sums.dim)
-        said = walked_info(self._walked.until_now(), self._fused, self._begins_s)
-        doubts, has_sound = (*self._told, *self._found, *self._at_the_end), self.hearing.track is not None
-        if recording is not None:
-            said, doubts = recording_info(recording), self._doubts
-        name, settings = self.encoders.name, self.settings
-        key = self._key or key_of("map", BUILD_VERSION, said.fingerprint, name, models, settings)
-        return About(said, rig, has_sound, name, models, settings, key, tuple(dict.fromkeys(doubts)))
+        odd = tuple(feature_doubts(voxels, keyframes, sounds, models))
+        known = *self._told, *self._found, *self._at_the_end, *carving_doubts(removed, len(voxels)), *odd
+        self._at_the_end += odd if final else ()
+        doubts, bad = tuple(dict.fromkeys(known)), tuple(sorted(self._left_out, key=lambda one: one.index))
+        worth_knowing = notices(start, self._fused, len(bad), has_sound=self.hearing.track is not None)
+        info = MapInfo(
+            avlmaps_version=__version__,
+            build_key=self._key or key_of("map", BUILD_VERSION, of.fingerprint, name, models, settings),
+            voxel_size_m=settings.voxel_size_m,
+            up=start.up,
+            ground=start.floors,
+            rig=RigInfo.of(rig),
+            profile=name,
+            models=models,
+            settings=settings,
+            sensor=start.sensor,
+            removed=removed,
+            seed=settings.seed,
+            recording=of,
+            counts=Counts.of(self._fused, keyframes, voxels, sounds),
+            bounding_box_m=MapBounds.of(voxels.index, settings.voxel_size_m),
+            bad_frames=bad,
+            notices=(*doubts, *worth_knowing),
+            doubts=doubts,
+            timings=took,
+        )
+        submaps = self.submaps() if final else None
+        return MapData(info, voxels, keyframes, sounds, state, sources, self.hearing.sources.waiting, submaps)
 
     # Doubts
 

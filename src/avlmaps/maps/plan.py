@@ -1,7 +1,7 @@
 """The plan of a build: what it is made of, which frames it fuses, and where it stores what it has finished."""
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -112,11 +112,6 @@ def claim(plan: BuildPlan, resume: bool, overwrite: bool) -> MapInfo | None:
     there = None if overwrite else read_info(plan.path)
     if there is not None:
         if there.build_key != plan.key:
-            if _lacks_submaps_alone(plan, there):
-                raise MapError(
-                    f"{plan.path} is a finished map without submaps, and cannot follow corrected poses; build it "
-                    f"again with {option('submaps')} and {option('overwrite')}, or give another {option('out')}."
-                )
             raise MapError(
                 f"{plan.path} is a finished map already, of {there.recording.name} {_difference(plan, there)}; give "
                 f"another {option('out')}, or replace it with {option('overwrite')}."
@@ -140,17 +135,6 @@ def require_unchanged(plan: BuildPlan, stamp: str) -> None:
     raise MapError(
         f"Files of {plan.recording.path} were written while it was mapped, so that the map would be of two recordings; "
         "run the same build again when it is complete."
-    )
-
-
-def _lacks_submaps_alone(plan: BuildPlan, there: MapInfo) -> bool:
-    frames = plan.settings.frames
-    without = replace(plan.settings, frames=replace(frames, per_submap=0))
-    return (
-        frames.per_submap > 0
-        and there.recording.fingerprint == plan.recording.fingerprint
-        and there.profile == plan.encoders.name
-        and there.settings == without
     )
 
 

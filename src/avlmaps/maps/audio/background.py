@@ -6,7 +6,7 @@ quarters overlap) whose power is averaged over a small neighbourhood before it i
 single bins do not flicker; the gain is ξ/(1 + ξ) with ξ the power over the noise less one, never below a floor.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,49 +36,28 @@ def hop_samples(rate_hz: int) -> int:
     return max(1, round(HOP_S * rate_hz))
 
 
-def band_powers(blocks: Iterable[Sound]) -> Iterator[Float32[np.ndarray, "frames bands"]]:
-    """Yield the mean power in every band for each 10 ms of a track; a full-scale sine has 0.5 in its band.
+def band_powers(blocks: Iterable[Sound]) -> Float32[np.ndarray, "frames bands"]:
+    """Return the mean power in every band for each 10 ms of a track; a full-scale sine has 0.5 in its band.
 
     Frame k stands for samples k·hop to (k+1)·hop, its Hann window reaches a little beyond on both sides; before
     the track and after it is silence. The frames do not depend on how the track is cut into blocks.
     """
-    stream = PowerStream()
+    powers: list[np.ndarray] = []
+    waiting, rate_hz, hop, size = np.zeros(0, np.float32), 1, 1, 1
     for block in blocks:
-        if len(powers := stream.add(block)):
-            yield powers
-    if len(powers := stream.end()):
-        yield powers
-
-
-class PowerStream:
-    """The band powers of a track that comes piece by piece; see ``band_powers``."""
-
-    def __init__(self) -> None:
-        self._waiting, self._rate_hz = np.zeros(0, np.float32), 0
-
-    def add(self, block: Sound) -> Float32[np.ndarray, "frames bands"]:
-        """Take the next piece, and return the powers that are known with it."""
-        hop, size = hop_samples(block.rate_hz), _window_samples(block.rate_hz)
-        if self._rate_hz == 0:
-            self._rate_hz, self._waiting = block.rate_hz, np.zeros((size - hop) // 2, np.float32)
-        self._waiting = np.concatenate([self._waiting, block.samples])
-        count = (len(self._waiting) - size) // hop + 1
-        if count <= 0:
-            return np.zeros((0, band_count(block.rate_hz)), np.float32)
-        powers = _spectra(self._waiting, count, self._rate_hz)
-        self._waiting = self._waiting[count * hop :]
-        return powers
-
-    def end(self) -> Float32[np.ndarray, "frames bands"]:
-        """Return the last powers, as if silence followed; more pieces may come nevertheless."""
-        if self._rate_hz == 0:
-            return np.zeros((0, 1), np.float32)
-        hop, size = hop_samples(self._rate_hz), _window_samples(self._rate_hz)
-        count = -(-(len(self._waiting) - (size - hop) // 2) // hop)
-        if count <= 0:
-            return np.zeros((0, band_count(self._rate_hz)), np.float32)
-        lacking = max(0, (count - 1) * hop + size - len(self._waiting))
-        return _spectra(np.pad(self._waiting, (0, lacking)), count, self._rate_hz)
+        if not powers:
+            rate_hz, hop, size = block.rate_hz, hop_samples(block.rate_hz), _window_samples(block.rate_hz)
+            waiting = np.zeros((size - hop) // 2, np.float32)
+            powers.append(np.zeros((0, band_count(rate_hz)), np.float32))
+        waiting = np.concatenate([waiting, block.samples])
+        if (count := (len(waiting) - size) // hop + 1) > 0:
+            powers.append(_spectra(waiting, count, rate_hz))
+            waiting = waiting[count * hop :]
+    count = -(-(len(waiting) - (size - hop) // 2) // hop)
+    if powers and count > 0:
+        lacking = max(0, (count - 1) * hop + size - len(waiting))
+        powers.append(_spectra(np.pad(waiting, (0, lacking)), count, rate_hz))
+    return np.concatenate(powers) if powers else np.zeros((0, 1), np.float32)
 
 
 def _window_samples(rate_hz: int) -> int:
@@ -121,12 +100,10 @@ class NoiseFloor:
     Attributes:
         power: one row a block of half a second; at least a million times less than the loudest frame.
         loudest: mean power over the bands of the track's loudest frame.
-        frames: how many frames the track has.
     """
 
     power: Float32[np.ndarray, "blocks bands"]
     loudest: float
-    frames: int
 
     def at(self, begin: int, count: int) -> Float32[np.ndarray, "count bands"]:
         """Return the background for frames ``begin`` to ``begin + count``, interpolated between blocks."""
@@ -140,44 +117,32 @@ class NoiseFloor:
 
 
 def find_noise_floor(
-    powers: Iterable[Float32[np.ndarray, "frames bands"]],
-    rate_hz: int,
-    window_s: float,
-    range_db: float,
-    loudest: float = 0.0,
+    power: Float32[np.ndarray, "frames bands"], rate_hz: int, window_s: float, range_db: float
 ) -> NoiseFloor:
-    """Go through a track's band powers once and find its background.
+    """Find the background of a track.
 
     Args:
-        powers: band powers, frame by frame.
+        power: its band powers.
         rate_hz: samples a second of the track.
         window_s: how many seconds around a moment determine its background.
         range_db: the background is never put lower than this below the track's loudest frame, so that in digital
             silence not every whisper is a sound.
-        loudest: the loudest frame is at least this.
     """
-    medians: list[np.ndarray] = []
-    waiting = np.zeros((0, 0), np.float32)
-    frames = 0
-    for power in powers:
-        frames += len(power)
-        loudest = max(loudest, float(power.mean(axis=1).max(initial=0.0)))
-        waiting = power if not len(waiting) else np.concatenate([waiting, power])
-        whole = len(waiting) // _BLOCK_FRAMES
-        blocks = waiting[: whole * _BLOCK_FRAMES].reshape(whole, _BLOCK_FRAMES, waiting.shape[1])
-        medians.extend(np.median(blocks, axis=1))
-        waiting = waiting[whole * _BLOCK_FRAMES :]
-    if len(waiting) and (not medians or len(waiting) >= _BLOCK_FRAMES // 2):
-        medians.append(np.median(waiting, axis=0))
+    loudest = float(power.mean(axis=1).max(initial=0.0))
     lowest = max(loudest * 10.0 ** (-range_db / 10.0), 1e-30)
-    if not medians:
-        return NoiseFloor(np.full((1, 1), lowest, np.float32), loudest, frames)
+    whole = len(power) // _BLOCK_FRAMES
+    blocks = power[: whole * _BLOCK_FRAMES].reshape(whole, _BLOCK_FRAMES, power.shape[1])
+    medians, rest = np.median(blocks, axis=1), power[whole * _BLOCK_FRAMES :]
+    if len(rest) and (not whole or len(rest) >= _BLOCK_FRAMES // 2):
+        medians = np.concatenate([medians, np.median(rest, axis=0)[None]])
+    if not len(medians):
+        return NoiseFloor(np.full((1, 1), lowest, np.float32), loudest)
     bias = 10.0 ** (_BIAS_DB / 10.0 / np.sqrt(band_lines(rate_hz)))
     reach = max(1, round(window_s / 2.0 / (HOP_S * _BLOCK_FRAMES)))
-    low, higher = _quantiles(np.log(np.maximum(np.array(medians) * bias, lowest)), reach)
+    low, higher = _quantiles(np.log(np.maximum(medians * bias, lowest)), reach)
     restless = (higher - low).mean(axis=1, keepdims=True)
-    power = np.exp(low + np.minimum(restless, _MOST_RESTLESS_DB * np.log(10.0) / 10.0))
-    return NoiseFloor(power.astype(np.float32), loudest, frames)
+    background = np.exp(low + np.minimum(restless, _MOST_RESTLESS_DB * np.log(10.0) / 10.0))
+    return NoiseFloor(background.astype(np.float32), loudest)
 
 
 def _quantiles(
@@ -199,7 +164,6 @@ _SPECTRUM_S = 0.032
 _OVERLAP = 4
 _SMOOTH_FRAMES, _SMOOTH_BINS = 5, 3
 _STEEPNESS = 1.5  # noise is assumed to be louder than its average by this factor, since single frames exceed it
-_CHUNK_S = 10.0
 # Spread over the bands of a sound's power over its background's: of 73 swells of steady sounds 95 % have less than 3.7
 # dB, of 75 other sounds on a background 95 % more than 3.2; in between, no filter names more of the others.
 _LEAST_COLOUR_DB = 4.0
@@ -245,55 +209,22 @@ def is_swell(sound: Sound, quiet: Sequence[Sound]) -> bool:
     It then has the background's colour: its power over that of the background is nearly the same in every band. What a
     filter would leave of it is like another sound.
     """
-    over, below = ([power for one in sounds for power in band_powers([one])] for sounds in ([sound], quiet))
-    if not over or not below:
+    over, below = band_powers([sound]), [band_powers([one]) for one in quiet]
+    if not len(over) or not sum(map(len, below)):
         return False
-    loud, soft = np.concatenate(over).mean(axis=0), np.concatenate(below).mean(axis=0)
+    loud, soft = over.mean(axis=0), np.concatenate(below).mean(axis=0)
     both = (loud > 0.0) & (soft > 0.0)
     return bool(both.any()) and float(np.std(10.0 * np.log10(loud[both] / soft[both]))) < _LEAST_COLOUR_DB
 
 
 def denoise(sound: Sound, profile: NoiseProfile, reduction_db: float = 12.0) -> Sound:
-    """Return the sound with the background made quieter, of the same length."""
-    samples = [block.samples for block in denoise_blocks([sound], profile, reduction_db)]
-    return Sound(np.concatenate(samples) if samples else sound.samples, sound.rate_hz)
-
-
-def denoise_blocks(blocks: Iterable[Sound], profile: NoiseProfile, reduction_db: float = 12.0) -> Iterator[Sound]:
-    """Take the background out of a long track block by block; how it is cut into blocks changes nothing."""
+    """Return the sound with the background made quieter, of the same length and rate as the profile."""
     size, hop = _sizes(profile.rate_hz)
-    reach = _SMOOTH_FRAMES // 2  # frames of context that smoothing needs on either side
-    late = size - hop  # the first output lies before the track
-    waiting, tail = np.zeros(late + reach * hop, np.float32), np.zeros(late, np.float32)
-    owed = 0
-    for samples, is_end in _with_end(blocks, profile.rate_hz, np.zeros(2 * size + reach * hop, np.float32)):
-        owed += 0 if is_end else len(samples)
-        waiting = np.concatenate([waiting, samples])
-        count = (len(waiting) - size) // hop + 1 - 2 * reach
-        if count < 1:
-            continue
-        spectra = _windowed_spectra(waiting[: (count + 2 * reach - 1) * hop + size], size, hop)
-        cleaned = spectra[reach : reach + count] * _gains(spectra, profile, reduction_db)
-        added = _overlapped(cleaned, size, hop)
-        added[: len(tail)] += tail
-        waiting, tail = waiting[count * hop :], added[count * hop :]
-        done = added[min(late, count * hop) : count * hop][:owed]
-        late = max(0, late - count * hop)
-        owed -= len(done)
-        if len(done):
-            yield Sound(done, profile.rate_hz)
-
-
-def _with_end(
-    blocks: Iterable[Sound], rate_hz: int, end: Float32[np.ndarray, " n"]
-) -> Iterator[tuple[Float32[np.ndarray, " _"], bool]]:
-    chunk = round(_CHUNK_S * rate_hz)
-    for block in blocks:
-        if block.rate_hz != rate_hz:
-            raise ValueError(f"a block has {block.rate_hz} samples a second, the profile is for {rate_hz}")
-        for at in range(0, len(block.samples), chunk):
-            yield block.samples[at : at + chunk], False
-    yield end, True
+    reach, late = _SMOOTH_FRAMES // 2, size - hop  # frames of context on either side; samples before the first
+    samples = np.pad(sound.samples, (late + reach * hop, 2 * size + reach * hop))
+    spectra = _windowed_spectra(samples, size, hop)
+    cleaned = _overlapped(spectra[reach:-reach] * _gains(spectra, profile, reduction_db), size, hop)
+    return Sound(cleaned[late : late + len(sound.samples)], profile.rate_hz)
 
 
 def _sizes(rate_hz: int) -> tuple[int, int]:

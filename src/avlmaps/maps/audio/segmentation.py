@@ -1,10 +1,9 @@
 """Where the sounds are in a track: short-time energy against a background that is measured all along.
 
-The track is gone through twice, in blocks: once for its background, once for the sounds. A frame's excess is the
-mean over the bands of its power divided by the background's, so that every band of a coloured background counts
-alike. A sound is a run of frames above ``release_db`` that somewhere passes ``onset_db``; runs that a short pause
-divides (barks of one dog) are one sound. The paper's own rule, a fixed threshold on the samples, is there as
-``method="silence"``.
+A frame's excess is the mean over the bands of its power divided by the background's, so that every band of a coloured
+background counts alike. A sound is a run of frames above ``release_db`` that somewhere passes ``onset_db``; runs that a
+short pause divides (barks of one dog) are one sound. The paper's own rule, a fixed threshold on the samples, is there
+as ``method="silence"``.
 
 An encoder with a feature every few hundredths of a second needs no loudness: the track is divided so that squared
 distances of features from their stretch's mean, and a price for each stretch, add up to the least (Jackson et al. 2005,
@@ -12,20 +11,22 @@ optimal partitioning). Unit vectors that have nothing in common lie √2 apart, 
 wholly unlike what is round it becomes a stretch of its own, and what is half unlike must last twice as long.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.errors import BackendError
 from avlmaps.core.progress import progress
-from avlmaps.maps.audio.background import NoiseFloor, band_powers, find_noise_floor, hop_samples
+from avlmaps.maps.audio.background import band_powers, find_noise_floor, hop_samples
 from avlmaps.maps.audio.settings import SegmentationSettings, SoundChangeSettings
 from avlmaps.perception.protocols import FrameSoundEncoder
 from avlmaps.recordings.audio import AudioTrack
 
 _BLOCK_S = 10.0
+_AT_ONCE = 100_000  # frames
 _USUAL = SegmentationSettings()
 
 
@@ -56,97 +57,40 @@ class _Run:
 
 
 def segment(track: AudioTrack, settings: SegmentationSettings = _USUAL) -> list[Segment]:
-    """Find the sounds in a track, in constant memory.
+    """Find the sounds in a track.
 
     Returns:
         Segments in the order of time, disjoint and within the track; none for a silent track.
     """
     if settings.method == "silence":
         return _padded(list(_loud_runs(track, settings)), settings, 1.0 / track.rate_hz, track)
-    return segment_powers(lambda: band_powers(track.blocks(_BLOCK_S)), track, settings)
-
-
-def segment_powers(
-    powers: Callable[[], Iterable[Float32[np.ndarray, "frames bands"]]],
-    track: AudioTrack,
-    settings: SegmentationSettings,
-    loudest: float = 0.0,
-) -> list[Segment]:
-    """Find the sounds in a track whose band powers are known.
-
-    Args:
-        powers: gives the band powers of the whole track, block by block; called twice.
-        track: says when it begins and ends.
-        settings: how; the method is ``adaptive``.
-        loudest: mean power over the bands of the loudest frame of a longer track that this one is the end of.
-    """
-    step_s = hop_samples(track.rate_hz) / track.rate_hz
-    floor = find_noise_floor(powers(), track.rate_hz, settings.background_window_s, settings.range_db, loudest)
+    powers, step_s = band_powers(track.blocks(_BLOCK_S)), hop_samples(track.rate_hz) / track.rate_hz
+    floor = find_noise_floor(powers, track.rate_hz, settings.background_window_s, settings.range_db)
     if floor.loudest <= 0.0:
         return []
-    runs = _merged(_runs(_excess(powers(), floor), settings, step_s), settings, step_s)
-    return _padded(list(runs), settings, step_s, track)
+    parts = np.array_split(powers, range(_AT_ONCE, len(powers), _AT_ONCE))
+    over = (part / floor.at(number * _AT_ONCE, len(part)) for number, part in enumerate(parts))
+    excess = np.concatenate([part.mean(axis=1) for part in over])
+    return _padded(list(_merged(_runs(excess, settings, step_s), settings, step_s)), settings, step_s, track)
 
 
-def _excess(
-    powers: Iterable[Float32[np.ndarray, "frames bands"]], floor: NoiseFloor
-) -> Iterator[Float32[np.ndarray, " frames"]]:
-    begin = 0
-    for power in powers:
-        yield (power / floor.at(begin, len(power))).mean(axis=1)
-        begin += len(power)
-
-
-def _runs(
-    excess: Iterable[Float32[np.ndarray, " frames"]], settings: SegmentationSettings, step_s: float
-) -> Iterator[_Run]:
+def _runs(excess: Float32[np.ndarray, " frames"], settings: SegmentationSettings, step_s: float) -> Iterator[_Run]:
     onset, release = (10.0 ** (level / 10.0) for level in (settings.onset_db, settings.release_db))
-    longest = max(2, int(settings.max_length_s / step_s))
-    begin, open_run = 0, np.zeros((0, 2), np.float32)  # columns: the excess, and smoothed
-    at = 0
-    for both in _smoothed(excess, max(1, round(settings.smoothing_s / step_s))):
-        edges = np.flatnonzero(np.diff(both[:, 1] > release, prepend=False, append=False))
-        starts, ends = edges[::2].tolist(), edges[1::2].tolist()
-        for start, end in zip(starts, ends, strict=True):
-            if start > 0 or not len(open_run):
-                yield from _closed(open_run, begin, onset, release, settings)
-                begin, open_run = at + start, both[:0]
-            open_run = np.concatenate([open_run, both[start:end]])
-            while len(open_run) >= longest:
-                cut = longest // 2 + int(np.argmin(open_run[longest // 2 : longest, 1]))
-                yield from _closed(open_run[:cut], begin, onset, release, settings)
-                begin, open_run = begin + cut, open_run[cut:]
-        at += len(both)
-        if not len(ends) or ends[-1] < len(both):
-            yield from _closed(open_run, begin, onset, release, settings)
-            open_run = both[:0]
-    yield from _closed(open_run, begin, onset, release, settings)
-
-
-def _closed(
-    run: Float32[np.ndarray, "frames 2"], begin: int, onset: float, release: float, settings: SegmentationSettings
-) -> Iterator[_Run]:
-    if len(run) and float(run[:, 1].max()) > onset:
-        audible = max(release, float(run[:, 0].max()) * 10.0 ** (-settings.tail_db / 10.0))
-        loud = np.flatnonzero(run[:, 0] > audible)
-        yield _Run(begin + int(loud[0]), begin + int(loud[-1]) + 1)
-
-
-def _smoothed(excess: Iterable[Float32[np.ndarray, " frames"]], length: int) -> Iterator[Float32[np.ndarray, "_ 2"]]:
-    before, after = (length - 1) // 2, length // 2
-    waiting = np.ones(before, np.float32)
-    kernel = np.full(length, 1.0 / length)
-    for block in excess:
-        waiting = np.concatenate([waiting, block])
-        if len(waiting) >= length:
-            mean = np.convolve(waiting, kernel, mode="valid").astype(np.float32)
-            yield np.stack([waiting[before : before + len(mean)], mean], axis=1)
-            waiting = waiting[len(mean) :]
-    left = len(waiting) - before
-    if left > 0:
-        padded = np.concatenate([waiting, np.ones(after, np.float32)])
-        mean = np.convolve(padded, kernel, mode="valid").astype(np.float32)[:left]
-        yield np.stack([waiting[before:], mean], axis=1)
+    longest, length = max(2, int(settings.max_length_s / step_s)), max(1, round(settings.smoothing_s / step_s))
+    padded = np.pad(excess, ((length - 1) // 2, length // 2), constant_values=1.0)
+    smooth = np.convolve(padded, np.full(length, 1.0 / length), mode="valid").astype(np.float32)
+    edges = np.flatnonzero(np.diff(smooth > release, prepend=False, append=False))
+    for begin, end in edges.reshape(-1, 2).tolist():
+        cuts = [begin]
+        while end - cuts[-1] >= longest:
+            half = cuts[-1] + longest // 2
+            cuts.append(half + int(np.argmin(smooth[half : cuts[-1] + longest])))
+        for first, last in pairwise([*cuts, end]):
+            if last > first and float(smooth[first:last].max()) > onset:
+                run = excess[first:last]
+                audible = max(release, float(run.max()) * 10.0 ** (-settings.tail_db / 10.0))
+                loud = np.flatnonzero(run > audible)
+                yield _Run(first + int(loud[0]), first + int(loud[-1]) + 1)
 
 
 def _merged(runs: Iterable[_Run], settings: SegmentationSettings, step_s: float) -> Iterator[_Run]:
@@ -198,7 +142,7 @@ def _padded(runs: list[_Run], settings: SegmentationSettings, step_s: float, tra
 
 _ENCODED_S = 26.0
 _CONTEXT_S = 2.0  # heard on either side of a block, so that its first and last frames know what is round them
-_AT_ONCE = 256
+_ENDS_AT_ONCE = 256
 _USUAL_CHANGES = SoundChangeSettings()
 
 
@@ -247,8 +191,8 @@ def split_at_changes(
     best = np.full(count + 1, -np.inf)
     best[0] = 0.0
     before = np.zeros(count + 1, np.int64)
-    for begin in range(1, count + 1, _AT_ONCE):
-        ends = np.arange(begin, min(begin + _AT_ONCE, count + 1))
+    for begin in range(1, count + 1, _ENDS_AT_ONCE):
+        ends = np.arange(begin, min(begin + _ENDS_AT_ONCE, count + 1))
         gains = _gains(features, ends, longest)
         for end, gain in zip(ends.tolist(), gains, strict=True):
             if end < shortest:

@@ -9,7 +9,7 @@ parts of a recording add up to the map of the whole.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float16, Float32, Float64, Int32, Int64
+from jaxtyping import Bool, Float, Float16, Float32, Float64, Int32
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
@@ -103,14 +103,14 @@ def _starts(row: Int32[np.ndarray, " n"], columns: int) -> Int32[np.ndarray, " n
 class _Scratch:
     """Working memory of the compiled loops, for pictures of one size: no frame has more voxels or pairs than pixels."""
 
-    def __init__(self, height: int, width: int) -> None:
-        pixels = height * width
+    def __init__(self, height: int, width: int, *, with_spread: bool) -> None:
+        pixels, spreads = height * width, kernels.SPREAD_COLUMNS - 1 if with_spread else 0
         whole, real = np.dtype(np.int64), np.dtype(np.float64)
         row = whole, real, whole, np.dtype(np.int32), np.dtype(np.int32)
         self.row: kernels.Row = tuple(np.empty(width, dtype) for dtype in row)  # pyright: ignore[reportAttributeAccessIssue]
         self.voxels: kernels.FrameVoxels = (
             np.empty(_FIRST_SLOTS, np.int64), np.empty(_FIRST_SLOTS, np.int32), np.empty(pixels, np.int64),
-            np.empty((pixels, kernels.SUM_COLUMNS)),
+            np.empty((pixels, kernels.SUM_COLUMNS)), np.empty((pixels, spreads)),
         )  # fmt: skip
         self.pairs: kernels.Pairs = (
             np.empty(pixels, np.int32), np.empty(pixels), np.empty(pixels, np.int32), np.empty(pixels, np.int32),
@@ -159,7 +159,7 @@ class VoxelAccumulator:
         self._with_spread = with_spread
         self._table = VoxelTable(dim, with_spread=with_spread)
         self._lookup: tuple[Rig, int, int, PixelLookup] | None = None
-        self._scratch = _Scratch(1, 1)
+        self._scratch = _Scratch(1, 1, with_spread=with_spread)
 
     def __len__(self) -> int:
         """Return how many voxels there are."""
@@ -194,9 +194,10 @@ class VoxelAccumulator:
             if pairs >= 0:
                 break
             held.enlarge()
-        table, rows = self._table, self._commit(voxels, pose[2], float(frame.stamp_s))
-        if self._with_spread:
-            kernels.add_spread(depth, rays, pose, limits[:3], float(self.frames), held.voxels, rows, table.spread)
+        table, rows = self._table, np.empty(voxels, np.int32)
+        table.reserve(voxels)
+        of_frame = voxels, self.frames, float(frame.stamp_s)
+        table.count = int(kernels.commit(of_frame, pose[2], held.voxels, table.arrays, table.count, rows))
         self.frames += 1
         faults = kernels.add_features(rows, held.pairs, cells, table.feature_sum, table.weight) if pairs else 0
         if faults:
@@ -221,19 +222,6 @@ class VoxelAccumulator:
         total = cls(grid, table.dim)
         total._table = table
         return total
-
-    def _commit(self, voxels: int, origin: Int64[np.ndarray, "3"], stamp_s: float) -> Int32[np.ndarray, " voxels"]:
-        _, _, voxel_key, voxel_sum = self._scratch.voxels
-        key, own, table = voxel_key[:voxels], voxel_sum[:voxels], self._table
-        lowest = (1 << kernels.OFFSET_BITS) - 1
-        offset = [key >> 2 * kernels.OFFSET_BITS, (key >> kernels.OFFSET_BITS) & lowest, key & lowest]
-        rows = table.enter(np.stack(offset, axis=1) + (origin - kernels.REACH_VOXELS), stamp_s)
-        table.rgb_sum[rows] += own[:, : kernels.RGB_WEIGHT]
-        table.rgb_weight[rows] += own[:, kernels.RGB_WEIGHT]
-        table.hits[rows] += own[:, kernels.HITS].astype(np.int64)
-        table.views[rows] += 1
-        table.sharp[rows] += own[:, kernels.SHARP].astype(np.int64)
-        return rows
 
     def sums(self, feature_out: Float32[np.ndarray, "n d"] | None = None) -> VoxelSums:
         """Return a copy of the sums, sorted by index.
@@ -295,7 +283,7 @@ class VoxelAccumulator:
                 f"A depth of {self.settings.max_depth_m} m spans {reach:.0f} voxels of {self.grid.voxel_size_m} m, and "
                 f"a frame takes fewer than {kernels.REACH_VOXELS - 1}; choose larger voxels or a smaller depth."
             )
-        self._scratch = _Scratch(rig.depth.height, rig.depth.width)
+        self._scratch = _Scratch(rig.depth.height, rig.depth.width, with_spread=self._with_spread)
         self._lookup = rig, feature_rows, feature_columns, lookup
         return lookup
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt8, UInt16
+from jaxtyping import Bool, Float32, Float64, Int32, UInt8, UInt16
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.progress import progress, silence_progress
@@ -95,9 +95,8 @@ class ThroughCounts:
             index: voxels, sorted; all those of the last call are among them.
             views: of all frames, those of the last call first.
         """
-        row = _rows_in(index, self._index)
-        if row is None:
-            return count_through(index, self._grid, self._camera, [views])
+        row = np.empty(len(self._index), np.int32)
+        find_rows(self._index, hash_of(index), np.ascontiguousarray(index), len(index), False, row)
         counts = np.zeros(len(index), np.int32)
         counts[row] = self._counts
         later = FreeViews(views.clear_mm[self._frames :], views.clear_pose[self._frames :])
@@ -108,18 +107,6 @@ class ThroughCounts:
             counts[~known] = count_through(index[~known], self._grid, self._camera, [views])
         self._index, self._counts, self._frames = index, counts, len(views)
         return counts.copy()
-
-
-def _rows_in(index: Int32[np.ndarray, "n 3"], some: Int32[np.ndarray, "m 3"]) -> Int64[np.ndarray, " m"] | None:
-    if not len(some):
-        return np.zeros(0, np.int64)
-    low = index.min(axis=0).astype(np.int64)
-    span = [int(size) for size in index.max(axis=0) - low + 1]
-    if span[0] * span[1] * span[2] >= 1 << 62:
-        return None
-    step = np.array([span[1] * span[2], span[2], 1], np.int64)
-    keys, wanted = (np.asarray(np.dot(one - low, step), np.int64) for one in (index, some))
-    return np.searchsorted(keys, wanted)
 
 
 def stack_views(clear: Sequence[np.ndarray], pose: Sequence[np.ndarray], shape: tuple[int, int]) -> FreeViews:

@@ -6,7 +6,7 @@ some 3,400 voxels and 33 thousand pairs, so that `add_features` reads a feature 
 """
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int8, Int32, Int64, UInt8, UInt16
+from jaxtyping import Float32, Float64, Int32, Int64, UInt8, UInt16
 from numba import njit
 
 from avlmaps.core.machine import Options, Real, Whole
@@ -22,6 +22,7 @@ RECENT_PAIRS = 1 << 13
 # Columns of what a frame adds to each voxel.
 RED, GREEN, BLUE, RGB_WEIGHT, HITS, SHARP = range(6)
 SUM_COLUMNS = 8  # one cache line
+SPREAD_COLUMNS = 10  # the last one: the number of the frame in its submap
 # How exact a hit is, from 0 to 1, is counted in these units: sums of whole numbers are the same in any order.
 SHARP_UNITS = 256
 
@@ -36,11 +37,30 @@ Limits = tuple[float, float, float, float, float, float]
 Projection = tuple[bool, np.ndarray, tuple[float, float, float, float], tuple[int, int], tuple[int, int]]
 # Of the pixels of a row: key (of its voxel), weight, sharp (how exact), picture (its colour pixel), cell.
 Row = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-# Of the frame's voxels: a hash table (key of each slot, its voxel), the key of each, and its sums.
-FrameVoxels = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+# Of the frame's voxels: a hash table (key of each slot, its voxel), the key of each, its sums, and where its points lie
+# in it: sums of x, y, z from its middle, in voxels, and of their products xx, xy, xz, yy, yz, zz (or no columns).
+FrameVoxels = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+# Of the map: slots, index, and the sums of `VoxelSums` but those of features.
+Table = tuple[
+    np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray
+]
 # Of each pair as it was met: its cell, its weight, the pair of the same voxel before; the last of each voxel; those
 # that were used last, and the voxel of each pair.
 Pairs = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+@njit(**OPTIONS)
+def _slot_of(i: Whole, j: Whole, k: Whole, slots: Int32[np.ndarray, " slots"], index: Int32[np.ndarray, "rows 3"]):
+    """Return the slot of a voxel in a hash table of rows, or the free one where it is to go."""
+    mask = np.int64(slots.shape[0] - 1)
+    mixed = i * np.int64(73856093) ^ j * np.int64(19349669) ^ k * np.int64(83492791)
+    mixed = mixed * np.int64(-7046029254386353131)
+    slot = (mixed ^ (mixed >> 29)) & mask
+    row = np.int64(slots[slot])
+    while row >= 0 and (index[row, 0] != i or index[row, 1] != j or index[row, 2] != k):
+        slot = (slot + 1) & mask
+        row = np.int64(slots[slot])
+    return slot
 
 
 @njit(**OPTIONS)
@@ -62,23 +82,15 @@ def find_rows(
         enter: give a voxel that is not there the next row; there is room.
         found: filled in.
     """
-    mask = np.int64(slots.shape[0] - 1)
     count = np.int64(count)
     for n in range(wanted.shape[0]):
         i, j, k = np.int64(wanted[n, 0]), np.int64(wanted[n, 1]), np.int64(wanted[n, 2])
-        mixed = i * np.int64(73856093) ^ j * np.int64(19349669) ^ k * np.int64(83492791)
-        mixed = mixed * np.int64(-7046029254386353131)
-        slot = (mixed ^ (mixed >> 29)) & mask
-        row = np.int64(slots[slot])
-        while row >= 0 and (index[row, 0] != i or index[row, 1] != j or index[row, 2] != k):
-            slot = (slot + 1) & mask
-            row = np.int64(slots[slot])
-        if row < 0 and enter:
-            row = count
-            slots[slot] = row
-            index[row, 0], index[row, 1], index[row, 2] = i, j, k
+        slot = _slot_of(i, j, k, slots, index)
+        if slots[slot] < 0 and enter:
+            slots[slot] = count
+            index[count, 0], index[count, 1], index[count, 2] = i, j, k
             count += 1
-        found[n] = row
+        found[n] = slots[slot]
     return count
 
 
@@ -114,13 +126,14 @@ def trace(
         Counts of points, of voxels and of pairs; no voxels where there are too many for the table.
     """
     keys, weights, sharp, picture, cells = row
-    slot_key, slot_voxel, voxel_key, voxel_sum = voxels
+    slot_key, slot_voxel, voxel_key, voxel_sum, voxel_spread = voxels
     pair_cell, pair_weight, pair_before, last_pair, recent, pair_voxel = pairs
     (x, y), (rotation, translation, origin) = rays, pose
     voxel_size, nearest, farthest, falloff, noise, noise_growth = limits
     projected, to_rgb, (fx, fy, cx, cy), (height, width), (cell_rows, cell_columns) = projection
     columns_of, rows_of, cell_columns_of, cell_rows_of = tables
     half, mask = np.int64(REACH_VOXELS), np.int64(slot_key.shape[0] - 1)
+    lowest, middle, spreads = (np.int64(1) << OFFSET_BITS) - 1, np.zeros(3), voxel_spread.shape[1] > 0
     slot_key[:] = -1
     recent[:] = -1
     points = count = paired = voxel = np.int64(0)
@@ -182,8 +195,11 @@ def trace(
                         return points, np.int64(0), np.int64(-1)
                     slot_key[slot], slot_voxel[slot], voxel_key[count], last_pair[count] = key, count, key, -1
                     voxel_sum[count] = 0.0
+                    voxel_spread[count] = 0.0
                     count += 1
                 voxel = np.int64(slot_voxel[slot])
+                for axis in range(3):  # the middle of the voxel
+                    middle[axis] = ((key >> (OFFSET_BITS * (2 - axis))) & lowest) - half + origin[axis] + 0.5
             start, exact_sum = u, np.int64(0)
             total = red = green = blue = seen = 0.0
             while u < depth.shape[1] and keys[u] == key and cells[u] == cell:
@@ -195,6 +211,13 @@ def trace(
                     red += weight * rgb[pixel, 0]
                     green += weight * rgb[pixel, 1]
                     blue += weight * rgb[pixel, 2]
+                if spreads:
+                    z = np.float64(depth[v, u])
+                    a = (translation[0] + z * (rotation[0, 0] * x[u] + bx)) / voxel_size - middle[0]
+                    b = (translation[1] + z * (rotation[1, 0] * x[u] + by)) / voxel_size - middle[1]
+                    c = (translation[2] + z * (rotation[2, 0] * x[u] + bz)) / voxel_size - middle[2]
+                    for column, value in enumerate((a, b, c, a * a, a * b, a * c, b * b, b * c, c * c)):
+                        voxel_spread[voxel, column] += value
                 u += 1
             points += u - start
             voxel_sum[voxel, RED] += red
@@ -274,58 +297,51 @@ def add_features(
 
 
 @njit(**OPTIONS)
-def add_spread(
-    depth: Float32[np.ndarray, "h w"],
-    rays: tuple[np.ndarray, np.ndarray],
-    pose: Pose,
-    limits: tuple[float, float, float],
-    number: Real,
+def commit(
+    frame: tuple[Whole, Whole, Real],
+    origin: Int64[np.ndarray, "3"],
     voxels: FrameVoxels,
+    table: Table,
+    count: Whole,
     rows: Int32[np.ndarray, " voxels"],
-    spread: Float64[np.ndarray, "rows columns"],
 ):
-    """Add where the points of a traced frame lie within their voxels.
+    """Add what a traced frame brings to its voxels to the map's table; return how many voxels that has then.
 
     Args:
-        depth: as `trace` took it.
-        rays: likewise.
-        pose: likewise.
-        limits: (voxel size, least and greatest depth), metres.
-        number: of the frame in its submap, from 0.
+        frame: how many voxels it has, its number in its submap, and its stamp in seconds.
+        origin: the camera's voxel.
         voxels: as `trace` left them.
-        rows: of the map, for each of the frame's voxels.
-        spread: x, y, z from the middle of the voxel, their products xx, xy, xz, yy, yz, zz, and the number; added to.
+        table: added to; there is room.
+        count: how many voxels it has.
+        rows: of each voxel of the frame in the table, filled in.
     """
-    (x, y), (rotation, translation, origin), (size, nearest, farthest) = rays, pose, limits
-    slot_key, slot_voxel = voxels[:2]
-    half, mask = np.int64(REACH_VOXELS), np.int64(slot_key.shape[0] - 1)
-    for v in range(depth.shape[0]):
-        for u in range(depth.shape[1]):
-            z = np.float64(depth[v, u])
-            if not ((z >= nearest) & (z <= farthest)):
-                continue
-            px = (translation[0] + z * (rotation[0, 0] * x[u] + rotation[0, 1] * y[v] + rotation[0, 2])) / size
-            py = (translation[1] + z * (rotation[1, 0] * x[u] + rotation[1, 1] * y[v] + rotation[1, 2])) / size
-            pz = (translation[2] + z * (rotation[2, 0] * x[u] + rotation[2, 1] * y[v] + rotation[2, 2])) / size
-            i, j, k = np.int64(np.floor(px)), np.int64(np.floor(py)), np.int64(np.floor(pz))
-            key = (i - origin[0] + half) << (2 * OFFSET_BITS)
-            key |= ((j - origin[1] + half) << OFFSET_BITS) | (k - origin[2] + half)
-            slot = ((key * np.int64(-7046029254386353131)) >> 40) & mask
-            while slot_key[slot] != key and slot_key[slot] != -1:
-                slot = (slot + 1) & mask
-            if slot_key[slot] == -1:  # rounded into another voxel than by `trace`
-                continue
-            row, a, b, c = rows[slot_voxel[slot]], px - i - 0.5, py - j - 0.5, pz - k - 0.5
-            spread[row, 0] += a
-            spread[row, 1] += b
-            spread[row, 2] += c
-            spread[row, 3] += a * a
-            spread[row, 4] += a * b
-            spread[row, 5] += a * c
-            spread[row, 6] += b * b
-            spread[row, 7] += b * c
-            spread[row, 8] += c * c
-            spread[row, 9] += number
+    _, _, voxel_key, voxel_sum, voxel_spread = voxels
+    slots, index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s, spread = table
+    (own, number, stamp_s), count = frame, np.int64(count)
+    half, lowest = np.int64(REACH_VOXELS), (np.int64(1) << OFFSET_BITS) - 1
+    for voxel in range(own):
+        key = voxel_key[voxel]
+        i = (key >> (2 * OFFSET_BITS)) - half + origin[0]
+        j, k = ((key >> OFFSET_BITS) & lowest) - half + origin[1], (key & lowest) - half + origin[2]
+        slot = _slot_of(i, j, k, slots, index)
+        if slots[slot] < 0:
+            slots[slot], last_seen_s[count] = count, stamp_s
+            index[count, 0], index[count, 1], index[count, 2] = i, j, k
+            count += 1
+        row = np.int64(slots[slot])
+        rows[voxel] = row
+        for colour in range(3):
+            rgb_sum[row, colour] += voxel_sum[voxel, colour]
+        rgb_weight[row] += voxel_sum[voxel, RGB_WEIGHT]
+        hits[row] += np.int64(voxel_sum[voxel, HITS])
+        views[row] += 1
+        sharp[row] += np.int64(voxel_sum[voxel, SHARP])
+        last_seen_s[row] = max(last_seen_s[row], stamp_s)
+        for column in range(voxel_spread.shape[1]):
+            spread[row, column] += voxel_spread[voxel, column]
+        if voxel_spread.shape[1] > 0:
+            spread[row, SPREAD_COLUMNS - 1] += number * voxel_sum[voxel, HITS]
+    return count
 
 
 @njit(**OPTIONS)
@@ -479,19 +495,3 @@ def fall_into_cells(
             source[pairs], share[pairs] = n, count[number] / (kept if kept > 0 else samples)
             pairs += 1
     return pairs
-
-
-@njit(**OPTIONS)
-def sum_moved(
-    starts: Int64[np.ndarray, " rows1"],
-    source: Int32[np.ndarray, " pairs"],
-    weight: Float32[np.ndarray, " pairs"],
-    feature: Int8[np.ndarray, "n d"],
-    out: Float32[np.ndarray, "rows d"],
-):
-    """Write weighted sums of the features of voxels that move: those of row ``r`` are ``starts[r]:starts[r + 1]``."""
-    for row in range(out.shape[0]):
-        out[row] = 0.0
-        for pair in range(starts[row], starts[row + 1]):
-            for column in range(out.shape[1]):
-                out[row, column] += weight[pair] * np.float32(feature[source[pair], column])

@@ -15,7 +15,7 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float, Float32, Float64, Int, Int8, Int32, UInt16
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse
-from avlmaps.maps.fusion.kernels import fall_into_cells, sum_moved
+from avlmaps.maps.fusion.kernels import fall_into_cells
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable, VoxelViews, blocks, unit_rows
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Submaps, Voxels
@@ -173,11 +173,10 @@ class MovedSubmaps:
         return csr_array((weight.astype(np.float32), (to, row)), (self._table.count, len(submaps.weight)))
 
     def _features(self, rows: Int[np.ndarray, " k"]) -> Float32[np.ndarray, "k d"]:
-        feature, some = np.asarray(self._submaps.feature).view(np.ndarray), self._shares[rows]
-        feature.flags.writeable = False  # as memory-mapped ones are, so that the loop is compiled once
-        summed = np.empty((len(rows), feature.shape[1]), np.float32)
-        sum_moved(some.indptr.astype(np.int64), some.indices.astype(np.int32), some.data, feature, summed)
-        return summed
+        some = self._shares[rows]
+        used, some.indices = np.unique(some.indices, return_inverse=True)
+        some = type(some)((some.data, some.indices, some.indptr), (len(rows), len(used)))
+        return some @ np.asarray(self._submaps.feature)[used].astype(np.float32)
 
 
 def _hits(submaps: Submaps, row: Int32[np.ndarray, " p"], share: Float32[np.ndarray, " p"]) -> Int[np.ndarray, " p"]:

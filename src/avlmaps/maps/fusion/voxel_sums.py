@@ -7,12 +7,11 @@ from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from avlmaps.core.columns import take
 from avlmaps.core.errors import MapError
-from avlmaps.maps.fusion.kernels import find_rows
+from avlmaps.maps.fusion.kernels import SPREAD_COLUMNS, Table, find_rows
 from avlmaps.maps.types import Voxels
 
 BLOCK_BYTES = 1 << 22  # merging and finishing go through features in blocks of this size, which stay in the cache
 SMALLEST_ROOM = 4096  # rows
-SPREAD_COLUMNS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +30,7 @@ class VoxelSums:
         views: how many frames have a pixel in it.
         sharp: sum over its pixels of how exact their depths are, 1 / (1 + (σ / half a voxel)²), in units of 1/256.
         last_seen_s: when a pixel last fell into it.
-        spread: sums of where its points lie in it, see `kernels.add_spread`; no columns where that is not needed.
+        spread: sums of where its points lie in it, see `kernels.FrameVoxels`; no columns where that is not needed.
     """
 
     index: Int32[np.ndarray, "n 3"]
@@ -106,7 +105,7 @@ class VoxelTable:
 
     def rows_of(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
         """Return the row of each voxel; those that are new become the last, and were never seen."""
-        self._reserve(len(index))
+        self.reserve(len(index))
         found, known = np.empty(len(index), np.int32), self.count
         wanted = np.array(index, np.int32, order="C")  # never read-only, which would compile the loop again
         self.count = int(find_rows(wanted, self.slots, self.index, self.count, True, found))
@@ -119,7 +118,16 @@ class VoxelTable:
         self.last_seen_s[found] = np.maximum(self.last_seen_s[found], last_seen_s)
         return found
 
-    def _reserve(self, extra: int) -> None:
+    @property
+    def arrays(self) -> Table:
+        """What `kernels.commit` adds to."""
+        return (
+            self.slots, self.index, self.rgb_sum, self.rgb_weight, self.hits, self.views, self.sharp, self.last_seen_s,
+            self.spread,
+        )  # fmt: skip
+
+    def reserve(self, extra: int) -> None:
+        """Make room for more voxels."""
         needed = self.count + extra
         if needed > len(self.weight):
             rows = max(needed, len(self.weight) + len(self.weight) // 8, 2 * SMALLEST_ROOM)

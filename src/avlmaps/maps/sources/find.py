@@ -1,18 +1,12 @@
-"""Where each sound of a drive began, over the surfaces of its map: of a whole drive, or while it goes on.
-
-Each sound is located when it is over, on the surfaces that there are then; what came before is carried over to the
-candidates of now. Surfaces, signs of channels and a device's offset are known better later, so that at the end every
-sound is located once more, on the finished map.
-"""
+"""Where each sound of a drive began, over the surfaces of its map: of a whole drive, or while it goes on."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from threading import Lock
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool, Float, Float16, Int
-from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.core.arrays import Float, Float16, Int
+from avlmaps.core.errors import AudioError
 from avlmaps.core.poses import apply, from_rotation, rotation_to_level
 from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
@@ -323,84 +317,47 @@ def moves(one: EventEvidence, plan: CandidateGrid, prior: Float[np.ndarray, " c"
     return log_same_place(first, second, prior) < _MOVING
 
 
-AT_ONCE = 1
-"""Sounds that a live map locates before it looks for new ones again, the newest first."""
-_SAME_S = 0.1  # limits of a sound that are found again, with the background better known
 _SIGNS_BY = 6  # sounds, by which the signs of the channels are settled until the end
 _RECENT = 8  # sounds whose directions are looked at again, now that the device is known better
 
 Spans = Sequence[tuple[float, float]]
 
 
-class GrowingSources:
-    """Takes the microphones and what a device says; gives the evidence of sounds.
+class SourceFinder:
+    """Finds sources while a drive goes on: of each sound when it is over, on the surfaces that there are then.
+
+    What was found before is laid on the candidates of now. Surfaces, signs of channels and a device's offset are known
+    better at the end, when ``find_sources`` finds all once more.
 
     Attributes:
-        microphones: one for each channel; None where they are not known.
-        known_rad: of the device that says directions, as ``DirectionTrack.known_rad``.
         waiting: how many sounds are not located yet.
-        doubt: why what a device said is left out; empty where it is not.
     """
 
     def __init__(self, at_once: int | None = None) -> None:
-        """Begin without sounds.
-
-        Args:
-            at_once: how many are located in one call at most; None for all.
-        """
-        self.microphones: Microphones | None = None
-        self.known_rad: tuple[float, float] | None = None
-        self.waiting, self.doubt = 0, ""
-        self._at_once, self._lock = at_once, Lock()
-        self._said: list[DirectionTrack] = []
+        """Begin without sounds; ``at_once`` are located in one call at most, the newest first (None for all)."""
+        self.waiting, self._at_once = 0, at_once
         self.forget()
-
-    def add_directions(self, said: DirectionTrack) -> None:
-        """Take directions that are later than those before. Another thread may do it."""
-        if not len(said):
-            return
-        with self._lock:
-            last_s = float(self._said[-1].stamp_s[-1]) if self._said else -np.inf
-            if said.stamp_s[0] <= last_s:
-                raise RecordingError(
-                    f"A direction has the stamp {said.stamp_s[0]:.3f} s, and one of {last_s:.3f} s came before: it is "
-                    "repeated or out of order, and was left out."
-                )
-            self._said.append(said)
-
-    def track(self, heard: AudioTrack, channels: int) -> AudioTrack | None:
-        """Return a track with what is known of its sources; None where that is nothing."""
-        with self._lock:
-            self._said = [DirectionTrack.joined(self._said)] if self._said else []
-            said = self._said[0] if self._said else None
-        try:
-            if said is not None:
-                said.require_beside(heard.start_s, heard.end_s, "What the device said")
-                said = replace(said, known_rad=self.known_rad)
-            self.doubt = ""
-        except RecordingError as fault:
-            said, self.doubt = None, self.doubt or str(fault)  # its numbers change with every piece
-        placed = self.microphones if self.microphones is not None and len(self.microphones) == channels else None
-        return None if placed is None and said is None else replace(heard, microphones=placed, directions=said)
 
     def forget(self) -> None:
         """Locate every sound again: the poses have changed."""
-        self._evidence: SourceEvidence | None = None
-        self._spans_s = np.zeros((0, 2))
-        self._located: Bool[np.ndarray, " n"] = np.zeros(0, bool)
-        self._of_device: Float[np.ndarray, "n g o"] = np.zeros((0, 1, 1))
-        self._signs: Float[np.ndarray, " m"] | None = None
+        self._found: FoundSources | None = None
+        self._rows: dict[tuple[float, float], int] = {}  # of the sounds that are located
+        self._known: tuple[Spans, SourceEvidence | None] = (), None
 
     def known(self, spans_s: Spans) -> SourceEvidence | None:
         """Return the evidence of the sounds that are over, as far as they are located. One that waits has all zeros.
 
         The same object as before where nothing changed.
         """
-        row = self._rows(spans_s)
+        row = np.array([self._rows.get(_rounded(span), -1) for span in spans_s], np.int64)
         self.waiting = int((row < 0).sum())
-        return self._chosen(row)
+        if self._found is None or not len(row):
+            return None
+        if self._known[1] is None or list(self._known[0]) != list(spans_s):
+            self._known = spans_s, _taken(self._found.evidence, row)
+        return self._known[1]
 
-    def until_now(
+    def find_next(
         self,
         track: AudioTrack,
         walk: Trajectory,
@@ -409,85 +366,59 @@ class GrowingSources:
         up_in_world: Float[np.ndarray, "3"],
     ) -> SourceEvidence | None:
         """Locate the next sounds that wait, and return what is ``known`` then; see ``find_sources``."""
-        row = self._rows(spans_s)
-        fresh = np.flatnonzero(row < 0)
-        if not len(fresh):
+        fresh = [span for span in spans_s if _rounded(span) not in self._rows]
+        if not fresh:
             return self.known(spans_s)
         now = fresh if self._at_once is None else fresh[-self._at_once :]
         if track.microphones is None:
-            now = np.union1d(now, np.arange(max(0, len(row) - _RECENT), len(row)))
-        old = np.setdiff1d(np.flatnonzero(row >= 0), now)
-        told = track.directions is not None and self._of_device.shape[1] > 1  # else the device said nothing before
-        others = self._of_device[row[old]] if told and len(old) else None
-        signs = self._signs if len(old) >= _SIGNS_BY else None
-        wanted = [spans_s[number] for number in now.tolist()]
+            now = [*(span for span in spans_s[max(0, len(spans_s) - _RECENT) :] if span not in now), *now]
+        taken = {_rounded(span) for span in now}
+        old, before = {span: row for span, row in self._rows.items() if span not in taken}, self._found
+        rows = np.array(list(old.values()), np.int64)
+        told = track.directions is not None and before is not None and before.of_device.shape[1] > 1
         # By all sounds, also those that wait: else signs change with the order, and what was located waits again.
-        found = find_among(track, walk, wanted, voxel_m, up_in_world, signs_by_s=spans_s, signs=signs, others=others)
+        found = find_among(
+            track, walk, now, voxel_m, up_in_world, signs_by_s=spans_s,
+            signs=before.signs if before is not None and len(old) >= _SIGNS_BY else None,
+            others=before.of_device[rows] if told and before is not None and len(old) else None,
+        )  # fmt: skip
         if found is None:
             return None
-        if self._signs is not None and not np.array_equal(self._signs, found.signs):
-            old = old[:0]  # they were located with other signs
-        self._keep(found, spans_s, row, old, now)
-        return self._evidence
+        self._rows = {_rounded(span): row for row, span in enumerate(now)}
+        if before is not None and len(old) and np.array_equal(before.signs, found.signs):  # else by other signs
+            found = _joined(found, before, rows)
+            self._rows |= {span: len(now) + row for row, span in enumerate(old)}
+        self._found, self._known = found, ((), None)
+        return self.known(spans_s)
 
-    def at_the_end(
-        self,
-        track: AudioTrack,
-        walk: Trajectory,
-        spans_s: Spans,
-        voxel_m: Float[np.ndarray, "n 3"],
-        up_in_world: Float[np.ndarray, "3"],
-    ) -> SourceEvidence | None:
-        """Return the evidence of all sounds as a build finds it."""
-        self.waiting = 0
-        return find_sources(track, walk, spans_s, voxel_m, up_in_world)
 
-    def _rows(self, spans_s: Spans) -> Int[np.ndarray, " n"]:
-        row = np.full(len(spans_s), -1)
-        for number, span in enumerate(spans_s if len(self._spans_s) else ()):
-            off_s = np.abs(self._spans_s - span).max(axis=1)
-            nearest = int(np.argmin(off_s))
-            if off_s[nearest] < _SAME_S and self._located[nearest]:
-                row[number] = nearest
-        return row
+def _rounded(span_s: tuple[float, float]) -> tuple[float, float]:
+    return round(span_s[0], 1), round(span_s[1], 1)  # limits change a little, with the background better known
 
-    def _chosen(self, row: Int[np.ndarray, " n"]) -> SourceEvidence | None:
-        evidence = self._evidence
-        if evidence is None or not len(row) or np.array_equal(row, np.arange(len(evidence))):
-            return evidence if len(row) else None
-        known = row >= 0
-        return replace(
-            evidence, heard=evidence.heard[row] * known[:, None], expected=evidence.expected[row] * known[:, None],
-            moving=evidence.moving[row] * known,
-        )  # fmt: skip
 
-    def _keep(
-        self,
-        found: FoundSources,
-        spans_s: Spans,
-        row: Int[np.ndarray, " n"],
-        old: Int[np.ndarray, " k"],
-        now: Int[np.ndarray, " s"],
-    ) -> None:
-        new, before, count = found.evidence, self._evidence, len(spans_s)
-        heard, expected = (np.zeros((count, len(new.place)), np.float16) for _ in range(2))
-        moving = np.zeros(count, np.uint8)
-        of_device = np.zeros((count, *found.of_device.shape[1:]))
-        heard[now], expected[now], moving[now] = new.heard, new.expected, new.moving
-        of_device[now if len(found.of_device) else now[:0]] = found.of_device
-        if before is not None and len(old):
-            own = replace(
-                before, heard=before.heard[row[old]], expected=before.expected[row[old]],
-                moving=before.moving[row[old]],
-            )  # fmt: skip
-            carried = laid(own, np.eye(4), new.place.astype(np.float64))
-            heard[old], expected[old] = (np.maximum(values, LEAST) for values in carried)
-            moving[old] = own.moving
-            of_device[old] = self._of_device[row[old]] if len(found.of_device) else 0.0
-        self._evidence = replace(new, heard=heard, expected=expected, moving=moving)
-        self._spans_s, self._of_device, self._signs = np.array(spans_s), of_device, found.signs
-        self._located = np.isin(np.arange(count), np.concatenate([old, now]))
-        self.waiting = int((~self._located).sum())
+def _taken(evidence: SourceEvidence, row: Int[np.ndarray, " n"]) -> SourceEvidence:
+    known = row >= 0
+    return replace(
+        evidence, heard=evidence.heard[row] * known[:, None], expected=evidence.expected[row] * known[:, None],
+        moving=evidence.moving[row] * known,
+    )  # fmt: skip
+
+
+def _joined(new: FoundSources, before: FoundSources, rows: Int[np.ndarray, " k"]) -> FoundSources:
+    """Return new sounds, and those of some rows of before on the candidates of the new ones."""
+    own = _taken(before.evidence, rows)
+    carried = laid(own, np.eye(4), new.evidence.place.astype(np.float64))
+    heard, expected = (np.maximum(values, LEAST).astype(np.float16) for values in carried)
+    evidence = replace(
+        new.evidence, heard=np.concatenate([new.evidence.heard, heard]),
+        expected=np.concatenate([new.evidence.expected, expected]),
+        moving=np.concatenate([new.evidence.moving, own.moving]),
+    )  # fmt: skip
+    said = np.zeros((len(evidence), *new.of_device.shape[1:]))
+    if len(new.of_device):
+        said[: len(new.of_device)] = new.of_device
+        said[len(new.of_device) :] = before.of_device[rows] if before.of_device.shape[1] > 1 else 0.0
+    return FoundSources(evidence, new.signs, said)
 
 
 def require_fit(microphones: Microphones | None, channels: int) -> None:

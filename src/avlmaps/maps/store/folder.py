@@ -376,7 +376,7 @@ def assembled(
         _named(keyframes, _STATE),
         _optional(SourceEvidence, sounds, at_sounds, _SOURCES),
         submaps=_optional(Submaps, voxels, at_voxels, _SUBMAPS),
-        life=read_life(life, f"{at_voxels}", len(info.visits)) if life else None,
+        life=read_life(life, f"{at_voxels}") if life else None,
         findings=dict(tables[_NAMES][1]) if _NAMES in tables else _named(voxels, _FOUND),
     )
 

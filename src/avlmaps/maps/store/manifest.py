@@ -51,49 +51,21 @@ class ModelInfo(msgspec.Struct, frozen=True, kw_only=True):
         )
 
 
-class CameraInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """Intrinsics in pixels, conventions as in ``core.camera``."""
-
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    width: int
-    height: int
-
-    @classmethod
-    def of(cls, camera: Pinhole) -> "CameraInfo":
-        """Return the entry for a camera."""
-        return cls(
-            fx=float(camera.fx),
-            fy=float(camera.fy),
-            cx=float(camera.cx),
-            cy=float(camera.cy),
-            width=int(camera.width),
-            height=int(camera.height),
-        )
-
-    def camera(self) -> Pinhole:
-        """Return the camera."""
-        return Pinhole(self.fx, self.fy, self.cx, self.cy, self.width, self.height)
-
-
 class RigInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """The recording's two cameras; ``rgb_from_depth`` row by row."""
+    """The recording's two cameras, in pixels; ``rgb_from_depth`` row by row."""
 
-    rgb: CameraInfo
-    depth: CameraInfo
+    rgb: Pinhole
+    depth: Pinhole
     rgb_from_depth: tuple[tuple[float, float, float, float], ...]
 
     @classmethod
     def of(cls, rig: Rig) -> "RigInfo":
         """Return the entry for a rig."""
-        rows = tuple(tuple(float(value) for value in row) for row in rig.rgb_from_depth)
-        return cls(rgb=CameraInfo.of(rig.rgb), depth=CameraInfo.of(rig.depth), rgb_from_depth=rows)  # pyright: ignore[reportArgumentType]
+        return cls(rgb=rig.rgb, depth=rig.depth, rgb_from_depth=tuple(map(tuple, rig.rgb_from_depth.tolist())))
 
     def rig(self) -> Rig:
         """Return the rig."""
-        return Rig(self.rgb.camera(), self.depth.camera(), np.array(self.rgb_from_depth, np.float64).reshape(4, 4))
+        return Rig(self.rgb, self.depth, np.array(self.rgb_from_depth, np.float64).reshape(4, 4))
 
 
 class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):

@@ -19,7 +19,8 @@ from jaxtyping import Float
 from avlmaps.core.columns import concat
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind, find, load
-from avlmaps.maps.audio.events import WalkedTrack, collect, detect_events
+from avlmaps.core.timeline import Trajectory
+from avlmaps.maps.audio.events import collect, detect_events
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.store.manifest import ModelInfo
 from avlmaps.maps.types import HeardSounds
@@ -90,7 +91,7 @@ class Ears:
         heard: list[HeardSounds] = []
         for walk, start_s in zip(self.walks, self.start_s.tolist(), strict=True):
             here = clips_folder / walk.path.name
-            track, walked = walk.audio, WalkedTrack(walk.stamps_s, walk.world_from_camera)
+            track, walked = walk.audio, Trajectory(walk.stamps_s, walk.world_from_camera)
             assert track is not None
             found = detect_events(track, walked, load(Kind.SOUNDS, self.backend), HEARING, here)
             heard.append(_moved(found, here, clips_folder, start_s))

@@ -17,9 +17,10 @@ from jaxtyping import Float
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import say
+from avlmaps.core.timeline import Trajectory
 from avlmaps.core.version import __version__
 from avlmaps.maps import sources
-from avlmaps.maps.audio.events import WalkedTrack, detect_events
+from avlmaps.maps.audio.events import detect_events
 from avlmaps.maps.build import build_map
 from avlmaps.maps.sources.bearings import Device
 from avlmaps.maps.sources.find import find_sources
@@ -252,7 +253,7 @@ class _Home:
         write_channels(folder / "track.flac", track)
         recording.audio = AudioTrack.open(folder / "track.flac", own.start_s)
         encoder, hearing = self.avlmap.encoders.sounds, self.avlmap.data.info.settings.hearing
-        walked = WalkedTrack(recording.stamps_s, recording.world_from_camera)
+        walked = Trajectory(recording.stamps_s, recording.world_from_camera)
         heard = detect_events(recording.audio, walked, encoder, hearing, folder / "clips")
         events = tuple(
             HeardEvent(one.onset_s, one.offset_s, one.source.category, one.source.clip, one.robot, one.source.position,
