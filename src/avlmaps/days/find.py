@@ -341,7 +341,7 @@ def views_of(stored: AVLMap) -> list[DayViews]:
     for visit, one in enumerate(visits):
         own = np.flatnonzero(number == visit)
         pose = np.asarray(keyframes.world_from_camera, np.float64)[own]
-        out.append(DayViews(np.asarray(keyframes.clear_mm)[own], pose, one.rig.depth.camera()))
+        out.append(DayViews(np.asarray(keyframes.clear_mm)[own], pose, one.rig.depth))
     return out
 
 
