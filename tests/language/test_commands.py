@@ -160,6 +160,37 @@ def test_what_a_map_cannot_say_is_no_condition(command: str) -> None:
     assert read_command(command).stops is not None
 
 
+def test_a_number_chooses_one_of_several_meanings() -> None:
+    command = "Mind the bathtub and head over to the fridge"
+    with pytest.raises(UnclearError, match="Which one, or none of these") as caught:
+        command_to_program(command)
+    for number, choice in enumerate(caught.value.choices, 1):
+        chosen = LearnedTranslator(choose=number).program_for(command)
+        assert chosen.plan == choice and chosen.chosen
+        assert parse_program(chosen.program).skills
+    with pytest.raises(UnclearError):
+        LearnedTranslator(choose=9).program_for(command)
+
+
+@pytest.mark.parametrize(
+    ("command", "why"),
+    [
+        ("There's a draught coming from the bathroom", "remark"),
+        ("It is warm in the kitchen", "remark"),
+        ("My sister says robots always go to the fridge first", "tells of a drive"),
+        ("'Go to the window,' she whispered, and the curtain fell", "tells of a drive"),
+        ("At quarter past three the lads will be going to the kitchen", "no order that the robot understands"),
+        ("go to the kitchen in the morning", "knows no clock"),
+        ("if it rains go to the sofa", "waits for nothing to happen"),
+        ("never go to the sofa", "nothing to avoid"),
+        ("Barge straight into the glass door, it'll give", "could hurt someone"),
+    ],
+)
+def test_a_refusal_names_its_true_reason(command: str, why: str) -> None:
+    read = read_command(command)
+    assert read.stops is not None and why in verbalise(read.intents)
+
+
 def test_steps_behind_a_condition_look_their_things_up_again() -> None:
     program = command_to_program("if there is a sofa, circle the table twice, otherwise circle the table")
     assert program.count("robot.get_contour") == 2

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from avlmaps.core.errors import QueryError
 from avlmaps.language.list_questions import Listed, read_list, said_alternatives, said_number
 
 READ = {
@@ -53,6 +54,10 @@ READ = {
     "list the sounds in the bathroom": (Listed.HEARD, "bathroom", False),
     "in which room did you hear the siren": (Listed.HEARD, "siren", False),
     "did the glass break before the phone rang?": (Listed.HEARD, "glass break", False),
+    "what time did the dog bark": (Listed.HEARD, "dog bark", False),
+    "The dog was barking at what time exactly?": (Listed.HEARD, "dog barking", False),
+    "did you hear the phone ring? when": (Listed.HEARD, "phone ring", False),
+    "what is between the sofa and the tv?": (Listed.BESIDE, "sofa", False),
 }
 OTHER = [
     "the chair near the sofa", "bed", "where is the kitchen", "what is in the fridge?", "how many chairs are there",
@@ -96,3 +101,13 @@ def test_numbers_in_words() -> None:
 @given(st.text(max_size=60))
 def test_no_text_is_too_much(text: str) -> None:
     read_list(text), said_number(text), said_alternatives(text)
+
+
+def test_two_sounds_are_asked_for_one_at_a_time() -> None:
+    with pytest.raises(QueryError, match="for phone ring, then for baby cry"):
+        read_list("when did the phone ring and the baby cry")
+
+
+def test_what_is_between_two_things_holds_both() -> None:
+    read = read_list("what is between the sofa and the tv?")
+    assert read is not None and (read.name, read.other) == ("sofa", "tv")

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_named, table_lines
+from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_named, kind_of, table_lines
 from avlmaps.cli.verb import Asking, MapVerb, idle
+from avlmaps.core.errors import LanguageError
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
 
@@ -77,7 +78,7 @@ class Go(Asking, MapVerb):
     guess: bool = False
     """Go to the best guess where nothing is found, and to the nearest of several things that fit equally."""
     choose: Annotated[tuple[int, ...], arg(metavar="NUMBER"), UseAppendAction] = ()
-    """Which of several things that fit equally is meant: its number in the question, one for each question."""
+    """Which of several meanings, or of several things that fit equally: its number in the question, one for each."""
     image: Annotated[Path | None, arg(metavar="FILE")] = None
     """File that "this photo" in the sentence means."""
     sound_clip: Annotated[Path | None, arg(metavar="FILE")] = None
@@ -98,6 +99,14 @@ class Go(Asking, MapVerb):
             if self.json:
                 emit({**stop.to_json(), "error": error_answer("interrupted", str(stop))}, (), as_json=True)
             raise
+        except LanguageError as unread:
+            if not self.json:
+                raise
+            choices = list(getattr(unread, "choices", ()))
+            emit(
+                {"ok": False, "error": error_answer(kind_of(unread), str(unread)), "choices": choices}, (), as_json=True
+            )
+            raise AnsweredError(str(unread)) from None
         failed = failure(answer)
         emit({**answer, "error": failed}, go_lines(answer), self.json)
         if failed is not None:
@@ -146,6 +155,11 @@ def _read(verb: "Go", translator: "Translator") -> "Translation":
     return replace(translation, notes=(*translation.notes, *_idle(verb, translation.program)))
 
 
+def numbers_left(verb: "Go", translation: "Translation") -> "Go":
+    """Return the verb with the numbers of --choose that choose a thing: the first may have chosen a meaning."""
+    return replace(verb, choose=verb.choose[1:]) if translation.chosen else verb
+
+
 def _idle(verb: "Go", program: str) -> list[str]:
     notes: list[str] = []
     if "sound=" not in program:
@@ -167,7 +181,8 @@ def _planned(verb: "Go", settings: "QuerySettings") -> dict[str, Any]:
     from avlmaps.query.avlmap import AVLMap
 
     avlmap = AVLMap.open(verb.map, settings) if verb.map.exists() else None
-    return plan_answer(verb, _read(verb, translator_for(verb, avlmap)), avlmap)
+    translation = _read(verb, translator_for(verb, avlmap))
+    return plan_answer(numbers_left(verb, translation), translation, avlmap)
 
 
 def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None") -> dict[str, Any]:
@@ -195,6 +210,7 @@ def _driven(verb: "Go", start: "GroundPose | None", settings: "QuerySettings") -
     translator = translator_for(verb, avlmap)
     # A sentence that is not understood fails here, before a scene is made.
     translation = _read(verb, translator)
+    verb = numbers_left(verb, translation)
     robot = simulated_robot(verb, avlmap, start) if verb.robot == "simulated" else _real(verb, avlmap)
     return drive(verb, avlmap, robot, translator, translation)
 
@@ -280,13 +296,14 @@ def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
         known = Attachments(image, clip, at=verb.at) if avlmap is None else given_by(
             avlmap, image, clip, said=verb.sentence
         )  # fmt: skip
+        number = next(iter(verb.choose), None)
         if verb.language != "local":
-            return LearnedTranslator(known)
+            return LearnedTranslator(known, number)
         if verb.llm is None:
             raise UsageError("--language local needs --llm, a GGUF file or the address of a llama.cpp server.")
         from avlmaps.language.local import LocalModel, LocalTranslator
 
-        return LocalTranslator(LocalModel(verb.llm), known)
+        return LocalTranslator(LocalModel(verb.llm), known, number)
     from avlmaps.language.chat import ChatSettings, ChatTranslator
 
     chat = verb.chat

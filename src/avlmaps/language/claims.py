@@ -6,12 +6,9 @@ that nothing moves on half of a sentence.
 """
 
 import re
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from importlib.resources import files
-from typing import Any
 
 import msgspec
 
@@ -41,6 +38,7 @@ from avlmaps.language.intents import (
 )
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import describes, is_entry, sounding_words, sounds_like
+from avlmaps.language.rows import filled, table
 from avlmaps.language.word_classes import pattern_of
 
 _ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
@@ -62,47 +60,44 @@ class Row(msgspec.Struct, rename={"of": "if"}):
     says: str
     of: frozenset[str] = frozenset()
     unless: frozenset[str] = frozenset()
-    ask: str = "A map does not know '{said}'; " + _ANSWERS
+    ask: str = ""
     refuse: RefusalReason | None = None
     choices: tuple[str, ...] = ()
 
 
 @cache
-def _book() -> dict[str, Any]:
-    return tomllib.loads(files("avlmaps.language").joinpath("claims.toml").read_text(encoding="utf-8"))
+def claimed_words(name: str) -> frozenset[str]:
+    """Return the words of a list."""
+    return frozenset(table("claims")["lists"][name].split())
 
 
 @cache
-def claimed_words(name: str) -> frozenset[str]:
-    """Return the words of a list."""
-    return frozenset(_book()["lists"][name].split())
+def reasons() -> Mapping[RefusalReason, frozenset[str]]:
+    """Return for each reason of refusal the words of which one is said where it is the true one."""
+    return {RefusalReason(name): frozenset(text.split()) for name, text in table("claims")["reasons"].items()}
 
 
 @cache
 def _known() -> Mapping[str, str]:
     """Return the regular expression of each name that a row may use."""
-    book = _book()
+    book = table("claims")
     known = {name: f"{_BEGIN}(?:{'|'.join(map(re.escape, text.split()))}) " for name, text in book["lists"].items()}
     known |= {name: f"{_BEGIN}(?:{pattern_of(text)})" for name, text in book["phrases"].items()}
     known["colours"] = f"{_BEGIN}(?:{'|'.join(map(re.escape, lexicon().colours))}) "
     for name, text in book["patterns"].items():
-        known[name] = _filled(text, known)
+        known[name] = filled(text, known)
     return known
 
 
 @cache
-def _rows(table: str) -> Sequence[tuple[Row, re.Pattern[str]]]:
-    rows = msgspec.convert(_book()[table], list[Row])
-    return [(row, re.compile(f"(?<![^ ^@$])(?:{_filled(row.says, _known())})")) for row in rows]
+def _rows(kind: str) -> Sequence[tuple[Row, re.Pattern[str]]]:
+    rows = msgspec.convert(table("claims")[kind], list[Row])
+    return [(row, re.compile(f"(?<![^ ^@$])(?:{filled(row.says, _known())})")) for row in rows]
 
 
 @cache
 def _asks() -> re.Pattern[str]:
     return re.compile(_known()["ask"])
-
-
-def _filled(text: str, known: Mapping[str, str]) -> str:
-    return re.sub(r"\{([a-z_]+)\}", lambda found: f"(?:{known[found[1]]})", text)
 
 
 class _Marked:
@@ -142,17 +137,19 @@ class _Marked:
         return " ".join(token.text for token in self.tokens[first : max(last, inside[-1] if inside else 0)])
 
 
-def _first(table: str, marked: _Marked, facts: frozenset[str]) -> Refuse | Clarify | None:
+def _first(kind: str, marked: _Marked, facts: frozenset[str]) -> Refuse | Clarify | None:
     """Return what the first row does that fits; None where none fits."""
-    for row, says in _rows(table):
+    for row, says in _rows(kind):
         found = says.search(marked.text) if row.of <= facts and row.unless.isdisjoint(facts) else None
         if found is None:
             continue
-        if row.refuse is not None:
-            return Refuse(row.refuse)
         start, end = next((found.span(name) for name in found.groupdict() if found[name]), found.span())
         said = marked.said(start, end)
-        return Clarify(row.ask.format(said=said), tuple(choice.format(said=said) for choice in row.choices))
+        asks = row.ask.format(said=said)
+        if row.refuse is not None:
+            return Refuse(row.refuse, asks)
+        choices = tuple(choice.format(said=said) for choice in row.choices)
+        return Clarify(asks or f"A map does not know '{said}'; {_ANSWERS}", choices)
     return None
 
 
@@ -225,7 +222,7 @@ def _facts_of_targets(targets: Sequence[Target]) -> Iterator[str]:
             yield "sound"
         *before, last = target.name.split() or ("",)
         if before and any(lexicon().find(target.name, kind) for kind in (EntryKind.THING, EntryKind.ROOM)):
-            yield "entry"
+            yield from ("entry", "positioned") if before[0] in claimed_words("positions") else ("entry",)
         elif before and is_entry(" ".join(before)) and not is_entry(target.name):
             yield from ("stated", "described") if describes(last) and not is_entry(last) else ("stated",)
     if len(targets) == 1:

@@ -25,12 +25,12 @@ from avlmaps.language.intents import (
     steps_of,
     targets_of,
 )
-from avlmaps.language.learned.decision import EXAMPLE, REFUSALS, NameResolver, Weighed, decided, weighed
+from avlmaps.language.learned.decision import EXAMPLE, NameResolver, Weighed, decided, refusal_of, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.names import is_entry
 from avlmaps.language.questions import read_question
-from avlmaps.language.rephrase import conditions
+from avlmaps.language.rephrase import forms
 from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, language_of, stand_ins
 from avlmaps.language.storey_words import SaidStorey, said_storeys
 from avlmaps.language.verbalise import verbalise
@@ -105,14 +105,20 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
     if branched is not None:
         return branched
     read = _read(text, given)
-    closed = None if read.stops is not None or is_stop(tokenise(text)) else no_order(text)
-    return read if closed is None else replace(read, intents=(_asked(closed, read.intents),), why="gate")
+    stop = read.stops
+    if is_stop(tokenise(text)) or isinstance(stop, Clarify):
+        return read
+    closed = no_order(text)
+    if closed is None or (stop is not None and (closed.is_unsure or stop.reason is RefusalReason.HARM)):
+        return read
+    answer = _asked(closed, read.intents) if stop is None else Refuse(RefusalReason.UNKNOWN, _not_ordered(closed))
+    return replace(read, intents=(answer,), why="gate")
 
 
 def _branched(text: str, given: Attachments | None) -> Command | None:
     """Return a command whose steps depend on whether the map has a thing; None for any other."""
     said = " ".join(token.text for token in tokenise(text))
-    found = next(filter(None, (row.fullmatch(said) for row in conditions())), None)
+    found = next(filter(None, (says.fullmatch(said) for says, _ in forms("condition"))), None)
     parts = {} if found is None else found.groupdict()
     what = parts.get("what") or ""
     thing = _thing(what, given) if what else None
@@ -176,13 +182,17 @@ def check_order(text: str) -> None:
         raise UnclearError(verbalise((stop,)), getattr(stop, "choices", ()))
     closed = None if stop is None else no_order(text)  # the reader refuses it too, perhaps for another reason
     if closed is not None:
-        raise UnclearError(f"{closed.answer} Say what to do now, such as: go to the kitchen.")
+        raise UnclearError(_not_ordered(closed))
+
+
+def _not_ordered(closed: NoOrder) -> str:
+    return f"{closed.answer} Say what to do now, such as: go to the kitchen."
 
 
 def _asked(closed: NoOrder, intents: Sequence[Intent]) -> Clarify:
     """Return the question whether a sentence is meant as an order, with the order that would be one."""
     order = verbalise(intents).removeprefix("I will ").rstrip(".")
-    return Clarify(f"{closed.answer} Shall I {order}?", (order,))
+    return Clarify(f"{closed.answer} Shall I {order}?", (order,), (tuple(intents),))
 
 
 def _read(text: str, given: Attachments | None) -> Command:
@@ -201,8 +211,7 @@ def _read(text: str, given: Attachments | None) -> Command:
     sentence = Sentence(text, given)
     stop = forbidden(sentence.tokens)
     if stop is not None:
-        stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
-        return Command((stop,), (), (), "words")
+        return Command((refusal_of(stop, sentence.tokens),), (), (), "words")
     storeys = said_storeys(text)
     if storeys:
         named = _on_storey(text, storeys, given)
@@ -240,7 +249,7 @@ def _back(intent: Intent, stand: StandIns) -> Intent:
     """Return a question to the person with the map's own names in it."""
     if not isinstance(intent, Clarify):
         return intent
-    return Clarify(stand.back(intent.question), tuple(map(stand.back, intent.choices)))
+    return replace(intent, question=stand.back(intent.question), choices=tuple(map(stand.back, intent.choices)))
 
 
 def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | None) -> Command | None:

@@ -7,7 +7,6 @@ back costs a second and a drive costs more, so the limit is below one half.
 
 import json
 import re
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -18,11 +17,13 @@ import numpy as np
 from avlmaps.core.errors import BackendError
 from avlmaps.language.lexer import tokenise
 from avlmaps.language.rephrase import rewritten
+from avlmaps.language.rows import filled, table, words_of
 from avlmaps.perception.embedded.words import WordPieces
 from avlmaps.perception.networks import open_network
 
 _ORDER = "order"
-_UNSURE = "Is this an order, to me, now?"
+_UNSURE = "unsure"
+_UNSURE_ANSWER = "Is this an order, to me, now?"
 _MOST_PIECES = 64
 _WORD = re.compile(r"[a-z]+|\d+|[^\w\s]")
 
@@ -39,6 +40,11 @@ class NoOrder:
 
     kind: str
     answer: str
+
+    @property
+    def is_unsure(self) -> bool:
+        """Whether the network says so, and no row."""
+        return self.kind == _UNSURE
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,23 +66,15 @@ def no_order(text: str) -> NoOrder | None:
         return found
     judge = _judge()
     unsure = judge.probability(text if ordered == said else ordered) > judge.limit
-    return NoOrder("unsure", _UNSURE) if unsure else None
+    return NoOrder(_UNSURE, _UNSURE_ANSWER) if unsure else None
 
 
 @cache
 def _rows() -> Sequence[_Row]:
-    book = tomllib.loads(files("avlmaps.language").joinpath("gate.toml").read_text(encoding="utf-8"))
-    words = book.pop("words")
-    for name in words:  # a row may use those before it
-        for other, said in words.items():
-            words[other] = said.replace(f"{{{name}}}", words[name]) if other != name else said
-
-    def compiled(row: str) -> re.Pattern[str]:
-        for name, said in words.items():
-            row = row.replace(f"{{{name}}}", said)
-        return re.compile(row)
-
-    return [_Row(kind, of["answer"], compiled(row)) for kind, of in book.items() for row in of["rows"]]
+    words, kinds = words_of("gate"), {kind: of for kind, of in table("gate").items() if kind != "words"}
+    return [
+        _Row(kind, of["answer"], re.compile(filled(row, words))) for kind, of in kinds.items() for row in of["rows"]
+    ]
 
 
 class _Judge:

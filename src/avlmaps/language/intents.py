@@ -250,11 +250,12 @@ class Refuse:
 
 @dataclass(frozen=True, slots=True)
 class Clarify:
-    """The robot does nothing until a question is answered."""
+    """The robot does nothing until a question is answered: one of ``choices``, whose intents are ``meanings``."""
 
     do: ClassVar[str] = "clarify"
     question: str = field(default="", compare=False)
     choices: tuple[str, ...] = field(default=(), compare=False)
+    meanings: "tuple[tuple[Intent, ...], ...]" = field(default=(), compare=False)
 
 
 Intent = (
@@ -281,7 +282,8 @@ def to_json(intent: Intent) -> dict[str, Any]:
     told: dict[str, Any] = {"do": intent.do}
     for name in intent.__slots__:
         value = getattr(intent, name)
-        if value is None or value == "" or value == () or (name == "side" and value is Side.AHEAD):
+        left_out = name == "meanings" or (name == "side" and value is Side.AHEAD)
+        if left_out or value is None or value in ("", ()):
             continue
         if isinstance(value, Target):
             told[name] = value.to_json()

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from avlmaps.language.commands import Command, UnclearError, read_command
+from avlmaps.language.intents import Clarify
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.sentence import Attachments
 from avlmaps.language.translator import Translation, Translator
@@ -25,12 +26,13 @@ class LearnedTranslator:
     Attributes:
         given: files and words that came along.
         knows_map: whether they were given, so that no map's own names and places need be.
+        choose: the number of the meaning to take where a command has several, from 1; None asks.
     """
 
     name = "learned"
 
-    def __init__(self, given: Attachments | None = None) -> None:
-        self.given, self.knows_map = given or Attachments(), given is not None
+    def __init__(self, given: Attachments | None = None, choose: int | None = None) -> None:
+        self.given, self.knows_map, self.choose = given or Attachments(), given is not None, choose
         self._last: tuple[str, Command] | None = None
 
     def read(self, command: str) -> Command:
@@ -51,10 +53,14 @@ class LearnedTranslator:
             LanguageError: the command is empty or too long.
         """
         read = self.last_read(command)
-        said = verbalise(read.intents)
-        if read.stops is not None:
-            raise UnclearError(said, getattr(read.stops, "choices", ()))
-        return Translation(write_program(read.intents), read.notes, said)
+        stop, intents, number = read.stops, read.intents, self.choose or 0
+        chosen = isinstance(stop, Clarify) and 1 <= number <= len(stop.meanings)
+        if isinstance(stop, Clarify) and chosen:
+            intents = stop.meanings[number - 1]
+        said = verbalise(intents)
+        if stop is not None and not chosen:
+            raise UnclearError(said, getattr(stop, "choices", ()))
+        return Translation(write_program(intents), read.notes, said, chosen)
 
     def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
         """Return None: the reader knows no second way to say the same."""

@@ -35,7 +35,6 @@ from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.names import is_known
 from avlmaps.language.program.vocabulary import SKILLS, Skill, ValueType
 from avlmaps.language.sentence import Attachments, Sentence, stand_ins
-from avlmaps.language.verbalise import verbalise
 from avlmaps.perception.models import cache_folder
 
 _ALWAYS, _NEAREST = 6, 4  # examples: the first ones, whose state is kept, and the nearest ones
@@ -345,12 +344,13 @@ class LocalTranslator(LearnedTranslator):
     Args:
         model: the language model.
         given: files and words that came along.
+        choose: the number of the meaning to take where a command has several, from 1.
     """
 
     name = "local"
 
-    def __init__(self, model: LocalModel, given: Attachments | None = None) -> None:
-        super().__init__(given or Attachments())
+    def __init__(self, model: LocalModel, given: Attachments | None = None, choose: int | None = None) -> None:
+        super().__init__(given or Attachments(), choose)
         self._model = model
 
     def read(self, command: str) -> Command:
@@ -390,7 +390,7 @@ def both(read: Command, proposed: Weighed | None) -> Command:
         notes = (*read.notes, *likely[0].notes, "The language model reads it likewise.")
         return replace(read, intents=likely[0].intents, notes=tuple(dict.fromkeys(notes)), why="read")
     meanings = (proposed.intents,) if read.stops is not None else (read.intents, proposed.intents)
-    return replace(read, intents=(which(tuple(map(verbalise, meanings))),), why="unsure")
+    return replace(read, intents=(which(meanings),), why="unsure")
 
 
 def _used(intents: Sequence[Intent], tokens: Sequence[Token]) -> frozenset[int]:

@@ -6,16 +6,15 @@ written out, "turn one and a half times" is "turn 540 degrees".
 """
 
 import re
-import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import sounding_forms, third_forms
+from avlmaps.language.rows import filled, table, words_of
 from avlmaps.language.word_classes import listed, load_word_classes
 
 _TURNS = frozenset({
@@ -35,11 +34,11 @@ def rewritten(text: str, *, only_robot: bool = False) -> tuple[str, list[str]]:
         only_robot: whether only what is said of the robot is said to it.
     """
     notes: list[str] = []
-    for row in _book()["row"]:
-        found = None if only_robot and not row.get("robot") else row["says"].search(text)
+    for says, row in forms("row"):
+        found = None if only_robot and not row.get("robot") else says.search(text)
         if found is not None:
             notes += [found.expand(row["note"])] if "note" in row else []
-            text = row["says"].sub(row["to"], text)
+            text = says.sub(row["to"], text)
     return text if only_robot else _sounding().sub(_whatever, text), notes
 
 
@@ -66,29 +65,10 @@ def _whatever(found: re.Match[str]) -> str:
 
 
 @cache
-def _book() -> dict[str, list[dict[str, Any]]]:
-    """Return the tables of rows, with their regular expressions compiled."""
-    book = tomllib.loads(files("avlmaps.language").joinpath("rewrites.toml").read_text(encoding="utf-8"))
-    words = {"order": f"(?:{'|'.join(sorted(_order_words()))})"}
-
-    def filled(text: str) -> str:
-        return re.sub(r"\{([a-z]+)\}", lambda found: words[found[1]], text)
-
-    for name, text in book.pop("words").items():
-        words[name] = filled(text)
-    for row in (row for rows in book.values() for row in rows):
-        row["says"] = re.compile(filled(row["says"]), re.IGNORECASE)
-    return book
-
-
-def picks() -> Iterator[re.Pattern[str]]:
-    """Yield what finds a thing that is chosen by its order."""
-    return (row["says"] for row in _book()["pick"])
-
-
-def conditions() -> Iterator[re.Pattern[str]]:
-    """Yield what takes a command apart whose steps depend on whether there is a thing."""
-    return (row["says"] for row in _book()["condition"])
+def forms(kind: str) -> Sequence[tuple[re.Pattern[str], Mapping[str, Any]]]:
+    """Return the rows of a kind: ``row`` is written in another form, ``pick`` and ``condition`` are taken apart."""
+    words = words_of("rewrites", order="|".join(sorted(_order_words())))
+    return [(re.compile(filled(row["says"], words), re.IGNORECASE), row) for row in table("rewrites")[kind]]
 
 
 def _order_words() -> frozenset[str]:

@@ -19,7 +19,7 @@ from avlmaps.language.claims import claimed_words
 from avlmaps.language.intents import Pick, Target, TargetKind
 from avlmaps.language.lexer import WORDS, Token, in_figures, tokenise
 from avlmaps.language.names import class_words, is_entry, is_known, respelt, sounding_words
-from avlmaps.language.rephrase import in_degrees, picks, rewritten
+from avlmaps.language.rephrase import forms, in_degrees, rewritten
 from avlmaps.language.verbalise import phrase
 from avlmaps.perception.embedded.words import is_word
 
@@ -186,8 +186,8 @@ def stand_ins(text: str, names: Sequence[OwnName], *, orders: bool = False) -> S
 
 def chosen_things(text: str) -> Iterator[tuple[str, Target]]:
     """Yield the things of a sentence that are chosen by their order, each with its words."""
-    for row in picks():
-        for found in row.finditer(text):
+    for says, _ in forms("pick"):
+        for found in says.finditer(text):
             said = found.groupdict()
             words = found["name"].lower().split()
             names = [" ".join(words[:end]) for end in range(len(words), 0, -1)]

@@ -14,11 +14,13 @@ class Translation:
         notes: one sentence each, for the person who gave the command: how something was taken that could have been
             meant in another way.
         plan: what the robot will do, in plain words; empty where the translator does not say it.
+        chosen: whether the command has several meanings, of which one was chosen.
     """
 
     program: str
     notes: tuple[str, ...] = ()
     plan: str = ""
+    chosen: bool = False
 
 
 @runtime_checkable

@@ -213,6 +213,9 @@ class Seeker:
             self._meant[name] = self._numbers.pop(0)
         number = 1 if len(fitting) == 1 else self._meant.get(name, 0)
         if 1 <= number <= len(fitting):
+            if len(fitting) > 1:
+                where = self._places_of(fitting[number - 1 : number])[0]
+                self.note(f"of {len(fitting)} places for {name} number {number} is meant: {where}")
             return fitting[number - 1]
         self.choices = self._places_of(fitting)
         listed = "; ".join(f"{at}: {where}" for at, where in enumerate(self.choices[:_MOST_LISTED], 1))

@@ -160,11 +160,7 @@ class Robot:
             return []
 
     def get_nth_pos(self, target: Target, number: float = 1, order: str = "nearest") -> Place:
-        """Return the place of a thing of that name by its number, from 1, in an order.
-
-        The order is "nearest" or "farthest" (first), "left" or "right" as the robot sees them, "north", "south", "east"
-        or "west".
-        """
+        """Return the place of the nth thing in an order: nearest, farthest, left, right, north, south, east or west."""
         which = number_of(number, "get_nth_pos", _MOST_M, "things")
         return self.seeker.place_of_thing(self.seeker.nth(target, self._here, int(which), order))
 

@@ -337,6 +337,8 @@ def _beside(lists: _Lists) -> Answer:
     subject = lists.ask(lists.question.name)
     if not subject.found:
         return replace(subject, goals=())
+    if lists.question.other:
+        return _between(lists, subject)
     own = _Box(lists.avlmap, subject.goals[0])
     near = [(own.gap_m(box), thing) for thing in lists.things() if not own.overlaps(box := _Box(lists.avlmap, thing))]
     near = sorted((one for one in near if one[0] <= BESIDE_M), key=lambda one: one[0])
@@ -344,6 +346,25 @@ def _beside(lists: _Lists) -> Answer:
     what = ", ".join(f"{thing.name} ({gap:.1f} m)" for gap, thing in near[:_MOST_NAMED])
     text = f"Next to {words}: {what or 'no thing that the map is certain of'}."
     return lists.answer([_thing_goal(thing) for _, thing in near], text, subject)
+
+
+def _between(lists: _Lists, subject: Answer) -> Answer:
+    # What is left and right of the straight line between two things, as far from it as things beside a thing are.
+    other = lists.ask(lists.question.other)
+    if not other.found:
+        return replace(other, goals=())
+    one, two = (_Box(lists.avlmap, answer.goals[0]) for answer in (subject, other))
+    way = (two.middle - one.middle)[:2]
+
+    def is_between(box: _Box) -> bool:
+        ahead = float(way @ (box.middle - one.middle)[:2]) / max(float(way @ way), 1e-9)
+        off_m = float(np.linalg.norm(box.middle[:2] - one.middle[:2] - ahead * way))
+        return 0.0 < ahead < 1.0 and off_m <= BESIDE_M and not (box.overlaps(one) or box.overlaps(two))
+
+    found = [thing for thing in lists.things() if is_between(_Box(lists.avlmap, thing))]
+    words = " and ".join(in_words([one.part for one in answer.parts]) for answer in (subject, other))
+    text = f"Between {words}: {counted([thing.name for thing in found])}."
+    return lists.answer([_thing_goal(thing) for thing in found], text, subject)
 
 
 ANSWERS: Mapping[Listed, Callable[[_Lists], Answer]] = {

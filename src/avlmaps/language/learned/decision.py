@@ -13,7 +13,7 @@ from avlmaps.core.question import HeardAt
 from avlmaps.core.words import singulars_of, stem_of
 from avlmaps.language import intents as act
 from avlmaps.language import lexer
-from avlmaps.language.claims import claimed_words, in_direction, unmet
+from avlmaps.language.claims import claimed_words, in_direction, reasons, unmet
 from avlmaps.language.intents import Clarify, Intent, RefusalReason, Refuse, Target, TargetKind, on_targets
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.reader import Read, ReadingLimits
@@ -28,11 +28,13 @@ REFUSALS = {
     RefusalReason.ENDLESS: "The robot does not drive without an end; say how often.",
     RefusalReason.HARM: "The robot does not do what could hurt someone or break something.",
     RefusalReason.FLYING: "The robot stays on its floor; it cannot fly, jump or climb stairs.",
-    RefusalReason.CONDITION: "The robot cannot wait for a condition; say what to do now.",
+    RefusalReason.CONDITION: (
+        "The robot waits for nothing to happen; it can look up whether the map has a thing. Say what to do now."
+    ),
     RefusalReason.NEGATION: "Say only what to do: nothing to avoid, no choice between two.",
     RefusalReason.CHAT: "The robot does not talk; say where it should go.",
     RefusalReason.QUESTION: 'This is a question; ask the map: avlmaps query MAP "QUESTION".',
-    RefusalReason.UNKNOWN: f"This is not understood; say it like: {EXAMPLE}.",
+    RefusalReason.UNKNOWN: f"This is no order that the robot understands; say it like: {EXAMPLE}.",
 }
 _FAR_M, _LONG_TIMES = 100.0, 50
 _ROOM_WORDS = frozenset({"room", "area", "zone", "hall", "corner", "wing", "bay", "ward", "lab", "office", "aisle"})
@@ -164,10 +166,18 @@ def weighed(read: Read, names: NameResolver) -> Weighed:
         turned = in_direction(tokens, intents)
         intents, stop = (intents, turned) if isinstance(turned, Clarify) else (turned, None)
     if stop is not None:
-        stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
-        return Weighed((stop,), read.probability)
+        return Weighed((refusal_of(stop, tokens),), read.probability)
     doubtful = is_doubtful(tokens, read.used, waits=any(isinstance(one, act.Wait) for one in intents))
     return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(names.notes)))
+
+
+def refusal_of(stop: Refuse | Clarify, tokens: Sequence[Token]) -> Refuse | Clarify:
+    """Return a refusal with its sentence; one for a reason of which no word is said is that it is no order."""
+    if not isinstance(stop, Refuse) or stop.said:
+        return stop
+    marks = reasons().get(stop.reason)
+    is_said = marks is None or not marks.isdisjoint(token.text for token in tokens)
+    return Refuse(stop.reason, REFUSALS[stop.reason if is_said else RefusalReason.UNKNOWN])
 
 
 def _too_much(intents: Sequence[Intent]) -> Clarify | None:
@@ -214,17 +224,19 @@ def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Decision:
     alike = sum(one.probability for one in readings if one.stops is None and is_same(one.intents, best.intents))
     if alike >= (limits.doubtful if best.doubtful else limits.command):
         return Decision(best.intents, "read", best.notes)
-    likely = (verbalise(one.intents) for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
-    return Decision((which(tuple(dict.fromkeys(likely))[:3]),), "unsure")
+    likely = (one.intents for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
+    return Decision((which(tuple(likely)),), "unsure")
 
 
-def which(choices: tuple[str, ...]) -> Clarify:
+def which(meanings: Sequence[tuple[Intent, ...]]) -> Clarify:
     """Return the question which of a few meanings is the right one, or none of them."""
+    by_words = dict(list({verbalise(meaning): meaning for meaning in meanings}.items())[:3])
+    choices, meant = tuple(by_words), tuple(by_words.values())
     if len(choices) > 1:
         each = " ".join(f"{number}: {choice}" for number, choice in enumerate(choices, 1))
-        return Clarify(f"This can mean several things. {each} Which one, or none of these?", choices)
+        return Clarify(f"This can mean several things. {each} Which one, or none of these?", choices, meant)
     if choices:
-        return Clarify(f"Is this what you mean? {choices[0]} If not, say it in other words.", choices)
+        return Clarify(f"Is this what you mean? {choices[0]} If not, say it in other words.", choices, meant)
     return Clarify("This is not clear. Can you say it in other words?")
 
 

@@ -156,11 +156,7 @@ class RobotSkills(Protocol):
         ...
 
     def get_nth_pos(self, target: Target, number: float = 1, order: str = "nearest") -> Place:
-        """Return the place of a thing of that name by its number, from 1, in an order.
-
-        The order is "nearest" or "farthest" (first), "left" or "right" as the robot sees them, "north", "south", "east"
-        or "west".
-        """
+        """Return the place of the nth thing in an order: nearest, farthest, left, right, north, south, east or west."""
         ...
 
     def exists(self, target: Target) -> bool:

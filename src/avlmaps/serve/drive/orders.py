@@ -326,7 +326,8 @@ class Dispatcher:
 
     def _planned(self, words: str, program: str, choose: tuple[int, ...]) -> OrderPlan:
         now = self._current()
-        translation = self._read(words, program, now)
+        translation = self._read(words, program, now, choose)
+        choose = choose[1:] if translation.chosen else choose
         obstacles = self._machine.prepare(now.avlmap, now.version)
         if fault := self._machine.fault():
             raise NavigationError(f"The robot cannot be driven: {fault.rstrip('.')}.")
@@ -355,13 +356,13 @@ class Dispatcher:
             choose=choose,
         )
 
-    def _read(self, words: str, program: str, now: MapNow) -> Translation:
+    def _read(self, words: str, program: str, now: MapNow, choose: tuple[int, ...]) -> Translation:
         if bool(words.strip()) == bool(program.strip()):
             raise DriveError("An order is a command (words) or a program, and not both.", 400, "usage")
         if program.strip():
             parse_program(program)
             return Translation(program)
-        return LearnedTranslator(given_by(now.avlmap, said=words)).program_for(words)
+        return LearnedTranslator(given_by(now.avlmap, said=words), next(iter(choose), None)).program_for(words)
 
     def _settings(self, choose: tuple[int, ...]) -> RobotSettings:
         return RobotSettings(guess=self._machine.guess, choose=choose)

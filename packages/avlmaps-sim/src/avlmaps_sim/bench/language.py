@@ -310,8 +310,8 @@ def _share(hits: int, count: int) -> str:
 def sealed() -> dict[str, Any]:
     """Return for each shipped list its hash and its counts at first use.
 
-    ``possible since`` holds the intents of sentences that no program could do when their list was sealed, and the list
-    says are to be asked back: "the third door from the right".
+    ``possible since`` holds what sentences mean that could not be done or answered when their list was sealed, and the
+    list says are to be asked back: "the third door from the right".
     """
     return json.loads(files("avlmaps_sim.bench").joinpath("data/language/sealed.json").read_text(encoding="utf-8"))
 
