@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import QueryError
-from avlmaps.language.list_questions import Listed, read_list, said_alternatives, said_number
+from avlmaps.language.list_questions import Listed, read_list, said_alternatives, said_both, said_number
 
 READ = {
     "the biggest room": (Listed.ROOM_BY_SIZE, "", False),
@@ -47,6 +47,7 @@ READ = {
     "what was the first sound you you heard today": (Listed.SOUND_BY_TIME, "", True),
     "which room is the biggest question mark": (Listed.ROOM_BY_SIZE, "", False),
     "when did you hear the phone?": (Listed.HEARD, "phone", False),
+    "which room is between the kitchen and the bathroom": (Listed.BESIDE, "kitchen", False),
     "when did the phone ring": (Listed.HEARD, "phone ring", False),
     "at what time was the doorbell heard": (Listed.HEARD, "doorbell", False),
     "how often did you hear a dog barking": (Listed.HEARD, "dog barking", False),
@@ -93,6 +94,25 @@ def test_each_alternative_has_the_context(names: list[str], tail: str) -> None:
     assert said_alternatives(f"the {text}") == tuple(f"{name}{tail}" for name in names)
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("when did you hear the dog and the phone?", ["when did you hear the dog", "when did you hear the phone"]),
+        ("where was the siren and the phone heard", ["where was the siren heard", "where was the phone heard"]),
+        ("what time did the dog bark and the phone ring",
+         ["what time did the dog bark", "what time did the phone ring"]),
+        ("how many sofas and beds are there", ["how many sofas are there", "how many beds are there"]),
+        ("the chair between the table and the sofa", []),
+        ("what is between the sofa and the tv", []),
+        ("the sofa near the sound of water and the phone", []),
+        ("where is the blorb and quux", []),
+    ],
+)  # fmt: skip
+def test_what_is_asked_of_two_things_is_two_questions(text: str, said: list[str]) -> None:
+    plain = [" ".join(word for word in one.split() if word != "the") for one in said]
+    assert [" ".join(word for word in one.split() if word != "the") for one in said_both(text)] == plain
+
+
 def test_numbers_in_words() -> None:
     assert said_number("two chairs") == said_number("a pair of chairs") == (2, "chairs")
     assert said_number("two") is None and said_number("2 m") is None
@@ -100,7 +120,7 @@ def test_numbers_in_words() -> None:
 
 @given(st.text(max_size=60))
 def test_no_text_is_too_much(text: str) -> None:
-    read_list(text), said_number(text), said_alternatives(text)
+    read_list(text), said_number(text), said_alternatives(text), said_both(text)
 
 
 def test_two_sounds_are_asked_for_one_at_a_time() -> None:

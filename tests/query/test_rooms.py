@@ -13,10 +13,12 @@ from avlmaps.perception.protocols import ModelCard, RoomContents, read_room_cont
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.floor_plan import FloorPlan
+from avlmaps.query.lists import extreme_shares
 from avlmaps.query.places import describe_place
 from avlmaps.query.rooms import InRooms, NamedVoxels, RoomField, Rooms, voting_rows
+from avlmaps.query.selection import MapLists, Wanted, page_of_things
 from avlmaps.query.settings import AreaSettings, QuerySettings, RoomSettings, query_settings
-from avlmaps.query.whereabouts import Whereabouts, own_names
+from avlmaps.query.whereabouts import own_names
 from avlmaps.view.labels import Labels
 from avlmaps.view.layout import Layout
 
@@ -169,17 +171,24 @@ class OpenViews:
 
 
 def home(
-    settings: QuerySettings | None = None, door_m: float = 0.8, things: bool = True, two_kitchens: bool = False
+    settings: QuerySettings | None = None,
+    door_m: float = 0.8,
+    things: bool = True,
+    two_kitchens: bool = False,
+    clocks: Sequence[tuple[int, int]] = (),
 ) -> AVLMap:
     """A kitchen on the left and a bedroom with a bed on the right, which views hardly tell apart.
 
-    Or, on the right, a second kitchen with a stove.
+    Or, on the right, a second kitchen with a stove. Clocks are 20 cm wide, at x and y in voxels.
     """
-    index = two_rooms_index(door_m)
     bed = np.argwhere(np.ones((30, 24, 8), bool)) + np.array([80, 18, 1])
-    encoder = NamedPixels(("wall", "bed", "stove"))
+    encoder = NamedPixels(("wall", "bed", "stove", "clocks"))
     thing = "stove" if two_kitchens else "bed"
-    words = ["wall"] * len(index) + [thing if things else "wall"] * len(bed)
+    clock = [np.argwhere(np.ones((4, 4, 6), bool)) + np.array([x, y, 30]) for x, y in clocks]
+    whole = np.concatenate([*clock, bed, two_rooms_index(door_m)])
+    named = ["clocks"] * sum(map(len, clock)) + [thing if things else "wall"] * len(bed)
+    index, first = np.unique(whole, axis=0, return_index=True)
+    words = [named[row] if row < len(named) else "wall" for row in first.tolist()]
     places = np.array([[x, y, 1.2] for x in (0.2, 0.8, 3.6, 4.2) for y in (0.8, 2.2)])
     view = OpenViews().encode_words(["kitchen"] * 4 + ["office"] * 4)
     view[:4] += 0.3 * OpenViews().encode_words(["bedroom"])
@@ -187,7 +196,7 @@ def home(
     if two_kitchens:
         view[4:] = OpenViews().encode_words(["kitchen"] * 4)
     view /= np.linalg.norm(view, axis=1, keepdims=True)
-    voxels = voxels_of(np.concatenate([index, bed]), encoder.encode_words(words))
+    voxels = voxels_of(index, encoder.encode_words(words))
     encoders = fake_encoders(encoder, FakeSounds(), OpenViews())
     stored = fake_map(voxels, keyframes=keyframes_at(places, view), encoders=encoders)
     stored.data.info.models = ("views", "pixels")
@@ -238,8 +247,8 @@ def test_one_of_two_kitchens_is_asked_for_by_the_number_that_the_lists_give_it()
     m = home(door_m=0.0, two_kitchens=True)
     x, y = m.points[:, 0], m.points[:, 1]
     inside, sides = (y > 0.3) & (y < 2.7), {False: (x > 0.3) & (x < 2.8), True: (x > 3.3) & (x < 5.6)}
-    names = {room.to_json(name)["room"]: room for room, name in zip(m.rooms(), Whereabouts.of(m).names, strict=True)}
-    assert set(names) == {"kitchen 1", "kitchen 2"} == set(m.numbered_rooms)
+    names = {room.to_json(name)["room"]: room for room, name in zip(m.rooms(), m.where.names, strict=True)}
+    assert set(names) == {"kitchen 1", "kitchen 2"} == set(m.where.numbered)
     for name, room in names.items():
         is_right = room.position[0] > 3.0
         heat = m.area(name).values
@@ -254,7 +263,53 @@ def test_one_of_two_kitchens_is_asked_for_by_the_number_that_the_lists_give_it()
     for counting in ("the stove", "turn left 2 times", "go to the kitchen 2 m ahead", "drive 2.5 m"):
         assert own_names(m, counting) == ()
     m.forget_edits()
-    assert "numbered_rooms" not in vars(m)
+    assert "where" not in vars(m)
+
+
+def test_a_thing_is_in_one_room_and_counts_add_up() -> None:
+    """Wherever it hangs: in a room, at the wall between two, or in it."""
+    places = [(5, 8), (29, 32), (53, 8), (56, 24), (59, 40), (62, 50), (69, 48), (93, 8)]  # the wall is from 58 to 62
+    m = home(door_m=0.0, clocks=places)
+    rooms = [room.name for room in m.rooms()]
+    assert sorted(rooms) == ["bedroom", "kitchen"]
+    listed = [thing for thing in m.contents().things if thing.name == "clocks"]
+    whole = m.ask("how many clocks are there").count
+    counts = [m.ask(f"how many clocks are in the {room}").count for room in rooms]
+    assert len(listed) == whole == sum(count or 0 for count in counts) == len(places)
+    for room, count in zip(rooms, counts, strict=True):
+        inside = [thing.position for thing in listed if thing.room == room]
+        assert [thing.position for thing in m.things(["clocks"], room=room)] == inside and len(inside) == count
+        found = [goal for goal in m.ask(f"the clocks in the {room}", top=20).goals if goal.probability >= 0.5]
+        assert len(found) == count
+        assert all(np.linalg.norm(np.subtract(inside, goal.position), axis=1).min() < 0.2 for goal in found)
+        answered = m.ask(f"what is in the {room}", top=40)
+        assert [goal.position for goal in answered.goals if goal.name == "clocks"] == inside
+
+
+def test_near_what_lies_in_another_room_has_a_note() -> None:
+    m = home(door_m=0.0)
+    pages = [page_of_things(MapLists(m), Wanted(room=room, near="bed")) for room in ("kitchen", "bedroom")]
+    assert [page.get("notes", []) for page in pages][1] == []
+    (note,) = pages[0]["notes"]  # pyright: ignore[reportTypedDictNotRequiredAccess]
+    assert "No bed lies in the kitchen" in note and "bedroom" in note
+
+
+def test_a_superlative_is_no_surer_than_what_it_rests_on() -> None:
+    m = home(door_m=0.0)
+    for words in ("the smallest room", "the largest room"):
+        goals = m.ask(words).goals
+        names = {room.name: room.confidence for room in m.rooms()}
+        assert all(goal.probability <= names[goal.name] for goal in goals)
+        assert sum(goal.probability for goal in goals) <= 1.001, "one room is the smallest"
+        assert "does not tell these sizes apart" in m.ask(words).text, "they are of one size"
+
+
+@given(st.lists(st.floats(1.0, 100.0), min_size=1, max_size=6), st.booleans())
+def test_the_smallest_of_rooms_is_one_of_them(sizes: list[float], smallest: bool) -> None:
+    shares = extreme_shares(np.array(sizes), smallest=smallest)
+    assert shares.sum() == pytest.approx(1.0) and shares.min() >= 0.0
+    best = min(sizes) if smallest else max(sizes)
+    assert shares[sizes.index(best)] == pytest.approx(shares.max(), abs=0.02)
 
 
 def test_each_voxel_has_the_colour_of_its_room_and_a_question_its_things() -> None:
@@ -263,7 +318,7 @@ def test_each_voxel_has_the_colour_of_its_room_and_a_question_its_things() -> No
     labels, x = Labels.of(layout), m.points[layout.order, 0]
     left, right = labels.voxels[x < 2.8, 1], labels.voxels[x > 3.2, 1]
     assert np.median(left) != np.median(right) and {*np.unique(left)} == {np.median(left)}
-    where = Whereabouts.of(m)
+    where = m.where
     assert where.areas_m2() == pytest.approx([8.6, 8.6], abs=1.0)
     np.testing.assert_array_equal(where.parts_of(lambda kind: kind == "kitchen", np.r_[LEFT, RIGHT]), [True, False])
 
@@ -272,7 +327,7 @@ def test_an_open_plan_is_one_room_of_two_names_and_a_part_answers_to_the_other()
     m = home(door_m=2.8, things=False)
     (room,) = m.rooms()
     assert {name for name, _ in room.names} >= {"kitchen", "office"} and (room.area_m2 or 0.0) > 16.0
-    where, ends = Whereabouts.of(m), np.array([[0.6, 1.5, 1.0], [4.6, 1.5, 1.0]])
+    where, ends = m.where, np.array([[0.6, 1.5, 1.0], [4.6, 1.5, 1.0]])
     own = room.name  # its name says the whole; another of its names the part that looks most like it
     assert where.parts_of(lambda kind: kind == own, ends).all()
     other = "office" if own == "kitchen" else "kitchen"

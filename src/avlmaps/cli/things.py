@@ -81,7 +81,8 @@ class Things(InFrame, MapVerb):
                 "frame": _FRAME,
                 **page_of_things(MapLists(avlmap), wanted),
             }
-            listed |= {"notes": list(doubts)} if doubts else {}
+            notes = [*listed.get("notes", ()), *doubts]
+            listed |= {"notes": notes} if notes else {}
         answer = shown_in(listed, self.frame, avlmap)
         if self.csv is not None:
             say(f"wrote {write_table(self.csv, answer['things'], answer.get('sounds', []), answer['frame'])}")

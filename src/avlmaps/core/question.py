@@ -43,6 +43,7 @@ class Part:
         role: primary or context.
         is_file: whether ``query`` is a path (always so for an image).
         at: the place of a sound that is meant; None: what the settings of the map say.
+        relation: how the goal lies to a part of context, in words; "" for in an area and near another.
     """
 
     modality: Modality
@@ -50,6 +51,7 @@ class Part:
     role: Role = Role.CONTEXT
     is_file: bool = False
     at: HeardAt | None = None
+    relation: str = ""
 
     def __post_init__(self) -> None:
         if not isinstance(self.query, str):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -103,6 +105,11 @@ class Question:
             raise QueryError(f"The query has no {primary} to be its primary part; add one or leave it out.")
         roles = [Role.PRIMARY if i == chosen else Role.CONTEXT for i in range(len(parts))]
         return cls(tuple(replace(part, role=role) for part, role in zip(parts, roles, strict=True)))
+
+    @property
+    def lead(self) -> Part:
+        """The primary part."""
+        return next(part for part in self.parts if part.role is Role.PRIMARY)
 
     def heard_at(self, at: HeardAt | None) -> "Question":
         """Return the question with its sounds at that place; None leaves it as it is."""

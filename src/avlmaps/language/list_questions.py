@@ -35,7 +35,7 @@ class Listed(StrEnum):
     ROOM_BY_SIZE = "room by size"
     SOUND_BY_TIME = "sound by time"
     CONTENTS = "contents of a room"
-    BESIDE = "things beside a thing, or between two"
+    BESIDE = "things beside a thing, or things or rooms between two"
     ROOM_OF = "room of a thing or a photo"
     NAMES = "all rooms, sounds or things"
     CHANGES = "what is new, gone or moved"
@@ -56,7 +56,8 @@ class ListQuestion:
         since: the day after which changes count, as it was said; "" for the first.
         change: ``new``, ``gone`` or ``moved``; "" for any change.
         how: of ``USUAL``, ``on``, ``in`` or ``near`` the name; "" where the thing of that name usually is. Of ``HEARD``
-            ``before`` or ``after`` another sound, ``in`` the room of that name; "" for a sound's times.
+            ``before`` or ``after`` another sound, ``in`` the room of that name; "" for a sound's times. Of ``BESIDE``
+            ``rooms`` where these are sought.
         other: of ``HEARD``, the other sound; of ``BESIDE``, the other of two things between which all are sought.
     """
 
@@ -120,6 +121,7 @@ def _listed(of: Listed, said: dict[str, str | None]) -> ListQuestion | None:
     change = said.get("change") or ""
     change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(change)), "")
     other = said.get("other") or ""
+    how = "rooms" if of is Listed.BESIDE and names else how
     return ListQuestion(of, name, bool(said.get("first")), bool(said.get("counts")), since, change, how, other)
 
 
@@ -189,6 +191,36 @@ def said_alternatives(text: str) -> tuple[str, ...]:
     told = [(how, re.sub(rf"^(?:either )?{words_of(_TABLE)['article']}", "", name)) for how, name in told]
     known = all(lexicon().head(name) is not None and _NO_NAMES.isdisjoint(name.split()) for _, name in told)
     return tuple(phrase.format(how + name) for how, name in told) if known and len(told) > 1 else ()
+
+
+def said_both(text: str) -> tuple[str, ...]:
+    """Return the questions of a sentence that asks the same of two things: "when did you hear the dog and the phone".
+
+    What is asked comes first, in words that name nothing; () for a sentence that names one thing, or places one by
+    others.
+    """
+    words = _plain(text).replace(",", "").split()
+    articles, asks_for = (frozenset(words_of(_TABLE)[name].split()) for name in ("articles", "asks_for"))
+    asking = articles | asks_for | frozenset(words_of(_TABLE)["asking"].split())
+    if "and" not in words or asks_for.isdisjoint(words):
+        return ()
+    at = words.index("and")
+    begin = next((number for number, word in enumerate(words) if word not in asking), len(words))
+    name, behind = " ".join(words[begin:at]), words[at + 1 :]
+    while behind and behind[0] in articles:
+        del behind[0]
+    ends = (end for end in range(len(behind), 0, -1) if _is_named(" ".join(behind[:end])))
+    end = next(ends, 0)
+    if not end or not _is_named(name):
+        return ()
+    asked, rest = " ".join(words[:begin]), " ".join(behind[end:])
+    return tuple(f"{asked} {one} {rest}".strip() for one in (name, " ".join(behind[:end])))
+
+
+def _is_named(name: str) -> bool:
+    *before, last = name.split() or [""]
+    sounds = last in sounding_words() | {"sound"} and lexicon().head(" ".join(before), EntryKind.SOUND) is not None
+    return bool(lexicon().senses(name)) or sounds
 
 
 def speaks_of_photo(words: str) -> bool:

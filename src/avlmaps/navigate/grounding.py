@@ -24,7 +24,6 @@ from avlmaps.query.goals import as_likely
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.lists import at_storey, storeys_meant
 from avlmaps.query.sound_sources import no_sources
-from avlmaps.query.whereabouts import Whereabouts
 
 
 def text_of(value: object, skill: str) -> str:
@@ -228,9 +227,7 @@ class Seeker:
 
     def _places_of(self, things: Sequence[Destination]) -> tuple[str, ...]:
         places = np.array([self.avlmap.space.world(thing.place) for thing in things])
-        where = Whereabouts.of(self.avlmap)
-        rooms = [where.names[room] if room >= 0 else "" for room in where.rooms_of(places).tolist()]
-        texts = zip(places, rooms, strict=True)
+        texts = zip(places, map(self.avlmap.where.name_of, places), strict=True)
         return tuple(f"{place_text(place)}{f' in {the_room(room)}' if room else ''}" for place, room in texts)
 
     def pair(self, a: Target, b: Target, here: Float[np.ndarray, "2"]) -> tuple[Destination, Destination]:

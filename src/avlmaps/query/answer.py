@@ -1,5 +1,6 @@
 """The answer of a query: goals, the outcome of each part, its text, and its JSON (a contract of the command line)."""
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -154,6 +155,7 @@ class Answer:
 
 WHICH = "Say which is meant, such as by what it is near."
 _MOST_NAMED = 3
+_ONE_PLACE_M = 0.5
 _HEAD = re.compile(r" (?:with|of|from|for|in|on) ")  # what is before it is the thing: "shelf with books"
 UNDERSTOOD_ONLY = "understood only"
 _PHOTO, _CLIP = "the place of the photo", "a sound like the clip"
@@ -202,14 +204,15 @@ def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alter
     else:
         where = " ".join(_context_words(one.part) for one in parts if one is not lead)
         why = f"{_not_found(lead.part)} {where}".rstrip()
-    if alone is not None and alone.goals and lead.found:
-        goal, what = alone.goals[0], "the best guess" if lead.part.at == "source" else f"the best {_bare(lead.part)}"
-        what = what if _is(lead.part) == "is" else "the best of them"
-    elif goals:
-        goal, what = goals[0], "the best guess"
-    else:
-        return _sentence(why)
-    return _sentence(f"{why}; {what} is at {_likely(goal)}")
+    best = alone.goals[0] if alone is not None and alone.goals and lead.found else None
+    told: list[str] = []
+    if goals and (best is None or math.dist(goals[0].position, best.position) > _ONE_PLACE_M):
+        told.append(f"the best guess{' there' if best else ''} is at {_likely(goals[0])}")
+    if best is not None:
+        what = "guess" if lead.part.at == "source" else _bare(lead.part)
+        what = f"the best {what}" if _is(lead.part) == "is" else "the best of them"
+        told.append(f"{what}{' anywhere' if told else ''} is at {_likely(best)}")
+    return _sentence("; ".join([why, ", and ".join(told)] if told else [why]))
 
 
 def _not_found(part: Part) -> str:
@@ -238,7 +241,7 @@ def _named(part: Part) -> str:
 
 
 def _context_words(part: Part) -> str:
-    return f"{'in' if part.modality is Modality.AREA else 'near'} {_named(part)}"
+    return f"{part.relation or ('in' if part.modality is Modality.AREA else 'near')} {_named(part)}"
 
 
 def place_of(goal: Goal) -> str:

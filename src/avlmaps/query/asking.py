@@ -9,26 +9,26 @@ import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool, Float
+from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
 from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
-from avlmaps.core.wording import coordinates
+from avlmaps.core.wording import coordinates, option
 from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.answer import UNDERSTOOD_ONLY, Alternative, Answer, PartAnswer, absent_text, found_text, placed
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
 from avlmaps.query.goals import Goal, alike
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities.image import Attachment, Photo, read_picture
-from avlmaps.query.places import distance_m, place_given
-from avlmaps.query.whereabouts import NOWHERE, Whereabouts, own_names
+from avlmaps.query.places import distance_m, lies_between, place_given
+from avlmaps.query.whereabouts import NOWHERE, own_names
 
 if TYPE_CHECKING:
     from avlmaps.language.questions import AskedSentence
@@ -50,8 +50,13 @@ _STATED = re.compile(
     r"are there|aren't there)[ ?.!]*",
     re.IGNORECASE,
 )
-_ASIDE_M = 0.5  # how far from the line between two things what is between them may lie
+_AND = " and "
+_SEVERAL = ("parts", "notes", "alternatives")
+# A name that ends so is that of a file.
+_FILE = re.compile(r"\.(?:wav|flac|ogg|mp3|m4a|aac|opus|aiff?|png|jpe?g|webp|heic|heif|avif|tiff?|bmp)$", re.IGNORECASE)
 _EXAMPLE = "the red cabinet near the sound of a dog barking"
+ENDS = ("between", "and")
+"""The relations to the two parts between which goals lie."""
 _OF_A_LIST = "The question has an order of its own, so that no place to count from (near) changes it."
 
 
@@ -86,6 +91,9 @@ class Asked:
             if named or self.files or self.primary is not None:
                 raise AskError("A question holds its parts already; give a sentence or parts instead.")
             return
+        for kind, name in (("object", self.object), ("sound", self.sound), ("area", self.area)):
+            if name is not None and _FILE.search(name.strip()):
+                raise AskError(_no_name(kind, name, self.attachments is None))
         words = bool(self.sentence.strip())
         if words == named and (words or not self.files):
             raise AskError(
@@ -131,6 +139,13 @@ class Asked:
             raise AskError(
                 f"Intrinsics are fx,fy,cx,cy in pixels, such as 525,525,320,240; not {tuple(self.camera)}."
             ) from None
+
+
+def _no_name(kind: str, name: str, may_look: bool) -> str:
+    given = option("image", "FILE") if kind == "object" else option("sound-clip", "FILE", argument="clip")
+    if may_look and not user_path(name).is_file():
+        return f"There is no file {name[:200]!r}; check the name. A file is given as a photo or a clip ({given})."
+    return f"{name[:200]!r} is a file, and no {kind}'s name; give it as a photo or a clip ({given})."
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,6 +238,29 @@ def _of_storeys(asking: _Asking) -> Answer | None:
     )
 
 
+def _of_both(asking: _Asking) -> Answer | None:
+    if _AND not in asking.asked.sentence.lower():
+        return None
+    from avlmaps.language.list_questions import said_both
+
+    said = said_both(asking.asked.sentence)
+    return _together([asking.but(sentence=one).answer(KINDS[2:]) for one in said], asking.asked.top) if said else None
+
+
+def _together(answers: Sequence[Answer], top: int) -> Answer:
+    # What is asked of several things is answered of each, the best goal of each first; found where all are.
+    lasting = sorted(((rank, number) for number, one in enumerate(answers) for rank in range(len(one.goals))))[:top]
+    parts, notes, others = ([value for one in answers for value in getattr(one, name)] for name in _SEVERAL)
+    counts = [one.count for one in answers if one.count is not None]
+    return replace(
+        answers[0], goals=tuple(answers[number].goals[rank] for rank, number in lasting),
+        found=all(one.found for one in answers), probability=min(one.probability for one in answers),
+        count=sum(counts) if len(counts) == len(answers) else None, parts=tuple(parts),
+        notes=tuple(dict.fromkeys(notes)), alternatives=tuple(others), text=" ".join(one.text for one in answers),
+        alike=0, when=(), usual=(),
+    )  # fmt: skip
+
+
 def _of_parts(asking: _Asking) -> Answer | None:
     asked = asking.asked
     question = asked.question or thing_alone(asked, asking.avlmap)
@@ -238,7 +276,7 @@ def _of_sources(asking: _Asking) -> Answer | None:
     if (asking.asked.at or asking.avlmap.settings.sounds.at) is not None or not asks_for_source(asking.asked.sentence):
         return None
     why = no_sources(asking.avlmap)
-    answer = (asking if why else asking.but(at="source", at_by_words=True)).answer(KINDS[3:])
+    answer = (asking if why else asking.but(at="source", at_by_words=True)).answer(KINDS[4:])
     silent = answer.parts and not any(one.part.modality is Modality.SOUND for one in answer.parts)
     return answer if silent or not why else replace(answer, notes=(why, *answer.notes))
 
@@ -307,7 +345,7 @@ def _read(asking: _Asking) -> Answer:
                 "this recording' in it, or take the sentence or the file away."
             )
         wanted = replace(asked, top=MOST_GOALS) if counted else asked
-        answers.append((question, answer_question(avlmap, question, wanted, between=_is_between(asked, question))))
+        answers.append((question, answer_question(avlmap, question, wanted, counted=counted)))
     answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
     best, others = answers[0][1], answers[1:]
     alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)
@@ -322,7 +360,7 @@ def _read(asking: _Asking) -> Answer:
     )  # fmt: skip
 
 
-KINDS: tuple[_Kind, ...] = (_of_storeys, _of_parts, _of_sources, _of_lists, _of_numbers, _of_claims, _read)
+KINDS: tuple[_Kind, ...] = (_of_storeys, _of_both, _of_parts, _of_sources, _of_lists, _of_numbers, _of_claims, _read)
 """The kinds of question, in the order in which they are tried."""
 
 
@@ -374,9 +412,16 @@ def _placed(question: Question, at: HeardAt | None) -> Question:
     return question if each else question.heard_at(at)
 
 
-def _is_between(asked: Asked, question: Question) -> bool:
-    things = [part for part in question.parts if part.modality is Modality.OBJECT and part.role is Role.CONTEXT]
-    return len(things) == 2 and _BETWEEN.search(asked.sentence) is not None
+def _related(sentence: str, question: Question) -> Question:
+    # The goals lie between the two parts of context that are named behind "between", whatever they are. No room lies in
+    # another one.
+    said = _BETWEEN.search(sentence)
+    ends = [part for part in question.parts if part.role is Role.CONTEXT] if said else []
+    if said and len(ends) > 2:
+        ends = [part for part in ends if part.query.casefold() in sentence[said.end() :].casefold()]
+    named = dict(zip(map(id, ends), ENDS, strict=True)) if len(ends) == len(ENDS) else {}
+    rooms = "near" if question.lead.modality is Modality.AREA else ""
+    return Question(tuple(replace(part, relation=named.get(id(part), rooms)) for part in question.parts))
 
 
 def _require_some(top: int) -> None:
@@ -384,28 +429,25 @@ def _require_some(top: int) -> None:
         raise AskError(f"At most {top} goals are wanted; the number must be 1 or more.")
 
 
-def answer_question(avlmap: "AVLMap", question: Question, asked: Asked, *, between: bool = False) -> Answer:
-    """Answer a question whose parts are known; ``between`` says that the goals lie between its first two other things.
+def answer_question(avlmap: "AVLMap", question: Question, asked: Asked, *, counted: bool = False) -> Answer:
+    """Answer a question whose parts are known.
+
+    ``counted``: only the number of things is sought; of an area, those that lists have in it.
 
     ``AskError``: intrinsics come without a photo, or no goal is wanted. ``QueryError``: a part cannot be used.
     """
     begin = time.perf_counter()
     _require_some(asked.top)
-    camera = asked.camera_of(question)
-    heats = [avlmap.heat(part, camera, asked.attachments) for part in question.parts]
-    heat = product(heats)
-    if between:
-        heat = heat.only(_lies_between(heat))
+    camera, question = asked.camera_of(question), _related(asked.sentence, question)
+    heats = [avlmap.heat(replace(part, relation=""), camera, asked.attachments) for part in question.parts]
+    heat, factors = _fused(avlmap, question, heats, counted=counted)
     several, found = tuple(heat.goals(max(asked.top, _MOST_ALIKE))), heat.found
     goals, equal = several[: asked.top], alike(several, heat.found_at)
-    said = (replace(part, at=factor.part.at) for part, factor in zip(question.parts, heat.factors, strict=True))
+    said = (replace(part, at=factor.part.at) for part, factor in zip(question.parts, factors, strict=True))
     question = Question(tuple(said))
-    parts = tuple(_part_answer(*both, heat) for both in zip(question.parts, heat.factors, strict=True))
+    parts = tuple(_part_answer(*both, heat) for both in zip(question.parts, factors, strict=True))
     alone = () if found or len(heats) == 1 else (_alone(question, heats),)
     text = found_text(parts, goals[0], alike=equal) if found else absent_text(parts, goals, next(iter(alone), None))
-    if between:
-        a, b = (part.query for part in question.parts if part.role is Role.CONTEXT and part.modality is Modality.OBJECT)
-        text = text.replace(f"near the {a} near the {b}", f"between the {a} and the {b}")
     elapsed_ms = 1e3 * (time.perf_counter() - begin)
     named = {kind: [part.query for part in question.parts if part.modality is kind] for kind in Modality}
     places = [goal.position for goal in goals] if found else []
@@ -414,6 +456,32 @@ def answer_question(avlmap: "AVLMap", question: Question, asked: Asked, *, betwe
         goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone,
         notes=(*avlmap.data.info.doubts, *notes), alike=len(equal) if found else 0,
     )  # fmt: skip
+
+
+def _fused(
+    avlmap: "AVLMap", question: Question, heats: Sequence[Heatmap], *, counted: bool
+) -> tuple[Heatmap, list[Factor]]:
+    # The product of the parts, and the factor of each. Areas that goals lie between, or that things are counted in,
+    # bound the goals instead.
+    areas = [part.role is Role.CONTEXT and part.modality is Modality.AREA for part in question.parts]
+    ends = [part.relation in ENDS for part in question.parts]
+    counts_things = counted and question.lead.modality is Modality.OBJECT
+    bounds = [is_area and (is_end or counts_things) for is_area, is_end in zip(areas, ends, strict=True)]
+    beside = question.lead.modality is Modality.AREA  # no room is in another one
+    fused = [
+        Heatmap.of(one.factors[0].cones(), one.found_at) if is_area and beside else one
+        for one, is_area, is_bound in zip(heats, areas, bounds, strict=True)
+        if not is_bound
+    ]
+    heat = product(fused)
+    of_fused = iter(heat.factors)
+    factors = [one.factors[0] if is_bound else next(of_fused) for one, is_bound in zip(heats, bounds, strict=True)]
+    if any(ends):
+        heat = heat.only(_between(*(one.factors[0] for one, is_end in zip(heats, ends, strict=True) if is_end)))
+    for part, is_end, is_bound in zip(question.parts, ends, bounds, strict=True):
+        if is_bound and not is_end:
+            heat = heat.only(partial(avlmap.where.inside, part.query))
+    return heat, factors
 
 
 def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
@@ -435,29 +503,30 @@ def _alone(question: Question, heats: Sequence[Heatmap]) -> Alternative:
     return Alternative(Question.of([part]), heat.probability, heat.found, tuple(heat.goals(1)))
 
 
-def _lies_between(heat: Heatmap) -> "Callable[[Float[np.ndarray, 'n 3']], Bool[np.ndarray, ' n']]":
-    # Which places lie between an instance of one thing of context and one of another, on the plan.
-    marks = [factor for factor in heat.factors if isinstance(factor, NearThings) and factor is not heat.lead]
-    level = heat.space.level
-    one, other = (
-        [level(mark.anchors[mark.instance == k].mean(axis=0))[:2] for k in range(len(mark.confidence))]
-        for mark in marks[:2]
-    )
+def _between(one: Factor, other: Factor) -> "Callable[[Float[np.ndarray, 'n 3']], Float[np.ndarray, ' n']]":
+    # How likely each place lies between an instance of one factor and one of the other: as likely as both are.
+    level = one.space.level
 
-    def between(places: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
-        at, out = level(places)[:, :2], np.zeros(len(places), bool)
-        for a, b in itertools.product(one, other):
-            along = b - a
-            length_m = float(np.linalg.norm(along))
-            share = (at - a) @ along / max(length_m**2, 1e-9)
-            aside_m = np.abs((at - a) @ np.array([-along[1], along[0]])) / max(length_m, 1e-9)
-            out |= (share > 0.0) & (share < 1.0) & (aside_m <= max(length_m / 4.0, _ASIDE_M))
-        return out
+    def between(places: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
+        at, most = level(places)[:, :2], np.zeros(len(places))
+        for (a, sure), (b, also) in itertools.product(_instances(one), _instances(other)):
+            most = np.maximum(most, np.where(lies_between(at, a, b), min(sure, also), 0.0))
+        return most
 
     return between
 
 
+def _instances(factor: Factor) -> list[tuple[Float[np.ndarray, "2"], float]]:
+    # The middle of each instance, level x and y, and how likely it is what is meant.
+    level, found = factor.space.level(factor.anchors)[:, :2], list[tuple[Float[np.ndarray, "2"], float]]()
+    for number, sure in enumerate(factor.confidence.tolist()):
+        own = factor.instance == number
+        itself = float(factor.scores[own].max(initial=0.0)) if isinstance(factor, NearAnchors) else 1.0
+        found.append((level[own].mean(axis=0), sure * itself))
+    return found
+
+
 def _one_a_room(avlmap: "AVLMap", goals: Sequence[Goal]) -> tuple[Goal, ...]:
-    rooms: list[int] = Whereabouts.of(avlmap).rooms_of(np.array([goal.position for goal in goals])).tolist()
+    rooms: list[int] = avlmap.where.rooms_of(np.array([goal.position for goal in goals])).tolist()
     first = {room: at for at, room in reversed(list(enumerate(rooms)))}
     return tuple(goal for at, goal in enumerate(goals) if rooms[at] == NOWHERE or first[rooms[at]] == at)

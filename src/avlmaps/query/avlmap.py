@@ -28,7 +28,7 @@ from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import RoomField, Rooms, ThingsInRooms
 from avlmaps.query.settings import QuerySettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.whereabouts import Whereabouts, numbered_rooms, region_named
+from avlmaps.query.whereabouts import Whereabouts, region_named
 from avlmaps.query.words import ClosestWords, is_open
 from avlmaps.recordings.audio import Sound
 
@@ -52,7 +52,7 @@ _GUESS_FROM = 20
 _LEAST_EDITED = 0.2  # a person may name what the map is not certain of
 # What serves answers, lists and fronts, rather than a person.
 _INSIDE = ("as_edited_now", "forget_edits", "things_to_edit", "unedited_things", "things_in_rooms", "require_model",
-           "has", "room_votes", "room_field", "room_regions", "numbered_rooms", "source_map", "sees", "heat",
+           "has", "room_votes", "room_field", "room_regions", "where", "source_map", "sees", "heat",
            "closest_words", "doubts_of_drives", "doubts_of_things")  # fmt: skip
 
 
@@ -167,7 +167,7 @@ class AVLMap:
         """Read what people corrected again at the next question."""
         # What lists things weighs them by what they are called.
         self._heats = None if self._heats is None else self._heats.anew()
-        for name in ("edited", "room_field", "source_map", "numbered_rooms"):
+        for name in ("edited", "room_field", "source_map", "where"):
             self.__dict__.pop(name, None)
 
     def as_edited_now(self) -> Self:
@@ -228,7 +228,7 @@ class AVLMap:
         settings, number = self.settings, region_named(self, word)
         factor = area_factor(
             self.space, self.data.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes,
-            self._settled if number is None else partial(self._with_room, number), self._rooms.room_of_places,
+            self._settled if number is None else partial(self._with_room, number),
         )  # fmt: skip
         return Heatmap.of(factor, settings.found_at)
 
@@ -440,7 +440,10 @@ class AVLMap:
         ``QueryError``: there is no such room, or the map was not seen on such a day, or on one day alone.
         """
         if room is not None:
-            return Whereabouts.of(self).things_in(room, self.things(names, least_confidence, structure, watch, at=at))
+            self.where.require(room)
+            found = self.where.with_rooms(self.things(names, least_confidence, structure, watch, at=at))
+            inside = self.where.inside(room, [thing.position for thing in found])
+            return [thing for thing, is_in in zip(found, inside, strict=True) if is_in]
         if at is not None:
             from avlmaps.query.changes import Days, things_at
             from avlmaps.query.sound_sources import with_heard_then
@@ -513,7 +516,7 @@ class AVLMap:
         things = with_heard(self, things, are_all=not names)
         rooms = self.rooms() if self.has(Kind.VIEWS) else []
         if rooms:
-            things = Whereabouts.of(self).with_rooms(things)
+            things = self.where.with_rooms(things)
         return Contents(things, self.sounds(), rooms, self.doubts_of_things, self.storeys)
 
     @checked(QueryError)
@@ -604,9 +607,9 @@ class AVLMap:
         return None if found is None else replace(found, up=(x, y, z))
 
     @cached_property
-    def numbered_rooms(self) -> dict[str, int]:
-        """The region of each room that shares its name with others, by the name with its number."""
-        return numbered_rooms(self)
+    def where(self) -> Whereabouts:
+        """The floors and rooms as names. ``MapError``: the map was built with another view encoder than is here."""
+        return Whereabouts(self)
 
     @cached_property
     def room_votes(self) -> Rooms | None:

@@ -11,6 +11,7 @@ import numpy as np
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import FRAME
+from avlmaps.core.registry import Kind
 from avlmaps.core.wording import place_text, the_room
 from avlmaps.core.words import plural_of
 from avlmaps.query.settings import FOUND_AT
@@ -223,19 +224,7 @@ def is_meant(name: str) -> Callable[[str], bool]:
 
 def room_namer(avlmap: "AVLMap") -> RoomOf:
     """Return what names the room of a place in a map; nothing where it has no model of views."""
-    from avlmaps.query.whereabouts import NOWHERE, Whereabouts
-
-    known: list[Whereabouts] = []
-
-    def room_of(place: tuple[float, float, float]) -> str | None:
-        if "views" not in avlmap.data.info.models:
-            return None
-        if not known:
-            known.append(Whereabouts.of(avlmap))
-        number = int(known[0].rooms_of(np.array([place]))[0])
-        return None if number == NOWHERE else known[0].names[number]
-
-    return room_of
+    return lambda place: avlmap.where.name_of(place) if avlmap.has(Kind.VIEWS) else None
 
 
 def text_of(answer: "ChangesAnswer", kinds: Iterable[ChangeKind] = ("new", "moved", "gone"), place: str = "") -> str:

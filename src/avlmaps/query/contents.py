@@ -23,6 +23,7 @@ from avlmaps.query.modalities.area import area_names, modes, pooled_name_shares
 from avlmaps.query.modalities.sound import sound_features
 from avlmaps.query.rooms import FEWEST_VIEWS, LEAST_PART
 from avlmaps.query.settings import FOUND_AT
+from avlmaps.query.voxel_space import middle_of
 
 if TYPE_CHECKING:
     from avlmaps.maps.storeys import Storeys
@@ -276,7 +277,9 @@ def thing_of(avlmap: "AVLMap", name: str, confidence: float, rows: Int[np.ndarra
     extent = np.ptp(space.level(points), axis=0) + space.grid.voxel_size_m
     colors: UInt8[np.ndarray, "m 3"] = np.asarray(avlmap.data.voxels.rgb)[rows]
     r, g, b = (int(value) for value in colors.mean(axis=0).round())
-    return Thing(name, round(confidence, 3), _middle(points), plain_point(extent), (r, g, b), rows, points)
+    return Thing(
+        name, round(confidence, 3), plain_point(middle_of(points)), plain_point(extent), (r, g, b), rows, points
+    )
 
 
 def find_sounds(avlmap: "AVLMap", most_names: int = 3) -> list[SoundEvent]:
@@ -346,7 +349,7 @@ def _rooms_by_floor(
         likely = [(field.kinds[k], round(float(share[number, k]), 3)) for k in best]
         known = likely[0][1] >= FOUND_AT or bool(has_parts[number].any())
         yield Room(
-            likely[0][0] if known else UNKNOWN, likely[0][1], _middle(seen), len(seen), seen,
+            likely[0][0] if known else UNKNOWN, likely[0][1], plain_point(middle_of(seen)), len(seen), seen,
             tuple(one for one in likely if one[1] >= _LEAST_ROOM_NAME) or (likely[0],),
             number, round(float(regions.areas_m2[number]), 2), regions.outline(number),
         )  # fmt: skip
@@ -367,7 +370,7 @@ def _rooms_of_views(
         yield Room(
             names[kind] if likely >= FOUND_AT else UNKNOWN,
             likely,
-            _middle(seen),
+            plain_point(middle_of(seen)),
             len(members),
             seen,
             ((names[kind], likely),),
@@ -386,7 +389,3 @@ def _groups_of_views(
         out[of_name] = count + group
         count += int(group.max(initial=-1)) + 1
     return out
-
-
-def _middle(points: Float[np.ndarray, "m 3"]) -> tuple[float, float, float]:
-    return plain_point(points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))])

@@ -213,9 +213,7 @@ class Editor:
             )
 
     def _room(self, room: str) -> EditedSpot:
-        from avlmaps.query.whereabouts import Whereabouts
-
-        where = Whereabouts.of(self._map)
+        where = self._map.where
         if where.regions is None:
             raise QueryError("The map has no floor plan, so that its rooms are not known.")
         if is_place(room):

@@ -15,7 +15,7 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.core.question import Part, Role
 from avlmaps.query.scores import share
-from avlmaps.query.voxel_space import Space
+from avlmaps.query.voxel_space import Space, middle_of
 
 if TYPE_CHECKING:
     from avlmaps.maps.sources.candidates import Spread
@@ -44,8 +44,7 @@ class Factor(ABC):
     understood: str  # what the encoder could act on
     note: str  # one sentence on why it was not found, or ``""``
     flat: bool  # whether the heat is the same at every height
-    # Whether the heat says in which region a place lies, not how near it is: a thing lies in one region, so the mean
-    # over its voxels counts (``goals.share_voxels``).
+    # Whether the heat says in which region a place lies, not how near it is; ``held`` says it of things.
     regional: bool = False
     is_named: bool = True  # whether what was said of it is understood; False where only a colour is ("red elephant")
     # The heat and the anchors of all voxels, once they were computed.
@@ -82,10 +81,21 @@ class Factor(ABC):
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""
 
+    def held(self, lead: "NearThings") -> Float[np.ndarray, " i"]:
+        """Return how far each instance of a lead lies in this region, in [0, 1]: the mean over its voxels."""
+        heat = self.among(lead.mask)[lead.mask].astype(np.float64)
+        count = len(lead.confidence)
+        own = np.maximum(np.bincount(lead.instance, minlength=count), 1)
+        return np.bincount(lead.instance, heat, minlength=count) / own
+
     def spread_of(self, instance: int) -> "Spread | None":
         """Return how well the place of an instance is known; None where it is known as well as any."""
         del instance
         return None
+
+    def cones(self) -> "Factor":
+        """Return the heat that falls off round the anchors, of what may have another extent."""
+        return self
 
     def for_product(self) -> "Factor":
         """Return this factor as it counts in a product with others."""
@@ -148,6 +158,12 @@ class NearThings(Factor):
     def anchors(self) -> Float[np.ndarray, "a 3"]:  # pyright: ignore[reportIncompatibleVariableOverride]
         """The middles of the object's voxels."""
         return self.space.centres_of(self.mask)
+
+    @cached_property
+    def middles(self) -> Float[np.ndarray, "i 3"]:
+        """Of each instance, the voxel nearest to its middle: where lists put a thing."""
+        order, ends = np.argsort(self.instance, kind="stable"), np.cumsum(np.bincount(self.instance))
+        return np.array([middle_of(own) for own in np.split(self.anchors[order], ends)[:-1]]).reshape(-1, 3)
 
     def heat_and_anchors(
         self, among: Bool[np.ndarray, " n"] | None = None

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float16, Int, UInt8
+from avlmaps.core.arrays import Float16, Int, UInt8
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.question import Part
 from avlmaps.core.registry import Kind
@@ -309,11 +309,6 @@ class MapRooms:
         surveyed = encoder.room_contents if isinstance(encoder, SurveyedEncoder) else None
         contents = surveyed or read_room_contents()
         return NamedVoxels(rows, namer.names, namer.confidences(rows), area_m2, contents)
-
-    def room_of_places(self, places: Float[np.ndarray, "k 3"]) -> Int[np.ndarray, " k"]:
-        """Return the number of the room that each place is in."""
-        assert self.votes is not None
-        return self.room_of_cells[self.votes.plan.cells_of(places)]
 
     @cached_property
     def room_of_cells(self) -> Int[np.ndarray, " c"]:

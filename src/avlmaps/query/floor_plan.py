@@ -115,6 +115,14 @@ class FloorPlan:
         centres = np.c_[self.origin_m + (np.stack([i, j], axis=1) + 0.5) * CELL_M, far * storey]
         return np.asarray(KDTree(points).query(centres)[1], np.int64)
 
+    def nearest_of(self, cells: Int[np.ndarray, " k"], points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+        """Return which of some cells of a storey is nearest to each point."""
+        from scipy.spatial import KDTree
+
+        _, i, j = np.unravel_index(cells, self.wall.shape)
+        middles = self.origin_m + (np.stack([i, j], axis=1) + 0.5) * CELL_M
+        return np.asarray(KDTree(middles).query(self.space.level(points_world)[:, :2])[1], np.int64)
+
     def _nearest_open(self, cells: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         # The open cells nearest to cells on their storeys: themselves where they are open, or where none is. Walls are
         # thin: most of their cells lie beside an open one, so rings of growing radius find it at once, and a query

@@ -3,8 +3,8 @@
 The lead factor is the primary one. Its instances divide the heated voxels among themselves: each voxel belongs to the
 instance that its lead heat comes from. A goal lies where the product is highest in an instance's share. On a thing it
 is the middle of the part that is nearly as hot, so that one stray voxel at its edge does not decide where the robot
-goes. Where a region is part of the query ("the chair in the kitchen"), an instance is as far in it as its voxels are on
-average.
+goes. Where a region is part of the query ("the chair in the kitchen"), an instance is as far in it as the region holds
+it (``Factor.held``): a thing is in one room.
 
 The probability that a goal is right, all parts together, is a product of what makes it so, each with its own odds:
 
@@ -54,15 +54,16 @@ class GoalEvidence:
 
 
 def evidence_of(
-    factors: Sequence[Factor], instance: int, position: Float[np.ndarray, "3"], peak: float
+    factors: Sequence[Factor], instance: int, position: Float[np.ndarray, "3"], peak: float, inside: float = 1.0
 ) -> GoalEvidence:
-    """Return the evidence for a goal."""
+    """Return the evidence for a goal; ``inside``: how far the thing lies in the regions among the factors."""
     lead = lead_of(factors)
     context = [factor for factor in factors if factor is not lead]
     itself = float(lead.scores[lead.instance == instance].max(initial=0.0)) if isinstance(lead, NearAnchors) else 1.0
     alone = itself * float(lead.confidence[instance])
     rooms = [factor for factor in context if factor.part.modality is Modality.AREA]
-    room = float(np.prod([_mean_heat(factor, lead, instance, position) for factor in rooms]))
+    beside = [factor for factor in rooms if not _holds(factor, lead)]
+    room = inside * float(np.prod([factor.at(position[None])[0] for factor in beside]))
     near = peak / max(itself * room, _LEAST_SCORE) if context else 1.0
     marks = [_mark(factor, position) for factor in context if factor not in rooms]
     return GoalEvidence(
@@ -82,10 +83,8 @@ def logit(probability: float) -> float:
     return float(np.clip(np.log(held / (1.0 - held)), -_MOST_LOGIT, _MOST_LOGIT))
 
 
-def _mean_heat(region: Factor, lead: Factor, instance: int, position: Float[np.ndarray, "3"]) -> float:
-    if not isinstance(lead, NearThings) or not region.regional:
-        return float(region.at(position[None])[0])
-    return float(region.among(lead.mask)[lead.mask][lead.instance == instance].mean(dtype=np.float64))
+def _holds(factor: Factor, lead: Factor) -> bool:
+    return factor.regional and isinstance(lead, NearThings)
 
 
 def _mark(factor: Factor, position: Float[np.ndarray, "3"]) -> float:
@@ -212,8 +211,8 @@ class Shares:
     rows: Int[np.ndarray, " v"]  # the map's rows of those that are voxels; they come first
     heat: Float[np.ndarray, " m"]  # the product there
     instance: Int[np.ndarray, " m"]  # whose share
-    # (instances,) highest heat in each share; that of a region is averaged over the instance's voxels.
-    peak: Float[np.ndarray, " i"]
+    peak: Float[np.ndarray, " i"]  # highest heat in each share, times ``inside``
+    inside: Float[np.ndarray, " i"]  # how far each instance lies in the regions among the factors
 
     def places(self, which: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k 3"]:
         """Return where some of them are, metres, world."""
@@ -251,23 +250,15 @@ def share_voxels(
             if factor is not lead:
                 at_anchors *= factor.at(lead.anchors)
         heat, instance = np.append(heat, at_anchors), np.append(instance, lead.instance)
-    regions = [factor for factor in factors if factor.regional]
-    if regions and isinstance(lead, NearThings):
-        return Shares(lead, rows, heat, instance, _peak_in_regions(lead, of_things(), regions))
-    return Shares(lead, rows, heat, instance, _highest(instance, heat, len(lead.confidence)))
-
-
-def _peak_in_regions(
-    lead: NearThings, others: Float32[np.ndarray, " n"], regions: Sequence[Factor]
-) -> Float[np.ndarray, " i"]:
     count = len(lead.confidence)
+    regions, inside = [factor for factor in factors if _holds(factor, lead)], np.ones(count)
+    if not (regions and isinstance(lead, NearThings)):
+        return Shares(lead, rows, heat, instance, _highest(instance, heat, count), inside)
+    inside = np.prod([region.held(lead) for region in regions], axis=0)
+    others = of_things()
     near = np.flatnonzero(others > 0.0)
     peak = _highest(lead.instance[lead.anchor_of(near)], others[near].astype(np.float64), count)
-    own = np.bincount(lead.instance, minlength=count)
-    for region in regions:
-        heat = region.among(lead.mask)[lead.mask].astype(np.float64)
-        peak *= np.bincount(lead.instance, heat, minlength=count) / np.maximum(own, 1)
-    return peak
+    return Shares(lead, rows, heat, instance, peak * inside, inside)
 
 
 def _highest(instance: Int[np.ndarray, " m"], heat: Float[np.ndarray, " m"], count: int) -> Float[np.ndarray, " i"]:
@@ -297,7 +288,7 @@ def weigh_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[tup
         if extents is not None and not extents.takes(instance, lead.space.level(position)):
             continue
         ground.append(xy)
-        evidence = evidence_of(factors, instance, position, float(shares.peak[instance]))
+        evidence = evidence_of(factors, instance, position, float(shares.peak[instance]), shares.inside[instance])
         probability = probability_of(evidence) if is_named else 0.0
         goals.append((_goal(factors, lead, instance, position, float(score[instance]), probability), evidence))
     return goals

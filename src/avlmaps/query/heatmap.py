@@ -175,7 +175,7 @@ class Blend(Heat):
         return " + ".join(f"{weight:g} * {heat.name}" for weight, heat in self.terms)
 
 
-_Where = Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, " n"]]
+_Where = Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, " n"] | Bool[np.ndarray, " n"]]
 _MOST_GOALS = 200  # that are looked through for those that lie where they may
 
 
@@ -189,7 +189,8 @@ class Heatmap(Heat):
     space: Space  # the map's voxels
     factors: tuple[Factor, ...]  # the parts of the query, one factor each
     found_at: float = FOUND_AT  # from this probability of the first goal on the query is found
-    where: "_Where | None" = None  # says of places (n, 3), metres, world, which may be goals; None: all
+    # Says of places (n, 3), metres, world, how likely each may be a goal, at most: 0 for those that may not. None: all.
+    where: "_Where | None" = None
 
     @classmethod
     def of(cls, factor: Factor, found_at: float = FOUND_AT) -> "Heatmap":
@@ -223,8 +224,8 @@ class Heatmap(Heat):
         if where is None or before is None:
             return replace(self, where=where or before)
 
-        def both(places: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
-            return before(places) & where(places)
+        def both(places: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
+            return np.minimum(before(places), where(places), dtype=np.float64)
 
         return replace(self, where=both)
 
@@ -311,8 +312,12 @@ class Heatmap(Heat):
     def _where_it_may(self) -> list[tuple[Goal, GoalEvidence]]:
         assert self.where is not None
         every = weigh_goals(self.factors, self._shares, _MOST_GOALS)
-        fits = self.where(np.array([goal.position for goal, _ in every]).reshape(-1, 3))
-        return [one for one, fit in zip(every, fits.tolist(), strict=True) if fit]
+        most = self.where(np.array([goal.position for goal, _ in every]).reshape(-1, 3))
+        return [
+            (replace(goal, probability=round(min(goal.probability, float(sure)), 3)), evidence)
+            for (goal, evidence), sure in zip(every, most.tolist(), strict=True)
+            if sure
+        ]
 
     @overload
     def plot(self, path: str | Path, *, top: int = 3) -> Path: ...

@@ -3,6 +3,7 @@
 ``ANSWERS`` has one function for each kind of list.
 """
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool, Float
+from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Question
@@ -25,6 +26,7 @@ from avlmaps.query.answer import Alternative, Answer, in_words, place_of, placed
 from avlmaps.query.changes import ChangeKind, Days
 from avlmaps.query.edits import means
 from avlmaps.query.goals import Goal
+from avlmaps.query.places import lies_between
 from avlmaps.query.whereabouts import NOWHERE, Whereabouts
 
 if TYPE_CHECKING:
@@ -36,6 +38,9 @@ BESIDE_M = 1.0  # from box to box, horizontally
 _ON_M = 0.3  # how far over a thing's box another that lies on it may be
 _HANGS = ("wall", "ceiling", "built in")  # such lies on nothing, even over a table
 _MOST_NAMED = 12
+# The standard deviation of a room's area, as a share: the median error is 7.1 % on twelve held-out homes
+# (docs/benchmarks.md).
+_AREA_ERROR = 0.105
 _LEAST_M2 = 1.0  # of a room; less is a corner that views disagree about
 _LIKELY = 0.3  # of a sound's second name
 _ROUND_SOUNDS = frozenset({"the", "a", "an", "of", "sound", "noise", "someone", "somebody", "my", "your", "go", "off"})
@@ -51,27 +56,11 @@ class _Lists:
     ) -> None:
         self.avlmap, self.question, self.top, self.ask, self.at = avlmap, question, top, ask, at
 
-    def where(self) -> Whereabouts:
-        return Whereabouts.of(self.avlmap)
-
     def days(self) -> Days:
         return Days.of(self.avlmap, self.avlmap.edited.life)
 
     def things(self) -> "list[Thing]":
         return self.avlmap.things() if "pixels" in self.avlmap.data.info.models else []
-
-    def inside(self, name: str, points: Sequence[Sequence[float]]) -> Bool[np.ndarray, " m"]:
-        """Return which points lie in a room by its name with a number, or in the parts that are of such a kind."""
-        places, where = np.array(points, np.float64).reshape(-1, 3), self.where()
-        number = where.one_named(name)
-        if number is not None and where.names[number] != where.rooms[number].name:
-            return where.rooms_of(places) == number
-        return where.parts_of(lambda kind: _same_room(kind, name), places)
-
-    def has_room(self, name: str) -> bool:
-        where = self.where()
-        is_one = where.one_named(name) is not None
-        return is_one or any(room.may_be(lambda kind: _same_room(kind, name)) for room in where.rooms)
 
     def answer(
         self, goals: Sequence[Goal], text: str, subject: Answer | None = None, count: int | None = None
@@ -111,17 +100,36 @@ def _thing_goal(thing: "Thing") -> Goal:
 
 
 def _rooms_by_size(lists: _Lists) -> Answer:
-    where, first = lists.where(), lists.question.first
+    where, first = lists.avlmap.where, lists.question.first
     areas = where.areas_m2()
     if not len(areas):
         raise QueryError("The map does not know the sizes of rooms: it has no floor plan, or no model of views.")
-    order = [int(number) for number in np.argsort(areas if first else -areas, kind="stable")]
-    order = [number for number in order if areas[number] >= _LEAST_M2]
-    goals = [_room_goal(where, number) for number in order]
-    if not goals:
+    order = np.argsort(areas if first else -areas, kind="stable")
+    order = order[areas[order] >= _LEAST_M2]
+    if not len(order):
         return lists.answer([], f"The map shows no room of {_LEAST_M2:g} m² or more.")
-    text = f"the {'smallest' if first else 'largest'} room is the {goals[0].name}, {areas[order[0]]:.0f} m²"
-    return lists.answer(goals, placed(text, goals[0]))
+    likely = extreme_shares(areas[order], smallest=first)
+    goals = [_room_goal(where, int(number)) for number in order]
+    goals = [
+        replace(goal, probability=round(share * goal.probability, 3))
+        for goal, share in zip(goals, likely.tolist(), strict=True)
+    ]
+    which = "smallest" if first else "largest"
+    text = placed(f"the {which} room is {the_room(goals[0].name)}, {areas[order[0]]:.0f} m²", goals[0])
+    rivals = [f"{the_room(goals[n].name)} ({areas[order[n]]:.1f} m²)" for n in np.flatnonzero(likely > 0.1).tolist()]
+    if len(rivals) > 1:
+        text = f"{text} The map does not tell these sizes apart: {', '.join(rivals)}."
+    return lists.answer(goals, text)
+
+
+def extreme_shares(areas_m2: Float[np.ndarray, " r"], *, smallest: bool) -> Float[np.ndarray, " r"]:
+    """Return how likely each room is the smallest, or the largest, as well as areas are known; they add up to 1."""
+    sigma, sign = _AREA_ERROR * areas_m2, 1.0 if smallest else -1.0
+    ends = (sign * areas_m2 - 5.0 * sigma).min(), (sign * areas_m2 + 5.0 * sigma).max()
+    score: Float[np.ndarray, "n r"] = (np.linspace(*ends, 2001)[:, None] - sign * areas_m2) / sigma
+    larger: Float[np.ndarray, "n r"] = np.maximum(0.5 * np.vectorize(math.erfc)(score / math.sqrt(2.0)), 1e-300)
+    density = np.exp(-0.5 * np.square(score)) / sigma * larger.prod(axis=1, keepdims=True) / larger
+    return density.sum(axis=0) / density.sum()
 
 
 def _sounds_by_time(lists: _Lists) -> Answer:
@@ -157,7 +165,7 @@ def _heard(lists: _Lists) -> Answer:
     # When, where and how often a sound was heard, which came first, or what was heard in a room.
     question, sounds = lists.question, sorted(lists.avlmap.sounds(), key=lambda sound: sound.onset_s)
     if question.how == "in":
-        inside = lists.inside(question.name, [sound.position for sound in sounds]) if sounds else ()
+        inside = lists.avlmap.where.inside(question.name, [sound.position for sound in sounds]) if sounds else ()
         sounds = [sound for sound, is_in in zip(sounds, inside, strict=True) if is_in]
         told = ", ".join(f"{_sound_goal(sound).name} at {sound.onset_s:.1f} s" for sound in sounds)
         text = f"In the {question.name} were heard: {told}." if sounds else f"No sound was in the {question.name}."
@@ -205,7 +213,7 @@ def _stems(words: str) -> frozenset[str]:
 
 
 def _names(lists: _Lists) -> Answer:
-    kind, where = lists.question.name, lists.where() if lists.question.name == "rooms" else None
+    kind, where = lists.question.name, lists.avlmap.where if lists.question.name == "rooms" else None
     if where is not None:
         goals = [_room_goal(where, number) for number in range(len(where.rooms))]
     elif kind == "sounds":
@@ -226,9 +234,9 @@ def _changes(lists: _Lists) -> Answer:
     kinds: list[ChangeKind] = [kind for kind in every if question.change in ("", kind)]
     listed = [one for one in answer["changes"] if one["kind"] in kinds]
     if question.name:
-        inside = lists.inside(question.name, [one["position"] for one in listed])
+        inside = lists.avlmap.where.inside(question.name, [one["position"] for one in listed])
         listed = [one for one, is_in in zip(listed, inside, strict=True) if is_in]
-        if not lists.has_room(question.name):
+        if not lists.avlmap.where.has(question.name):
             return lists.answer([], _no_room(question.name), count=0)
     answer["changes"] = listed
     goals = [_goal(one["position"], one["confidence"], one["name"], one["size"]) for one in listed]
@@ -258,9 +266,9 @@ def _usual(lists: _Lists) -> Answer:
         found = changes.usual(days, lambda stay: meant(stay.name))
         text = changes.usual_place_text(days, name, found, changes.room_namer(avlmap))
     elif how == "in":
-        if not lists.has_room(name):
+        if not lists.avlmap.where.has(name):
             return lists.answer([], _no_room(name))
-        inside = lists.inside(name, [stay.position for stay in days.life.stays])
+        inside = lists.avlmap.where.inside(name, [stay.position for stay in days.life.stays])
         within = {id(stay) for stay, is_in in zip(days.life.stays, inside, strict=True) if is_in}
         found = changes.usual(days, lambda stay: id(stay) in within)
         text = changes.usual_text(found, f"in {the_room(name)}")
@@ -312,7 +320,7 @@ def _room_of(lists: _Lists) -> Answer:
     subject = lists.ask(lists.question.name)
     if not subject.found:
         return replace(subject, goals=())
-    where, goal = lists.where(), subject.goals[0]
+    where, goal = lists.avlmap.where, subject.goals[0]
     number = int(where.rooms_of(np.array([goal.position]))[0])
     if number == NOWHERE:
         raise QueryError("The map has no rooms: it was built without a model of views.")
@@ -327,9 +335,10 @@ def _contents(lists: _Lists) -> Answer:
     if not subject.found:
         return replace(subject, goals=())
     things = lists.things()
-    inside = lists.inside(name, [thing.position for thing in things])
+    inside = lists.avlmap.where.inside(name, [thing.position for thing in things])
     goals = [_thing_goal(thing) for thing, is_in in zip(things, inside, strict=True) if is_in]
-    text = f"In {the_room(name)}: {counted([goal.name for goal in goals])}." if lists.has_room(name) else _no_room(name)
+    is_there = lists.avlmap.where.has(name)
+    text = f"In {the_room(name)}: {counted([goal.name for goal in goals])}." if is_there else _no_room(name)
     return lists.answer(goals, text, subject)
 
 
@@ -348,23 +357,30 @@ def _beside(lists: _Lists) -> Answer:
     return lists.answer([_thing_goal(thing) for _, thing in near], text, subject)
 
 
-def _between(lists: _Lists, subject: Answer) -> Answer:
-    # What is left and right of the straight line between two things, as far from it as things beside a thing are.
-    other = lists.ask(lists.question.other)
+def _between(lists: _Lists, one: Answer) -> Answer:
+    question, avlmap = lists.question, lists.avlmap
+    other = lists.ask(question.other)
     if not other.found:
         return replace(other, goals=())
-    one, two = (_Box(lists.avlmap, answer.goals[0]) for answer in (subject, other))
-    way = (two.middle - one.middle)[:2]
-
-    def is_between(box: _Box) -> bool:
-        ahead = float(way @ (box.middle - one.middle)[:2]) / max(float(way @ way), 1e-9)
-        off_m = float(np.linalg.norm(box.middle[:2] - one.middle[:2] - ahead * way))
-        return 0.0 < ahead < 1.0 and off_m <= BESIDE_M and not (box.overlaps(one) or box.overlaps(two))
-
-    found = [thing for thing in lists.things() if is_between(_Box(lists.avlmap, thing))]
-    words = " and ".join(in_words([one.part for one in answer.parts]) for answer in (subject, other))
-    text = f"Between {words}: {counted([thing.name for thing in found])}."
-    return lists.answer([_thing_goal(thing) for thing in found], text, subject)
+    if question.how:
+        goals = [_room_goal(avlmap.where, number) for number in range(len(avlmap.where.rooms))]
+    else:
+        goals = list(map(_thing_goal, lists.things()))
+    ends = [avlmap.space.level(np.array(end.goals[0].position))[:2] for end in (one, other)]
+    places = avlmap.space.level(np.array([goal.position for goal in goals]).reshape(-1, 3))[:, :2]
+    fits, sure = lies_between(places, *ends), min(one.probability, other.probability)
+    for name in (question.name, question.other):  # what is in a room is not beside it
+        if avlmap.where.has(name):
+            fits &= ~avlmap.where.inside(name, [goal.position for goal in goals])
+    boxes = [_Box(avlmap, end.goals[0]) for end in (one, other)]
+    inside = [
+        replace(goal, probability=min(goal.probability, sure))
+        for goal, is_in in zip(goals, fits.tolist(), strict=True)
+        if is_in and not any(box.overlaps(_Box(avlmap, goal)) for box in boxes)
+    ]
+    words = " and ".join(in_words([part.part for part in end.parts]) for end in (one, other))
+    what = counted([goal.name for goal in inside]) if inside or not question.how else "no room"
+    return lists.answer(inside, f"Between {words}: {what}.", one)
 
 
 ANSWERS: Mapping[Listed, Callable[[_Lists], Answer]] = {
@@ -384,10 +400,6 @@ ANSWERS: Mapping[Listed, Callable[[_Lists], Answer]] = {
 
 def _no_room(name: str) -> str:
     return f"The map shows no room that is a {name} as a whole."
-
-
-def _same_room(kind: str, name: str) -> bool:
-    return kind == name or lexicon().is_a(kind, name, EntryKind.ROOM)
 
 
 def counted(names: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict, cast
 import numpy as np
 from msgspec import Meta
 
-from avlmaps.core.arrays import Float, Int
+from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME, FrameName, apply
 from avlmaps.core.question import Modality, Part, Role
@@ -66,6 +66,20 @@ def distance_m(
 def is_place(near: str | Sequence[float]) -> bool:
     """Return whether what things are near to is meant as a place rather than as the name of a thing."""
     return not isinstance(near, str) or not any(letter.isalpha() for letter in near)
+
+
+_ASIDE_M = 0.5  # how far from the line between two things what is between them may lie
+
+
+def lies_between(
+    at: Float[np.ndarray, "n 2"], one: Float[np.ndarray, "2"], other: Float[np.ndarray, "2"]
+) -> Bool[np.ndarray, " n"]:
+    """Return which places lie between two others, top-down: near the line from one to the other, level x and y."""
+    along = other - one
+    length_m = max(float(np.linalg.norm(along)), 1e-9)
+    share = (at - one) @ along / length_m**2
+    aside_m = np.abs((at - one) @ np.array([-along[1], along[0]])) / length_m
+    return (share > 0.0) & (share < 1.0) & (aside_m <= max(length_m / 4.0, _ASIDE_M))
 
 
 MOST_NAMES = 5

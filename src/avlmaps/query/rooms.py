@@ -4,7 +4,7 @@ The kind of room then speaks for a thing that seems to stand in it: a stove in a
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float, Float32, Float64, Int
 from avlmaps.core.lexicon import Entry, EntryKind, lexicon
 from avlmaps.perception.protocols import RoomContents
-from avlmaps.query.factors import NearAnchors
+from avlmaps.query.factors import NearAnchors, NearThings
 from avlmaps.query.floor_plan import CELL_M, FloorPlan
 from avlmaps.query.room_regions import NONE, RoomRegions
 from avlmaps.query.settings import FOUND_AT, RoomSettings
@@ -140,10 +140,29 @@ class RoomField:
     share: Float32[np.ndarray, "c n"]  # of each cell; rows add up to 1
     # Number of views that vote there, each by its nearness in [0, 1]; more between walls that reflect it.
     views: Float32[np.ndarray, " c"]
+    rooms: "tuple[RoomRegions, Int[np.ndarray, ' c']] | None" = None  # once settled, and the room of each cell
 
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float32[np.ndarray, "m n"]:
-        """Return how likely each point is in each kind of room."""
-        return self.share[self.plan.cells_of(points_world)]
+        """Return how likely each point is in each kind of room.
+
+        A picture in a thin wall is in the room that its region says, though the open cell nearest to it be behind it.
+        """
+        cells = self.plan.cells_of(points_world)
+        if self.rooms is not None:
+            own, room_of_cell = self.room_of(points_world), self.rooms[1]
+            behind = own != room_of_cell[cells]
+            for room in np.unique(own[behind]):
+                of_room, there = np.flatnonzero(room_of_cell == room), np.flatnonzero(behind & (own == room))
+                cells[there] = of_room[self.plan.nearest_of(of_room, np.asarray(points_world)[there])]
+        return self.share[cells]
+
+    def room_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+        """Return the room of each point, of a settled field: its region, else that of the cell nearest to it."""
+        assert self.rooms is not None
+        regions, room_of_cell = self.rooms
+        own = regions.at(points_world)
+        is_room = (own != NONE) & np.isin(own, room_of_cell)
+        return np.where(is_room, own, room_of_cell[self.plan.cells_of(points_world)])
 
     def with_certain(self, named: "Sequence[tuple[str, Bool[np.ndarray, ' c']]]") -> "RoomField":
         """Return the field where some cells are certain to be of a kind; new kinds come behind the others.
@@ -217,7 +236,7 @@ class RoomField:
         in_parts /= np.maximum(in_parts.sum(axis=1, keepdims=True), 1e-12)
         share = self.share.copy()
         share[inside] = np.where(parts.any(axis=1, keepdims=True), in_parts, whole)
-        return replace(self, share=share)
+        return replace(self, share=share, rooms=(regions, room_of_cell))
 
 
 def seen_twice(field: RoomField, regions: RoomRegions) -> Int[np.ndarray, "p 2"]:
@@ -358,6 +377,15 @@ class InRooms(NearAnchors):
     @cached_property
     def _nearest(self) -> Int[np.ndarray, " c"]:
         return self.kinds.plan.nearest(self.anchors)
+
+    def cones(self) -> NearAnchors:
+        """Return the heat that falls off round the places that look like such an area."""
+        own = (getattr(self, each.name) for each in fields(NearAnchors) if each.init)
+        return NearAnchors(*own)
+
+    def held(self, lead: NearThings) -> Float[np.ndarray, " i"]:
+        """Return how likely each instance is in such a room: a thing is in one, that of its middle, as in lists."""
+        return self.at(lead.middles)
 
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""

@@ -12,12 +12,12 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AvlmapsError, QueryError
+from avlmaps.core.wording import the_room
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Watch, listed_rooms, put_storeys, require_known
 from avlmaps.query.places import distance_m, is_place, place_given
-from avlmaps.query.schema import ListedThing, NearAnswer, RoomAnswer, SoundAnswer, ThingAnswer
+from avlmaps.query.schema import ListedThing, NearAnswer, Notes, RoomAnswer, SoundAnswer, ThingAnswer
 from avlmaps.query.sound_sources import with_heard
-from avlmaps.query.whereabouts import Whereabouts
 from avlmaps.query.words import unknown_note
 
 Row = TypeVar("Row")
@@ -38,11 +38,6 @@ class MapLists:
     once: Callable[[object, Callable[[], Any]], Any] = field(default=_computed, repr=False)
     # Is given the progress, as by ``AVLMap.things``.
     watch: Watch = field(default=lambda stage, done, total: None, repr=False)
-
-    @property
-    def where(self) -> Whereabouts:
-        """The floors and rooms."""
-        return self.once("whereabouts", lambda: Whereabouts.of(self.avlmap))
 
     def things(
         self, least: float = 0.5, names: Sequence[str] = (), structure: bool = False, at: str | None = None
@@ -113,6 +108,7 @@ class ThingsPage(TypedDict):
     page: NotRequired[int]
     pages: NotRequired[int]
     near: NotRequired[NearAnswer]
+    notes: NotRequired[Notes]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,12 +132,16 @@ def page_of_things(lists: MapLists, wanted: Wanted) -> ThingsPage:
         rows = [ListedThing(**thing) for thing in lists.wanted(wanted)]
     else:
         chosen, about = selected(lists, wanted)
-        names = lists.where.names
+        names = lists.avlmap.where.names
         rows = [_row(one, names[one.room] if one.room >= 0 else None) for one in chosen]
     top = max(len(rows), 1) if wanted.top is None else wanted.top
     things, pages = page_of(rows, top, wanted.page, "things")
     answer: ThingsPage = {"things": things, "total": len(rows), "page": wanted.page, "pages": pages}
-    return answer if about is None else {**answer, "near": about}
+    if about is not None:
+        answer["near"] = about
+    if notes := beyond(lists, wanted.room, about):
+        answer["notes"] = notes
+    return answer
 
 
 def things_with_rooms(lists: MapLists, wanted: Wanted) -> list[Selected]:
@@ -149,7 +149,7 @@ def things_with_rooms(lists: MapLists, wanted: Wanted) -> list[Selected]:
     things = lists.wanted(wanted)
     key = ("rooms of things", wanted.least, tuple(wanted.name), wanted.structure, wanted.at)
     places = np.array([thing["position"] for thing in things], np.float64).reshape(-1, 3)
-    rooms: list[int] = lists.once(key, lambda: lists.where.rooms_of(places).tolist())
+    rooms: list[int] = lists.once(key, lambda: lists.avlmap.where.rooms_of(places).tolist())
     return [Selected(thing, room) for thing, room in zip(things, rooms, strict=True)]
 
 
@@ -158,13 +158,10 @@ def selected(lists: MapLists, wanted: Wanted) -> tuple[list[Selected], NearAnswe
 
     ``QueryError``: there is no such room, or no such thing to be near to.
     """
-    found, numbers = things_with_rooms(lists, wanted), None
-    if wanted.room is not None:
-        numbers = set(lists.where.numbers_of(wanted.room))
-        found = [one for one in found if one.room in numbers]
+    found = _inside(lists, wanted.room, things_with_rooms(lists, wanted), lambda one: one.thing["position"])
     if wanted.near is None:
         return found, None
-    place, about = _near(lists, wanted.near, wanted.at, numbers)
+    place, about = _near(lists, wanted.near, wanted.at, wanted.room)
     itself = None if about is None else about["position"]
     level = lists.avlmap.space.level
     found = [
@@ -197,9 +194,9 @@ def _row(one: Selected, room: str | None) -> ListedThing:
 
 
 def _near(
-    lists: MapLists, near: str | Sequence[float], at: str | None, rooms: set[int] | None
+    lists: MapLists, near: str | Sequence[float], at: str | None, room: str | None
 ) -> tuple[Float[np.ndarray, " n"], NearAnswer | None]:
-    # The place that is meant, and the thing there if one is named; where the rooms hold one, that.
+    # The place that is meant, and the thing there if one is named; where the room holds one, that.
     if is_place(near):
         return place_given(near), None
     name = str(near)
@@ -208,12 +205,27 @@ def _near(
     if not things:
         why = "" if known else f": {unknown_note(name)}"
         raise QueryError(f"The map shows no {name[:60]!r} to be near to{why}; give a place as x,y,z, or another name.")
-    best = things[0]
-    if rooms is not None:
-        own = lists.where.rooms_of(np.array([thing["position"] for thing in things])).tolist()
-        best = next((thing for thing, room in zip(things, own, strict=True) if room in rooms), best)
+    best = next(iter(_inside(lists, room, things, lambda thing: thing["position"])), things[0])
     about: NearAnswer = {"name": best["name"], "confidence": best["confidence"], "position": best["position"]}
     return np.array(best["position"]), about
+
+
+def _inside(lists: MapLists, room: str | None, rows: Sequence[Row], place: Callable[[Row], list[float]]) -> list[Row]:
+    if room is None:
+        return list(rows)
+    where = lists.avlmap.where
+    where.require(room)
+    return [row for row, is_in in zip(rows, where.inside(room, [place(row) for row in rows]), strict=True) if is_in]
+
+
+def beyond(lists: MapLists, room: str | None, about: NearAnswer | None) -> list[str]:
+    """Return the note that what things should be near to lies in another room than they do."""
+    if room is None or about is None or _inside(lists, room, [about], lambda one: one["position"]):
+        return []
+    own = lists.avlmap.where.name_of(about["position"])
+    return [
+        f"No {about['name']} lies in {the_room(room)}; the distances are to the one in {the_room(own or 'the map')}."
+    ]
 
 
 def map_answer(avlmap: AVLMap, note: Callable[[AvlmapsError], object] = lambda _: None) -> dict[str, Any]:

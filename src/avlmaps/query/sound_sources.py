@@ -289,9 +289,7 @@ class _Places:
 
     @cached_property
     def _rooms(self):
-        from avlmaps.query.whereabouts import Whereabouts
-
-        return Whereabouts.of(self._map)
+        return self._map.where
 
     @cached_property
     def _things(self) -> "list[Thing]":

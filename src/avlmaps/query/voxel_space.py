@@ -92,6 +92,11 @@ def boxes(
     return low, high
 
 
+def middle_of(points: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, "3"]:
+    """Return the point nearest to the mean of some points."""
+    return points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
+
+
 def distinct(values: Int[np.ndarray, " n"]) -> Int[np.ndarray, " d"]:
     """Return the distinct values, ascending, as ``np.unique`` does; that loads ``numpy.ma`` to compare with."""
     ordered = np.sort(values)

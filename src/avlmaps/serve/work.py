@@ -42,6 +42,7 @@ from avlmaps.query.selection import (
     Selected,
     ThingsPage,
     Wanted,
+    beyond,
     map_answer,
     page_of,
     page_of_things,
@@ -103,7 +104,6 @@ class ListedThingsAnswer(ThingsPage):
 
     map: str
     frame: Frame
-    notes: NotRequired[Notes]
 
 
 class SoundsAnswer(TypedDict):
@@ -166,7 +166,7 @@ Noted = TypeVar("Noted", ContentsAnswer, ListedThingsAnswer, SoundsAnswer, Rooms
 def _noted(task: WorkInput, answer: Noted) -> Noted:
     opened = task.map.avlmap
     if doubts := opened.doubts_of_things if "things" in answer else opened.data.info.doubts:
-        answer["notes"] = [without_folders(doubt) for doubt in doubts]
+        answer["notes"] = [*answer.get("notes", ()), *map(without_folders, doubts)]
     return answer
 
 
@@ -340,7 +340,7 @@ _MOST_KINDS, _MOST_HEARD = 12, 2
 def describe_building(task: WorkInput, query: NoQuery) -> dict[str, Any]:
     """Return the floors with their rooms, and how many things of each name there are."""
     avlmap, lists = task.map.avlmap, lists_of(task)
-    where, things = lists.where, lists.things()
+    where, things = lists.avlmap.where, lists.things()
     floors = where.floors_of(_places([room.position for room in where.rooms]))
     thing_floors = where.floors_of(_places([thing["position"] for thing in things]))
     level = avlmap.space.level(avlmap.points) if len(avlmap.space) else np.zeros((1, 3))
@@ -365,15 +365,16 @@ def describe_building(task: WorkInput, query: NoQuery) -> dict[str, Any]:
 def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, Any]:
     """Return the things of a room, or near a place, or of a name; a page of them."""
     lists = lists_of(task)
-    where, names = lists.where, query.name
+    where, names = lists.avlmap.where, query.name
     unknown = [name for name in names if not task.map.avlmap.knows(name)]
     known = [name for name in names if name not in unknown]
     wanted = Wanted(**{**msgspec.structs.asdict(query), "name": known})
     chosen, near = selected(lists, wanted) if known or not names else ([], None)
     about: dict[str, Any] = {"near": near}
     rows = [_thing_row(one, where) for one in chosen]
-    if unknown:
-        about["note"] = unknown_note(unknown[0])
+    notes = [unknown_note(unknown[0])] if unknown else beyond(lists, query.room, near)
+    if notes:
+        about["note"] = notes[0]
     if not names and len(rows) > query.top:
         about["names"] = _kinds(rows)
     return _paged(task, "things", rows, query.top, query.page) | about
@@ -382,7 +383,7 @@ def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, A
 def tool_rooms(task: WorkInput, query: requests.RoomsToolQuery) -> dict[str, Any]:
     """Return the rooms of a floor, each with the number of things in it; a page of them."""
     lists = lists_of(task)
-    where = lists.where
+    where = lists.avlmap.where
     count = Counter(one.room for one in things_with_rooms(lists, Wanted()))
     floors = where.floors_of(_places([room.position for room in where.rooms]))
     if query.floor is not None and not 0 <= query.floor < where.floor_count:
@@ -410,7 +411,7 @@ def tool_rooms(task: WorkInput, query: requests.RoomsToolQuery) -> dict[str, Any
 def tool_sounds(task: WorkInput, query: requests.SoundsToolQuery) -> dict[str, Any]:
     """Return the sounds with their likeliest names, times and places; a page of them."""
     lists, names = lists_of(task), {name.casefold() for name in query.name}
-    where, sounds = lists.where, lists.sounds()
+    where, sounds = lists.avlmap.where, lists.sounds()
     rooms = where.rooms_of(_places([sound["position"] for sound in sounds]))
     rows = [
         {

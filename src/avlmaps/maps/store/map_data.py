@@ -95,8 +95,13 @@ def require_model(info: MapInfo, encoders: Encoders, kind: Kind, path: Path) -> 
     here = public_name(card.id)
     if made_by.backend == GIVEN_FEATURES and card.dim == made_by.dim:
         return
+    if card.dim != made_by.dim:
+        raise MapError(
+            f"The features of {path} for {kind.value} have {made_by.dim} numbers, those of {here} {card.dim}; ask with "
+            f"the encoder that made them, {made_by.id}, or build the map again with this one."
+        )
     # An imported map does not know its weights (checksum ""); what is known of them must still agree.
-    if (here, card.dim, card.checksum) != (made_by.id, made_by.dim, made_by.checksum or card.checksum):
+    if (here, card.checksum) != (made_by.id, made_by.checksum or card.checksum):
         older = info.avlmaps_version
         instead = f", or use avlmaps {older}" if older != __version__ else " from its recording"
         if "@" in made_by.backend:

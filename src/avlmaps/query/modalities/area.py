@@ -206,7 +206,6 @@ def area_factor(
     heat: HeatSettings,
     rooms: Rooms | None = None,
     settled: Callable[[RoomField], RoomField] = lambda field: field,
-    room_of: Callable[[Float[np.ndarray, "k 3"]], Int[np.ndarray, " k"]] | None = None,
 ) -> NearAnchors:
     """Return the heat of an area: one anchor a keyframe.
 
@@ -214,7 +213,7 @@ def area_factor(
     that look most like it, and each room is one goal. Without rooms heat falls off round every keyframe.
 
     ``settled`` makes a room of one kind, and puts in the rooms that people named: kinds behind those that the encoder
-    knows; one without a name is the room that the query names by its number. ``room_of`` returns the rooms of places.
+    knows; one without a name is the room that the query names by its number.
     """
     anchors = area_anchors(keyframes, settings)
     view = np.asarray(keyframes.view)
@@ -239,8 +238,8 @@ def area_factor(
     if not len(keyframes):
         note = "the map holds no keyframes"
     group = modes(space.level(anchors)[:, :2], scores, settings.link_m)
-    if kinds is not None and room_of is not None:  # however far apart the views of a room look
-        room = room_of(anchors)
+    if kinds is not None and kinds.rooms is not None:  # however far apart the views of a room look
+        room = kinds.room_of(anchors)
         group = np.unique(np.where(room >= 0, room, 1 + room.max(initial=-1) + group), return_inverse=True)[1]
     falloff, found = heat.falloff_per_m(part.role), best >= FOUND_AT
     if kinds is None or part.role is Role.PRIMARY:
