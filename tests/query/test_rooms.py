@@ -364,7 +364,7 @@ def test_an_encoder_that_was_tried_out_in_rooms_says_what_its_names_mean() -> No
         room_contents = RoomContents(("bed",), ("kitchen", "bedroom"), np.array([[3.0, 0.1]]))
 
     m = home()
-    surveyed = Surveyed(("wall", "bed", "stove"))
+    surveyed = Surveyed(("wall", "bed", "stove", "clocks"))
     m.encoders = m.encoders.having(pixels=surveyed)
     right = np.array([[4.5, 1.5, 0.4]])
     assert m.area("bedroom").factors[0].at(right)[0] < home().area("bedroom").factors[0].at(right)[0]
