@@ -10,7 +10,7 @@ from avlmaps.language.commands import UnclearError, read_command
 from avlmaps.language.gate import no_order
 from avlmaps.language.learned_translator import LearnedTranslator
 
-HELD_OUT = Path(__file__).parent / "commands" / "gate_held_out.tsv"
+LISTS = Path(__file__).parent / "commands"
 NO_ORDERS = {
     "cancelled": ["cancel the visit to the sofa", "never mind going to the bed", "Don't bother driving to the desk."],
     "postponed": ["postpone the drive to the sofa", "I may send you to the kitchen later"],
@@ -60,8 +60,9 @@ def test_no_model_is_asked_to_write_a_danger(text: str) -> None:
         ChatTranslator(ChatSettings(base_url="http://127.0.0.1:9", model="none")).program_for(text)
 
 
-def test_sentences_that_the_network_never_saw_are_told_apart() -> None:
-    with HELD_OUT.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file, delimiter="\t"))
-    closed = [row["is"] for row in rows if no_order(row["sentence"]) is not None]
-    assert closed.count("no") >= 90 and closed.count("order") <= 5  # of 100 and 60; 93 and 3 when it was fitted
+@pytest.mark.parametrize(("file", "caught", "asked"), [("gate_held_out", 90, 10), ("gate_hand_held_out", 180, 14)])
+def test_sentences_that_the_network_never_saw_are_told_apart(file: str, caught: int, asked: int) -> None:
+    """Of 100 and 200 no orders at least so many are told, of 60 and 200 orders at most so many are asked back."""
+    with (LISTS / f"{file}.tsv").open(encoding="utf-8", newline="") as rows:
+        closed = [row["is"] for row in csv.DictReader(rows, delimiter="\t") if no_order(row["sentence"]) is not None]
+    assert closed.count("no") >= caught and closed.count("order") <= asked

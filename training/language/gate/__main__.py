@@ -1,6 +1,6 @@
 """Fit the gate's network and write it: python -m training.language.gate MODEL, the folder of all-MiniLM-L6-v2.
 
-Needs torch, transformers and onnxruntime; six minutes of one core.
+Needs torch, transformers and onnxruntime; twelve minutes of one core.
 """
 
 import json
@@ -13,11 +13,12 @@ from tempfile import TemporaryDirectory
 import torch
 from onnxruntime.quantization import QuantType, quantize_dynamic
 from torch import Tensor, nn
-from training.language.gate.sentences import filled, of_lists
+from training.language.gate.sentences import filled, of_hands, of_lists
 from transformers import AutoModel, AutoTokenizer
 
 OUT = Path(__file__).parents[3] / "src/avlmaps/language/learned/weights"
-LAYERS, HEADS, STEPS, BATCH, LIMIT = 3, 12, 800, 32, 0.3
+LAYERS, HEADS, STEPS, LIMIT = 3, 12, 900, 0.2
+BATCH = {"frames": (6, 4), "lists": (2, 12), "hands": (14, 14)}  # no orders and orders
 MOST_PIECES = 80
 USUAL = 15_000  # pieces of the vocabulary stand in the order of their use
 
@@ -48,8 +49,8 @@ class Exported(nn.Module):
         self.places = nn.Parameter((words.position_embeddings.weight[:MOST_PIECES] + kind).detach())
         self.norm, self.layers, self.head = words.LayerNorm, judge.model.encoder.layer, judge.head
 
-    def forward(self, pieces: Tensor) -> Tensor:
-        """Return the logit of a sentence of shape (1, n)."""
+    def forward(self, pieces: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the logit of a sentence of shape (1, n), and the states of its pieces (1, n, 384)."""
         count = pieces.shape[1]
         states = self.norm(self.words(pieces) + self.places[:count])
 
@@ -63,26 +64,29 @@ class Exported(nn.Module):
             states = out.LayerNorm(states + out.dense(heeded.transpose(1, 2).reshape(1, count, 384)))
             wide = nn.functional.gelu(layer.intermediate.dense(states))
             states = layer.output.LayerNorm(states + layer.output.dense(wide))
-        return self.head(states.mean(1))[:, 0]
+        return self.head(states.mean(1))[:, 0], states
 
 
 def fitted(folder: str) -> Judge:
-    """Return the network, fitted to the frames and the lists; half of each batch is no order."""
+    """Return the network, fitted to the frames, the lists and the hands; nearly half of each batch is no order."""
     random = Random(2)
     torch.manual_seed(2)
     pieces_of, judge = AutoTokenizer.from_pretrained(folder), Judge(AutoModel.from_pretrained(folder))
-    made, listed = list(filled(random, 8)), list(of_lists())
-    none = [text for closed, text in made if closed] + 3 * [text for closed, text in listed if closed]
-    orders, said = ([text for closed, text in each if not closed] for each in (made, listed))
+    every = {"frames": list(filled(random, 8)), "lists": list(of_lists()), "hands": list(of_hands())}
+    parts = [
+        ([text for closed, text in every[name] if closed is wanted], counts[not wanted], 0.96 * wanted + 0.02)
+        for name, counts in BATCH.items()
+        for wanted in (True, False)
+    ]
+    truth = torch.tensor([likely for _, count, likely in parts for _ in range(count)])
     judge.model.embeddings.word_embeddings.requires_grad_(requires_grad=False)
     body = [each for each in judge.model.parameters() if each.requires_grad]
     rates = (1e-4, 2e-3)
     steps = torch.optim.AdamW([{"params": body}, {"params": judge.head.parameters()}], weight_decay=0.01)
-    truth = torch.tensor([0.98] * (BATCH // 2) + [0.02] * (BATCH // 2))
     for step in range(STEPS):
         for group, rate in zip(steps.param_groups, rates, strict=True):
             group["lr"] = rate * min(1.0, (step + 1) / 30) * max(0.02, 1.0 - step / STEPS)
-        texts = random.sample(none, BATCH // 2) + random.sample(orders, BATCH // 4) + random.sample(said, BATCH // 4)
+        texts = [text for said, count, _ in parts for text in random.sample(said, count)]
         batch = pieces_of(texts, padding=True, truncation=True, max_length=48, return_tensors="pt")
         loss = nn.functional.binary_cross_entropy_with_logits(judge(batch["input_ids"], batch["attention_mask"]), truth)
         steps.zero_grad()
@@ -102,7 +106,8 @@ def main(folder: str) -> None:
         graph = f"{where}/gate.onnx"
         torch.onnx.export(
             Exported(judge, kept).eval(), (torch.zeros(1, 12, dtype=torch.long),), graph, input_names=["pieces"],
-            output_names=["logit"], dynamic_axes={"pieces": {1: "n"}}, opset_version=17, dynamo=False,
+            output_names=["logit", "states"], dynamic_axes={"pieces": {1: "n"}, "states": {1: "n"}},
+            opset_version=17, dynamo=False,
         )  # fmt: skip
         quantize_dynamic(graph, str(OUT / "gate.onnx"), weight_type=QuantType.QInt8, per_channel=True)
     facts = {"limit": LIMIT, "pieces": [entries[at] for at in kept]}

@@ -49,6 +49,12 @@ def of_lists() -> Iterator[tuple[bool, str]]:
                 yield False, row["say"]
 
 
+def of_hands() -> Iterator[tuple[bool, str]]:
+    """Yield the sentences of `hands.tsv`, and whether each is no order: written by hands that knew no frame."""
+    with (HERE / "hands.tsv").open(encoding="utf-8", newline="") as file:
+        yield from ((row["is"] == "no", row["sentence"]) for row in csv.DictReader(file, delimiter="\t"))
+
+
 @cache
 def _slots() -> dict[str, list]:  # pyright: ignore[reportMissingTypeArgument] - words, or the five forms of verbs
     told = tomllib.loads((HERE / "slots.toml").read_text(encoding="utf-8"))
