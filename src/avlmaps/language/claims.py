@@ -13,26 +13,16 @@ from functools import cache
 import msgspec
 
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.language import intents as act
 from avlmaps.language import lexer
 from avlmaps.language.intents import (
-    Ask,
-    Beside,
-    Circle,
     Clarify,
-    Face,
     Inquiry,
     Intent,
-    Move,
     RefusalReason,
     Refuse,
-    Repeat,
-    Side,
-    StopAt,
     Target,
     TargetKind,
-    Turn,
-    TurnSense,
-    VisitEach,
     steps_of,
     targets_of,
 )
@@ -45,8 +35,8 @@ _ANSWERS = "it answers where things and sounds are, how many there are, and whet
 _MARKS = {TargetKind.AREA: "@", TargetKind.SOUND: "$"}
 _BEGIN = r"(?<![^ ^@$])[\^@$]?"  # of a word
 _HEARD = frozenset({"hear", "heard", "hearing", "sound", "noise"})
-_WAYS = dict.fromkeys(("clockwise", "cw"), TurnSense.CLOCKWISE) | dict.fromkeys(
-    ("counterclockwise", "anticlockwise", "ccw"), TurnSense.COUNTERCLOCKWISE
+_WAYS = dict.fromkeys(("clockwise", "cw"), act.TurnSense.CLOCKWISE) | dict.fromkeys(
+    ("counterclockwise", "anticlockwise", "ccw"), act.TurnSense.COUNTERCLOCKWISE
 )
 _VAGUE = frozenset({"a", "an", "one", "another"})
 _AMOUNTS = {
@@ -174,7 +164,7 @@ def unmet_by(tokens: Sequence[Token], inquiry: Inquiry, used: frozenset[int]) ->
         facts |= {"sound"} | ({"heard sound"} if _HEARD & {token.text for token in tokens} else set())
         facts |= {"no sound"} if "heard sound" not in facts and not _sounds(about.name) else set()
     facts |= {token.kind for token in tokens if token.kind in ("clip", "image")}
-    if inquiry.ask is Ask.EXISTS or _asks().search(marked.text):
+    if inquiry.ask is act.Ask.EXISTS or _asks().search(marked.text):
         facts.add("whether")
     found = _first("question", marked, frozenset(facts))
     return None if found is None else getattr(found, "question", "A map cannot answer this.")
@@ -184,17 +174,17 @@ def in_direction(tokens: Sequence[Token], intents: Sequence[Intent]) -> tuple[In
     """Return intents whose circles run in the direction that is said, or the question which one is meant."""
     ways = [_WAYS[token.text] for token in tokens if token.text in _WAYS]
     steps = steps_of(intents)
-    circles = sum(isinstance(step, Circle) for step in steps)
-    if not circles or not ways or any(isinstance(step, Turn) for step in steps):
+    circles = sum(isinstance(step, act.Circle) for step in steps)
+    if not circles or not ways or any(isinstance(step, act.Turn) for step in steps):
         return tuple(intents)
     if len(ways) != circles:
         return Clarify("Which way round? Say it for each: go clockwise around the table.")
     left = iter(ways)
 
     def turned(intent: Intent) -> Intent:
-        if isinstance(intent, Repeat):
+        if isinstance(intent, act.Repeat):
             return replace(intent, body=tuple(map(turned, intent.body)))
-        return replace(intent, way=next(left)) if isinstance(intent, Circle) else intent
+        return replace(intent, way=next(left)) if isinstance(intent, act.Circle) else intent
 
     return tuple(map(turned, intents))
 
@@ -239,18 +229,18 @@ def _facts(intents: Sequence[Intent], targets: Sequence[Target]) -> Iterator[str
         yield "one step"
     for step in steps:
         match step:
-            case StopAt() | Face(side=Side.BEHIND):
+            case act.StopAt() | act.Face(side=act.Side.BEHIND):
                 yield "kept"
-            case Beside(of=target, side=side, metres=metres):
+            case act.Beside(of=target, side=side, metres=metres):
                 yield from ("beside", str(side), *(["kept"] if metres is not None else []))
                 yield "beside room" if target.kind is TargetKind.AREA else "beside"
-            case Face(side=side):
+            case act.Face(side=side):
                 yield str(side)
-            case Move(metres=metres):
+            case act.Move(metres=metres):
                 yield from ("forward",) if metres > 0 else ("back", "kept")
-            case Turn(degrees=degrees) if degrees and degrees % 180.0:
+            case act.Turn(degrees=degrees) if degrees and degrees % 180.0:
                 yield from ("turn", "left" if degrees < 0 else "right")
-            case VisitEach():
+            case act.VisitEach():
                 yield "each"
             case _:
                 pass

@@ -5,22 +5,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from avlmaps.core.errors import LanguageError, QueryError
+from avlmaps.language import intents as act
 from avlmaps.language.claims import claimed_words, forbidden
 from avlmaps.language.gate import NoOrder, no_order
 from avlmaps.language.intents import (
     Ask,
-    Beside,
     Clarify,
-    Face,
-    If,
     Intent,
     Pick,
     RefusalReason,
     Refuse,
-    StopAt,
     Target,
     TargetKind,
-    Wait,
     on_targets,
     steps_of,
     targets_of,
@@ -137,7 +133,7 @@ def _branched(text: str, given: Attachments | None) -> Command | None:
         return None
     if bool(parts.get("none")) != bool(parts.get("unless")):
         then, otherwise = otherwise, then
-    return Command((*before, If(replace(thing, pick=Pick.ANY), then, otherwise)), notes, (), "words")
+    return Command((*before, act.If(replace(thing, pick=Pick.ANY), then, otherwise)), notes, (), "words")
 
 
 def _thing(what: str, given: Attachments | None) -> Target | None:
@@ -205,7 +201,7 @@ def _read(text: str, given: Attachments | None) -> Command:
     language = language_of(text)
     tokens = tokenise(text)
     if is_stop(tokens):
-        return Command((Wait(),), (), (), "words")
+        return Command((act.Wait(),), (), (), "words")
     if language is not None:
         return Command((Clarify(ASK.format(language=language)),), (), (), "words")
     sentence = Sentence(text, given)
@@ -284,7 +280,9 @@ def _without_effect(sentence: Sentence) -> list[str]:
 def _lost_sides(intents: Sequence[Intent], sentence: Sentence) -> tuple[str, ...]:
     """Return a note for each side ("the chair left of the table") that only says which thing is meant."""
     steps = steps_of(intents)
-    if any(isinstance(step, Beside | Face | StopAt) for step in steps):  # the side is where it drives or looks
+    if any(
+        isinstance(step, act.Beside | act.Face | act.StopAt) for step in steps
+    ):  # the side is where it drives or looks
         return ()
     return sentence.side_notes if any(target.near for intent in intents for target in targets_of(intent)) else ()
 

@@ -3,28 +3,8 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-from avlmaps.language.intents import (
-    Beside,
-    Between,
-    Circle,
-    Clarify,
-    Face,
-    Go,
-    If,
-    Intent,
-    Move,
-    Pick,
-    Refuse,
-    Repeat,
-    Return,
-    Side,
-    StopAt,
-    Target,
-    TargetKind,
-    Turn,
-    VisitEach,
-    Wait,
-)  # fmt: skip
+from avlmaps.language import intents as act
+from avlmaps.language.intents import Clarify, Intent, Pick, Refuse, Side, Target, TargetKind
 from avlmaps.language.lexer import Token, is_amount
 from avlmaps.language.names import class_words, is_known, may_name, near_names
 from avlmaps.language.word_classes import listed
@@ -60,7 +40,7 @@ def verbalise(intents: Sequence[Intent]) -> str:
         return intents[0].said
     if intents and isinstance(intents[0], Clarify):
         return intents[0].question
-    if tuple(intents) == (Wait(),):
+    if tuple(intents) == (act.Wait(),):
         return "I will stop and stay here."
     return f"I will {_steps(intents)}.".replace(" ,", ",")
 
@@ -71,24 +51,24 @@ def _steps(intents: Sequence[Intent]) -> str:
 
 def _step(intent: Intent) -> str:
     match intent:
-        case Go(to=target):
+        case act.Go(to=target):
             return f"go to {phrase(target)}"
-        case Face(to=target, side=Side.AHEAD):
+        case act.Face(to=target, side=Side.AHEAD):
             return f"face {phrase(target)}"
-        case Face(to=target, side=side):
+        case act.Face(to=target, side=side):
             where = "behind me" if side is Side.BEHIND else f"on my {side}"
             return f"turn until {phrase(target)} is {where}"
-        case Turn(degrees=None, heading=heading):
+        case act.Turn(degrees=None, heading=heading):
             return f"turn to {_COMPASS.get(round(heading or 0), f'{heading:g} degrees on the compass')}"
-        case Turn(degrees=degrees):
+        case act.Turn(degrees=degrees):
             return _turn(degrees or 0.0)
-        case Move(metres=metres):
+        case act.Move(metres=metres):
             return f"move {'forward' if metres > 0 else 'back'} {abs(metres):g} m"
-        case Between(of=(a, b)):
+        case act.Between(of=(a, b)):
             return f"stop between {phrase(a)} and {phrase(b)}"
-        case Beside(of=target, side=side, metres=metres):
+        case act.Beside(of=target, side=side, metres=metres):
             return f"stop {'' if metres is None else f'{metres:g} m '}{_SIDES[side]} {phrase(target)}"
-        case StopAt(of=target, metres=metres):
+        case act.StopAt(of=target, metres=metres):
             return f"stop {metres:g} m from {phrase(target)}"
         case _:
             return _other(intent)
@@ -96,19 +76,19 @@ def _step(intent: Intent) -> str:
 
 def _other(intent: Intent) -> str:
     match intent:
-        case Circle(of=target, views=None, way=way):
+        case act.Circle(of=target, views=None, way=way):
             return f"drive around {phrase(target)} {way}".rstrip()
-        case Circle(of=target, views=views, way=way):
+        case act.Circle(of=target, views=views, way=way):
             return f"look at {phrase(target)} from {views} points around it {way}".rstrip()
-        case VisitEach(of=target):
+        case act.VisitEach(of=target):
             return f"go to each of these, the nearest first: {phrase(target)}"
-        case Wait(seconds=seconds):
+        case act.Wait(seconds=seconds):
             return "stay there" if seconds is None else f"wait {seconds:g} seconds"
-        case Return():
+        case act.Return():
             return "come back here"
-        case Repeat(times=times, body=body):
+        case act.Repeat(times=times, body=body):
             return f"{_TIMES.get(times, f'{times} times')}: {_steps(body)}"
-        case If(of=target, body=body, otherwise=otherwise):
+        case act.If(of=target, body=body, otherwise=otherwise):
             there = phrase(target).removeprefix("the ")
             if not body:
                 return f", if there is no {there}, {_steps(otherwise)}"

@@ -14,7 +14,7 @@ from avlmaps.core.words import singulars_of, stem_of
 from avlmaps.language import intents as act
 from avlmaps.language import lexer
 from avlmaps.language.claims import claimed_words, in_direction, reasons, unmet
-from avlmaps.language.intents import Clarify, Intent, RefusalReason, Refuse, Target, TargetKind, on_targets
+from avlmaps.language.intents import Clarify, Intent, Pick, RefusalReason, Refuse, Target, TargetKind, on_targets
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.reader import Read, ReadingLimits
 from avlmaps.language.lexer import Token
@@ -281,7 +281,7 @@ def _plain(target: Target) -> Target:
     else:
         name = " ".join([*own[:-1], next(iter(singulars_of(own[-1])), own[-1])]) if own else ""
     kind = TargetKind.OBJECT if target.kind is TargetKind.AREA else target.kind
-    pick = act.Pick.ANY if target.pick is act.Pick.NEAREST and target.number == 1 else target.pick
+    pick = Pick.ANY if target.pick is Pick.NEAREST and target.number == 1 else target.pick
     return Target(kind, name, near, pick, target.number)
 
 

@@ -9,10 +9,9 @@ half way for a slip that could be seen from the start. What is left means what P
 import ast
 import keyword
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
-from enum import Enum, auto
 
 from avlmaps.core.errors import ProgramError
 from avlmaps.core.printable import UNSAFE, printable
@@ -42,7 +41,6 @@ SIGNS: Mapping[type, str] = {
     ast.UAdd: "+", ast.Not: "not", ast.And: "and", ast.Or: "or", ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<",
     ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.In: "in", ast.NotIn: "not in", ast.Is: "is", ast.IsNot: "is not",
 }  # fmt: skip
-_MOST_PASSES = 6
 _LONGEST_NUMBER = 40
 _NUMBER = re.compile(r"(?:[0-9][0-9_]*(?:\.[0-9_]*)?|\.[0-9_]+)(?:[eE][+-]?[0-9_]+)?")
 _PIECE = re.compile(
@@ -118,7 +116,7 @@ def parse_program(text: str) -> Program:
     statements = _tree(plain).body
     if not statements:
         raise ProgramError("The program is empty; write at least one line, such as `robot.move_to('chair')`.")
-    _Checker().check(statements)
+    _Checker(statements).block(statements)
     return Program(statements, text)
 
 
@@ -247,50 +245,25 @@ def target_names(target: ast.expr) -> list[str]:
     ]
 
 
-class Unsure(Enum):
-    """The possible kinds of a value where that is not one kind."""
-
-    ANYTHING = auto()
-    NOT_YET = auto()
-
-
-Guess = ValueType | Unsure
+Guess = ValueType | None  # the kind of a value; None where it may have several
 
 
 class _Checker:
-    """Goes through a program until the kinds of its names rest, and refuses what is wrong on the last pass.
+    """Refuses a program that has a part that is none, or that must fail wherever it gets to what is wrong.
 
-    A name has a kind where every line that gives it a value gives it one of that kind.
+    A name has a kind where one line alone gives it a value.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, statements: Sequence[ast.stmt]) -> None:
+        self.lines = Counter(name for one in statements for node in ast.walk(one) for name in _names_given(node))
         self.kinds: dict[str, Guess] = {}
         self.given: set[str] = set()  # the names that a line before gave a value
-        self.is_last = False
-
-    def check(self, statements: Sequence[ast.stmt]) -> None:
-        """Refuse a program that has a part that is none, or that must fail wherever it gets to what is wrong.
-
-        Raises:
-            ProgramError: it does; the line is named.
-        """
-        for _ in range(_MOST_PASSES):
-            before, self.given = dict(self.kinds), set()
-            self.block(statements)
-            if self.kinds == before:
-                break
-        else:
-            self.kinds = dict.fromkeys(self.kinds, Unsure.ANYTHING)
-        self.given, self.is_last = set(), True
-        self.block(statements)
 
     def block(self, nodes: Sequence[ast.stmt], deep: int = 0, *, in_loop: bool = False) -> None:
         if deep > DEEPEST_BLOCK:
             raise refused(nodes[0].lineno, f"blocks nest more than {DEEPEST_BLOCK} deep; write a flatter program")
         for node in nodes:
-            # With kinds that are not settled a fault may be none; what is one still is on the last pass.
-            with nullcontext() if self.is_last else suppress(ProgramError):
-                self.statement(node, deep + 1, in_loop)
+            self.statement(node, deep + 1, in_loop)
 
     def statement(self, node: ast.stmt, deep: int, in_loop: bool) -> None:  # noqa: C901 - one case for each form
         line = node.lineno
@@ -303,9 +276,9 @@ class _Checker:
                 _check_assignable(line, name)
                 before, sign = self.name(line, name), _sign(line, node.op)
                 made = self.arithmetic(line, sign, before, self.value(node.value))
-                if sign == "+" and made is ValueType.LIST and self.is_last:
+                if sign == "+" and made is ValueType.LIST:
                     raise grown(line, name)
-                self.join(name, made)
+                self.give(name, made)
             case ast.AugAssign():
                 raise refused(line, "an update such as `+=` is of one name; write it out with `=`")
             case ast.Expr():
@@ -335,7 +308,7 @@ class _Checker:
         kind, names = self.needed(node.iter, "walk"), _checked_target(node.target)
         counts = kind is ValueType.RANGE and isinstance(node.target, ast.Name)
         for name in names:
-            self.join(name, ValueType.NUMBER if counts else Unsure.ANYTHING)
+            self.give(name, ValueType.NUMBER if counts else None)
         # Any round but the first may use what a later line of the body gave.
         self.given.update(*(_names_given(inner) for inner in ast.walk(node)))
         self.block(node.body, deep, in_loop=True)
@@ -350,12 +323,12 @@ class _Checker:
         elif isinstance(target, ast.Tuple):
             if isinstance(kind, ValueType):
                 check_kind(target.lineno, "unpack", kind)
-            kinds = [Unsure.ANYTHING] * len(names)
+            kinds = [None] * len(names)
         for name, one in zip(names, kinds, strict=True):
-            self.join(name, one)
+            self.give(name, one)
 
-    def join(self, name: str, kind: Guess) -> None:
-        self.kinds[name] = _joined(self.kinds.get(name, Unsure.NOT_YET), kind)
+    def give(self, name: str, kind: Guess) -> None:
+        self.kinds[name] = kind if self.lines[name] == 1 else None
         self.given.add(name)
 
     def needed(self, node: ast.expr, use: str, deep: int = 0) -> Guess:
@@ -393,16 +366,16 @@ class _Checker:
                 return self.comparison(node, deep)
             case ast.BoolOp():
                 kinds = [self.needed(each, "truth", deep) for each in node.values[:-1]]
-                for kind in (*kinds[1:], self.value(node.values[-1], deep)):
-                    kinds[0] = _joined(kinds[0], kind)
-                return kinds[0]
+                kinds.append(self.value(node.values[-1], deep))
+                return kinds[0] if len(set(kinds)) == 1 else None
             case ast.IfExp():
                 self.needed(node.test, "truth", deep)
-                return _joined(self.value(node.body, deep), self.value(node.orelse, deep))
+                kind, otherwise = self.value(node.body, deep), self.value(node.orelse, deep)
+                return kind if kind is otherwise else None
             case ast.Subscript():
                 self.needed(node.value, "index of", deep)
                 self.needed(node.slice, "index", deep)
-                return Unsure.ANYTHING
+                return None
             case ast.Call():
                 return self.call(node, deep)
             case ast.Attribute():
@@ -415,9 +388,9 @@ class _Checker:
             raise refused(line, f"`{ROBOT}` is no value; write `{ROBOT}.SKILL(...)`")
         if name in SKILLS or name in BUILTINS:
             raise refused(line, f"`{name}` is called, not handed on; write `{name}(...)`")
-        if name not in self.given and self.is_last:
-            raise _without_value(line, name, self.given, later=name in self.kinds)
-        return self.kinds.get(name, Unsure.NOT_YET)
+        if name not in self.given:
+            raise _without_value(line, name, self.given, later=name in self.lines)
+        return self.kinds.get(name)
 
     def comparison(self, node: ast.Compare, deep: int) -> Guess:
         parts = [node.left, *node.comparators]
@@ -433,7 +406,7 @@ class _Checker:
     def arithmetic(self, line: int, sign: str, left: Guess, right: Guess) -> Guess:
         if isinstance(left, ValueType) and isinstance(right, ValueType):
             return kind_of_result(line, sign, left, right)
-        return Unsure.NOT_YET if Unsure.NOT_YET in (left, right) else Unsure.ANYTHING
+        return None
 
     def call(self, node: ast.Call, deep: int) -> Guess:
         line = node.lineno
@@ -518,21 +491,14 @@ def _is_none(node: ast.expr) -> bool:
     return isinstance(node, ast.Constant) and node.value is None
 
 
-def _joined(first: Guess, second: Guess) -> Guess:
-    if Unsure.NOT_YET in (first, second):
-        return second if first is Unsure.NOT_YET else first
-    return first if first is second else Unsure.ANYTHING
-
-
 def _names_given(node: ast.AST) -> list[str]:
-    targets = (
-        node.targets
-        if isinstance(node, ast.Assign)
-        else [node.target]
-        if isinstance(node, ast.For | ast.AugAssign)
-        else []
-    )
-    return [name for target in targets for name in target_names(target)]
+    match node:
+        case ast.Assign(targets=targets):
+            return [name for target in targets for name in target_names(target)]
+        case ast.For(target=target) | ast.AugAssign(target=target):
+            return target_names(target)
+        case _:
+            return []
 
 
 def _check_assignable(line: int, name: str) -> str:

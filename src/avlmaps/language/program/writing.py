@@ -7,29 +7,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-from avlmaps.language.intents import (
-    Beside,
-    Between,
-    Circle,
-    Face,
-    Go,
-    If,
-    Intent,
-    Move,
-    Pick,
-    Repeat,
-    Return,
-    Side,
-    StopAt,
-    Target,
-    TargetKind,
-    Turn,
-    TurnSense,
-    VisitEach,
-    Wait,
-    blocks_of,
-    targets_of,
-)  # fmt: skip
+from avlmaps.language import intents as act
+from avlmaps.language.intents import Intent, Pick, Side, Target, TargetKind, TurnSense, blocks_of, targets_of
 
 _CORNERS = 8
 _WAIT_S = 3.0
@@ -62,10 +41,10 @@ class _Writer:
         for intent in self.intents:
             self.repeats.update(_counted(blocks_of(intent)))
         for intent in _flat(self.intents):
-            twice = isinstance(intent, StopAt) or (isinstance(intent, Beside) and intent.side is Side.FRONT)
-            if isinstance(intent, StopAt | Beside | Circle) and (twice or getattr(intent, "views", None)):
+            twice = isinstance(intent, act.StopAt) or (isinstance(intent, act.Beside) and intent.side is Side.FRONT)
+            if isinstance(intent, act.StopAt | act.Beside | act.Circle) and (twice or getattr(intent, "views", None)):
                 self.repeats[intent.of] += 1
-        if any(isinstance(one, Return) for one in _flat(self.intents)):
+        if any(isinstance(one, act.Return) for one in _flat(self.intents)):
             self.head.append("start = robot.current_pos()")
 
     def add(self, line: str) -> None:
@@ -83,37 +62,37 @@ class _Writer:
 
     def write(self, intent: Intent) -> None:  # noqa: C901
         match intent:
-            case Go(to=target):
+            case act.Go(to=target):
                 self.go(target)
-            case Face(to=target, side=side):
+            case act.Face(to=target, side=side):
                 self.face(target, side)
-            case Turn(degrees=degrees, heading=None):
+            case act.Turn(degrees=degrees, heading=None):
                 self.add(f"robot.turn({degrees or 0:g})")
-            case Turn(heading=heading):
+            case act.Turn(heading=heading):
                 self.add(f"robot.turn_absolute({heading:g})")
-            case Move(metres=metres):
+            case act.Move(metres=metres):
                 self.add(f"robot.move_forward({metres:g})")
-            case Between(of=(a, b)):
+            case act.Between(of=(a, b)):
                 self.between(a, b)
-            case Beside():
+            case act.Beside():
                 self.beside(intent)
-            case StopAt(of=target, metres=metres):
+            case act.StopAt(of=target, metres=metres):
                 self.go(target)
                 self.add(f"robot.face({self.value(target)})")
                 self.add(f"robot.move_forward({-metres:g})")
-            case Circle():
+            case act.Circle():
                 self.circle(intent)
-            case VisitEach(of=target):
+            case act.VisitEach(of=target):
                 self.add(f"robot.get_nearest_pos({self.query(target)})")  # where there is none, that is told
                 self.add(f"for place in robot.get_all_pos({self.query(target)}):")
                 self.add("    robot.move_to(place)")
-            case Wait(seconds=seconds):
+            case act.Wait(seconds=seconds):
                 self.add(f"robot.wait({_WAIT_S if seconds is None else seconds:g})")
-            case Return():
+            case act.Return():
                 self.add("robot.move_to(start)")
-            case Repeat():
+            case act.Repeat():
                 self.repeat(intent)
-            case If():
+            case act.If():
                 self.branch(intent)
             case _:
                 raise ValueError(f"{intent!r} has no program")
@@ -139,7 +118,7 @@ class _Writer:
         pair = (replace(one, pick=Pick.ANY) if one.pick is Pick.NEAREST else one for one in (a, b))
         self.add(f"robot.move_in_between({', '.join(map(self.value, pair))})")  # it takes those nearest to each other
 
-    def beside(self, intent: Beside) -> None:
+    def beside(self, intent: act.Beside) -> None:
         target, side, metres = intent.of, intent.side, intent.metres
         if side in _SKILLS:
             away = "" if metres is None else f", {metres:g}"
@@ -157,7 +136,7 @@ class _Writer:
         else:
             self.add(f"robot.move_behind({self.value(target)}, {metres:g})")
 
-    def circle(self, intent: Circle) -> None:
+    def circle(self, intent: act.Circle) -> None:
         count = intent.views or _CORNERS
         contour = self.variable("outline")
         self.add(f"{contour} = robot.get_contour({self.value(intent.of)})")
@@ -168,15 +147,15 @@ class _Writer:
         if intent.views:
             self.add(f"    robot.face({self.value(intent.of)})")
 
-    def repeat(self, intent: Repeat) -> None:
+    def repeat(self, intent: act.Repeat) -> None:
         for target in _counted(intent.body):
-            visited = {one.of for one in _flat(intent.body) if isinstance(one, VisitEach)}
+            visited = {one.of for one in _flat(intent.body) if isinstance(one, act.VisitEach)}
             if target.kind is not TargetKind.HERE and target not in visited:
                 self.value(target)
         self.add(f"for {self.variable('i')} in range({intent.times}):")
         self.indented(intent.body)
 
-    def branch(self, intent: If) -> None:
+    def branch(self, intent: act.If) -> None:
         """Write both branches; what one of them looks up has no name behind it."""
         named, thing = dict(self.names), self.query(intent.of)
         self.add(f"if {'' if intent.body else 'not '}robot.exists({thing}):")
