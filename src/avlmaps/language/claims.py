@@ -28,7 +28,7 @@ from avlmaps.language.intents import (
 )
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import describes, is_entry, sounding_words, sounds_like
-from avlmaps.language.rows import filled, table
+from avlmaps.language.rows import filled, table, word_list
 from avlmaps.language.word_classes import pattern_of
 
 _ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
@@ -55,10 +55,9 @@ class Row(msgspec.Struct, rename={"of": "if"}):
     choices: tuple[str, ...] = ()
 
 
-@cache
 def claimed_words(name: str) -> frozenset[str]:
     """Return the words of a list."""
-    return frozenset(table("claims")["lists"][name].split())
+    return word_list("claims", name)
 
 
 @cache
@@ -69,7 +68,6 @@ def reasons() -> Mapping[RefusalReason, frozenset[str]]:
 
 @cache
 def _known() -> Mapping[str, str]:
-    """Return the regular expression of each name that a row may use."""
     book = table("claims")
     known = {name: f"{_BEGIN}(?:{'|'.join(map(re.escape, text.split()))}) " for name, text in book["lists"].items()}
     known |= {name: f"{_BEGIN}(?:{pattern_of(text)})" for name, text in book["phrases"].items()}
@@ -128,7 +126,6 @@ class _Marked:
 
 
 def _first(kind: str, marked: _Marked, facts: frozenset[str]) -> Refuse | Clarify | None:
-    """Return what the first row does that fits; None where none fits."""
     for row, says in _rows(kind):
         found = says.search(marked.text) if row.of <= facts and row.unless.isdisjoint(facts) else None
         if found is None:
@@ -198,7 +195,6 @@ def _sounds(name: str) -> bool:
 
 
 def _kinds(targets: Sequence[Target]) -> dict[str, str]:
-    """Return the mark of each word of the names of a reading."""
     return {word: _MARKS.get(target.kind, "^") for target in targets for word in target.name.split()}
 
 

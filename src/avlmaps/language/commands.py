@@ -26,9 +26,9 @@ from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.names import is_entry
 from avlmaps.language.questions import read_question
-from avlmaps.language.rephrase import forms
+from avlmaps.language.rephrase import any_one, forms
 from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, language_of, stand_ins
-from avlmaps.language.storey_words import SaidStorey, said_storeys
+from avlmaps.language.storey_words import SaidStorey, changes_storey, said_storeys
 from avlmaps.language.verbalise import verbalise
 from avlmaps.language.word_classes import load_word_classes
 
@@ -36,19 +36,6 @@ MOST_CHARACTERS = 1000
 ON_ITS_STOREY = (
     "'{said}': the robot stays on its storey. Name the place without the storey; a place on another one is refused, "
     "with the reason."
-)
-# An order to change storeys, which is no place: "go upstairs and look at the sofa".
-_CHANGES_STOREY = re.compile(
-    r"\b(?:go|come|drive|head|move|climb|get|run|walk|race|hurry|roll|pop|nip|trot|hop|dash|step|proceed|travel) "
-    r"(?:back |straight |right )?"
-    r"(?:up|down|upstairs|downstairs|(?:up |down )?to the [a-z0-9]+ (?:floor|storey|level))\b"
-    r"|\b(?:up|down)stairs (?:to|into)\b"
-)
-# Words before and after a name that leave the choice to the robot.
-_ANY_BEFORE = re.compile(r"(?<!\S)(?:nearest|closest|any|an?|some|first|one of (?:the|these|those|my|your|our)) $")
-_ANY_AFTER = re.compile(
-    r" (?:(?:that|which) )?(?:is )?(?:nearest|closest)(?: to (?:you|me|us|here|the robot|where you are))?"
-    r"(?= (?:[,.;:!?]|and|then)(?!\S)|$)"
 )
 
 
@@ -186,7 +173,6 @@ def _not_ordered(closed: NoOrder) -> str:
 
 
 def _asked(closed: NoOrder, intents: Sequence[Intent]) -> Clarify:
-    """Return the question whether a sentence is meant as an order, with the order that would be one."""
     order = verbalise(intents).removeprefix("I will ").rstrip(".")
     return Clarify(f"{closed.answer} Shall I {order}?", (order,), (tuple(intents),))
 
@@ -234,7 +220,7 @@ def _picked(intents: Sequence[Intent], said: str) -> tuple[Intent, ...]:
         if target.pick is not Pick.ANY or target.kind not in (TargetKind.OBJECT, TargetKind.AREA):
             return target
         at = re.search(rf"(?<!\S){re.escape(target.name.lower())}(?!\S)", said)
-        if at is None or not (_ANY_BEFORE.search(said[: at.start()]) or _ANY_AFTER.match(said[at.end() :])):
+        if at is None or not any_one(said[: at.start()], said[at.end() :]):
             return target
         return replace(target, pick=Pick.NEAREST)
 
@@ -242,7 +228,6 @@ def _picked(intents: Sequence[Intent], said: str) -> tuple[Intent, ...]:
 
 
 def _back(intent: Intent, stand: StandIns) -> Intent:
-    """Return a question to the person with the map's own names in it."""
     if not isinstance(intent, Clarify):
         return intent
     return replace(intent, question=stand.back(intent.question), choices=tuple(map(stand.back, intent.choices)))
@@ -251,7 +236,7 @@ def _back(intent: Intent, stand: StandIns) -> Intent:
 def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | None) -> Command | None:
     """Return a command whose one target is on a storey, by the target's name: "bed upstairs"; None for any other."""
     word = storeys[0]
-    if len(storeys) > 1 or not word.said or word.isnt or not word.rest or _CHANGES_STOREY.search(text.lower()):
+    if len(storeys) > 1 or not word.said or word.isnt or not word.rest or changes_storey(text):
         return None
     inner = _read(word.rest, given)
     targets = {target for intent in inner.intents for target in targets_of(intent)}
@@ -271,7 +256,6 @@ def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed
 
 
 def _without_effect(sentence: Sentence) -> list[str]:
-    """Return a note for each word that says how fast or how quietly."""
     slow = load_word_classes().words["SLOW"]
     words = [token.text for token in sentence.tokens]
     return [f"'{word}' has no effect: the robot has one speed." for word in words if word in slow]

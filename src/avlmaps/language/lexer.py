@@ -343,7 +343,6 @@ def spelled(words: Sequence[str], at: int) -> tuple[int, float] | None:
 
 
 def _whole(words: Sequence[str], at: int) -> tuple[int, int] | None:
-    """Return the whole number that begins at a word, below a million."""
     found = _below_thousand(words, at)
     if found is None or words[found[0] : found[0] + 1] != ["thousand"]:
         return found

@@ -153,7 +153,6 @@ def _sounds(name: str) -> bool:
 
 
 def _how_of(said: str) -> str:
-    """Return ``on``, ``in`` or ``near`` for the words that say how things lie to a place."""
     if not said:
         return ""
     return "on" if said.startswith("on") else "in" if pattern(_TABLE, "in").fullmatch(said) else "near"

@@ -88,7 +88,6 @@ def grammar(tokens: Sequence[Token]) -> str:
 
 
 def _call(skill: Skill) -> str:
-    """Return the calls of a skill that moves the robot."""
     parts = [_literal(f"robot.{skill.name}(")]
     for at, parameter in enumerate(skill.parameters.values()):
         unit = parameter.name.rsplit("_", 1)[-1]

@@ -129,7 +129,6 @@ def _is_known(words: tuple[str, ...]) -> bool:
 
 @cache
 def _is_name(phrase: str) -> bool:
-    """Return whether a phrase is exactly the name of a thing or a room."""
     book = lexicon()
     if book.find(phrase, EntryKind.THING) is not None or book.find(phrase, EntryKind.ROOM) is not None:
         return True
@@ -194,7 +193,6 @@ def class_words() -> frozenset[str]:
 
 @cache
 def _verbs() -> frozenset[str]:
-    """Return the verbs that stand alone in a class of orders; none of them is the head of an unknown name."""
     classes = ("GO", "DIRECT", "TURN", "MANIPULATE", "HARM", "FLYING", "FACE", "GREETING", "NEGATION", "IF", "FILLER")
     return frozenset(phrase for name in classes for phrase in load_word_classes().words[name] if " " not in phrase)
 
@@ -304,7 +302,6 @@ def _neighbours(word: str) -> Iterator[str]:
 
 @cache
 def _known() -> frozenset[str]:
-    """Return all words that the classes and the lexicon have."""
     classes = load_word_classes()
     texts = (text for text in classes.lists.values() if isinstance(text, str))
     listed = (word.strip(",") for text in texts for word in text.split())

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
@@ -13,6 +14,7 @@ from avlmaps.language.learned.decision import NameResolver, is_doubtful, kind_of
 from avlmaps.language.learned.reader import Read, ReadingLimits, learned_reader
 from avlmaps.language.list_questions import SUPPORTED
 from avlmaps.language.names import is_entry, is_known, sounding_forms, sounds_like, third_forms
+from avlmaps.language.rows import pattern, word_list
 from avlmaps.language.sentence import ASK, Attachments, Sentence, language_of, stand_ins
 from avlmaps.language.verbalise import lacks_file
 from avlmaps.language.word_classes import listed, load_word_classes
@@ -26,33 +28,10 @@ _MODALITIES = {
     TargetKind.AREA: Modality.AREA,
     TargetKind.IMAGE: Modality.IMAGE,
 }
-_ACTORS = frozenset({
-    "i", "we", "one", "you", "he", "she", "they", "to", "us", "someone",
-    "somebody", "can", "could", "may", "might", "should",
-})  # fmt: skip
-_MODALS = frozenset({"can", "could", "may", "might", "should", "would", "does", "did", "do", "will"})
-_PLACING = frozenset({"in", "near", "next", "by", "beside", "close", "inside", "behind", "under", "around", "between"})
-_HERE = frozenset({"here", "hereabouts", "house", "home", "building", "map", "flat", "apartment", "place", "sense"})
-_PRONOUNS = frozenset({"i", "we", "you", "he", "she", "they"})
-_HABITS = frozenset({"does", "did", "do"})
-_WHAT = frozenset({"anything", "something", "nothing", "what", "stuff", "things", "thing"})
-_TAKEN = frozenset({"eat", "drink", "read", "watch", "play", "wear", "cook", "write", "wash", "do", "see", "look"})
-_OF_PLACES = frozenset({"on", "at", "with", "from", "off"})
 _OWN: Mapping[str, str] = dict.fromkeys(("his", "her", "their", "our", "your", "its"), "my")
-# A thing that is described instead of named: "the thing you boil water with".
-_DESCRIBED = re.compile(
-    r"\b(?:thing|something|stuff|gadget|device|machine|appliance|tool)s? (?:(?:that |which )?"
-    r"(?:you|we|i|one|people|they) (?!saw|see|hear|heard|ha[ds]|have|put|left|found|know|want|mean|pass)"
-    r"(?:can |could |would |might )?[a-z]+(?: [a-z]+){0,3}? (?:with|in|on|from|for|by|at)"
-    r"(?=[ ?.!]*$| (?:near|in|by|next|at|on|beside|behind|around)\b)|for [a-z]{3,}ing [a-z]+(?=[ ?.!]*$))"
-)
-# What is named by its sound alone: "what is ringing?", "what is making that ringing noise?". Who it is no map says.
-_WHAT_SOUNDS = re.compile(
-    r"\W*(?:what|which (?:thing|one|device|machine))(?P<is> ?'s| is| was)?(?: making (?:the|that|this))? "
-    r"(?P<verb>[a-z]+)(?: noise| sound)?(?P<rest>[ ?.!]*| (?:in|near|by|next to) .*)$"
-)
 _LONGEST_ACTOR = 3  # words of who does it: "an old lady"
-_ARTICLES = frozenset({"the", "a", "an"})
+_TABLE = "list_questions"
+_listed = partial(word_list, _TABLE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +100,7 @@ def read_question(text: str, given: Attachments | None = None) -> AskedSentence:
 
 def _where_it_sounds(text: str) -> str:
     """Return a question for the place of what sounds ("what is ringing?"); other questions as they are."""
-    found = _WHAT_SOUNDS.match(text.lower())
+    found = pattern(_TABLE, "what_sounds").match(text.lower())
     if found is None or found["verb"] in listed("silent") or found["verb"] not in sounding_forms():
         return text
     if not found["is"] and found["verb"] not in third_forms():
@@ -131,7 +110,9 @@ def _where_it_sounds(text: str) -> str:
 
 def by_name(sentence: Sentence) -> AskedSentence | None:
     """Return the query of a sentence that is one name and nothing else, which needs no reading; None for others."""
-    words = [token.text for token in sentence.tokens if token.kind != "punct" and token.text not in _ARTICLES]
+    words = [
+        token.text for token in sentence.tokens if token.kind != "punct" and token.text not in _listed("plain_articles")
+    ]
     name = " ".join(words)
     plain = all(token.kind in ("word", "punct") for token in sentence.tokens)
     if not (plain and words and is_entry(name)) or any(sounds_like(word) for word in words):
@@ -146,7 +127,7 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> A
         QueryError: it is not understood; a name or a file is not known.
     """
     use = use_in(sentence.text)
-    if _DESCRIBED.search(sentence.text.lower()):
+    if pattern(_TABLE, "described").search(sentence.text.lower()):
         if use is None:
             raise QueryError(_NO_USE)
         return _resolved(_for_use(sentence, use, limits), sentence)
@@ -189,9 +170,9 @@ def use_in(text: str) -> str | None:
     if (
         words[:1] == ["where"]
         and words[1:2]
-        and words[1] in _MODALS - {"did"}
+        and words[1] in _listed("modals") - {"did"}
         and words[2:3]
-        and words[2] not in _PRONOUNS
+        and words[2] not in _listed("pronouns")
     ):
         # "where might a lady sit down?"
         doing += [" ".join(words[at:]) + " " for at in range(3, min(len(words), 3 + _LONGEST_ACTOR))]
@@ -204,15 +185,16 @@ def _is_purpose(words: Sequence[str], at: int) -> bool:
     before = words[max(0, at - 3) : at]
     if before[-1] == "to":  # what to drink is no place
         return at < 2 or not (
-            words[at - 2] in _WHAT and words[at] in _TAKEN and not _OF_PLACES & set(words[at + 1 : at + 2])
+            words[at - 2] in _listed("what")
+            and words[at] in _listed("taken")
+            and not _listed("of_places") & set(words[at + 1 : at + 2])
         )
-    if before[-1] in _MODALS:
-        return before[-1] not in _HABITS
-    return before[-1] in _ACTORS and not {"did", "have", "had"} & set(before[:-1])
+    if before[-1] in _listed("modals"):
+        return before[-1] not in _listed("habits")
+    return before[-1] in _listed("actors") and not {"did", "have", "had"} & set(before[:-1])
 
 
 def _names_nothing(read: Read) -> bool:
-    """Return whether what a reading seeks is no name that is known: "hero wash"."""
     sought = read.meaning.of if isinstance(read.meaning, Inquiry) else ()
     named = [one for one in sought if one.kind in (TargetKind.OBJECT, TargetKind.AREA)]
     return bool(named) and not any(is_known(one.name) for one in named)
@@ -234,14 +216,15 @@ def _for_use(sentence: Sentence, use: str, limits: ReadingLimits) -> Inquiry:
 
 
 def _place_of_use(sentence: Sentence, use: str) -> str:
-    """Return the words that say where a purpose should be served: "near the window"; "" where none do."""
     texts = [token.text for token in sentence.tokens if token.kind != "punct"]
     own = [_OWN.get(text, text) for text in texts]
     size = len(use.split())
     end = next((at + size for at in range(len(own)) if " ".join(own[at : at + size]) == use), len(own))
-    begin = next((at for at in range(end, len(texts)) if texts[at] in _PLACING and texts[at + 1 : at + 2]), len(texts))
+    begin = next(
+        (at for at in range(end, len(texts)) if texts[at] in _listed("placing") and texts[at + 1 : at + 2]), len(texts)
+    )
     place = texts[begin:]
-    return "" if not place or _HERE.intersection(place) else " ".join(place)
+    return "" if not place or _listed("here").intersection(place) else " ".join(place)
 
 
 def _near(name: str, place: str, sentence: Sentence, limits: ReadingLimits) -> tuple[Target, ...]:
@@ -260,7 +243,6 @@ def _near(name: str, place: str, sentence: Sentence, limits: ReadingLimits) -> t
 
 
 def _not_near_itself(target: Target) -> Target:
-    """Return a target without itself among what it is near: "near the tv" is the tv."""
     others = tuple(one for one in target.near if (one.kind, one.name) != (target.kind, target.name))
     return replace(target, near=others)
 

@@ -14,7 +14,7 @@ from typing import Any
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import sounding_forms, third_forms
-from avlmaps.language.rows import filled, table, words_of
+from avlmaps.language.rows import filled, pattern, table, words_of
 from avlmaps.language.word_classes import listed, load_word_classes
 
 _TURNS = frozenset({
@@ -67,12 +67,17 @@ def _whatever(found: re.Match[str]) -> str:
 @cache
 def forms(kind: str) -> Sequence[tuple[re.Pattern[str], Mapping[str, Any]]]:
     """Return the rows of a kind: ``row`` is written in another form, ``pick`` and ``condition`` are taken apart."""
-    words = words_of("rewrites", order="|".join(sorted(_order_words())))
+    words = {**words_of("rewrites"), "order": "|".join(sorted(_order_words()))}
     return [(re.compile(filled(row["says"], words), re.IGNORECASE), row) for row in table("rewrites")[kind]]
 
 
+def any_one(before: str, behind: str) -> bool:
+    """Return whether the words round a name leave it to the robot which thing of that name is meant: "any chair"."""
+    found = pattern("rewrites", "any_before").search(before) or pattern("rewrites", "any_behind").match(behind)
+    return found is not None
+
+
 def _order_words() -> frozenset[str]:
-    """Return the words that begin an order to the robot."""
     classes = load_word_classes().words
     names = ("GO", "TURN", "FACE", "WAIT", "CIRCLE", "RETURN", "BACK_UP")
     begins = {phrase.split()[0] for name in names for phrase in classes[name]}

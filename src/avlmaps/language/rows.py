@@ -15,9 +15,15 @@ def table(name: str) -> dict[str, Any]:
 
 
 @cache
-def words_of(name: str, **given: str) -> Mapping[str, str]:
-    """Return the regular expression of each word of a table; one may use those before it, and those that are given."""
-    words = given
+def word_list(name: str, words: str) -> frozenset[str]:
+    """Return the words of a list of a table."""
+    return frozenset(table(name)["lists"][words].split())
+
+
+@cache
+def words_of(name: str) -> Mapping[str, str]:
+    """Return the regular expression of each word of a table; one may use those before it."""
+    words: dict[str, str] = {}
     for word, text in table(name)["words"].items():
         words[word] = filled(text, words)
     return words

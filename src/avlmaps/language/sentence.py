@@ -25,19 +25,12 @@ from avlmaps.perception.embedded.words import is_word
 
 OwnName = tuple[str, bool]
 """A name without its article, in lower case, and whether it is that of a room."""
-_DETERMINERS = frozenset({"the", "this", "that", "my", "your", "our", "her", "his", "their", "a", "an", "any", "every"})
 _THINGS = ("lamp", "clock", "vase", "suitcase", "printer", "basket")
 _ROOMS = ("kitchen", "garage", "library", "bathroom", "gym")
 ASK = "This seems to be {language}. Commands and questions have to be in English, such as: go to the kitchen."
 _ANOTHER = "another language than English"
 _LATIN = "LATIN"
 _SEVERAL = 3  # words; fewer may be a name that English borrowed
-# Words that may mean a file that came along.
-_PICTURE = frozenset({
-    "photo", "photos", "photograph", "photographed", "picture", "pictured", "image", "pic", "snapshot", "shot", "view",
-    "selfie", "screenshot", "polaroid",
-})  # fmt: skip
-_SOUND = frozenset({"recording", "recorded", "clip", "sound", "audio", "noise", "tape", "recordings", "memo"})
 _ORDERS = {
     "closest": "nearest", "furthest": "farthest", "northern": "north", "southern": "south", "eastern": "east",
     "western": "west",
@@ -50,7 +43,6 @@ _SIDE = re.compile(
     r"\b((?:left|right|north|south|east|west|in front) of|behind|opposite|"
     r"across from|underneath|under|beneath|below|above|over)\b"
 )
-_POINTS = frozenset({"this", "these", "attached", "attachment", "here", "file", "sent", "enclosed", "uploaded"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +68,15 @@ class Attachments:
     def tokens(self, words: Iterable[str], at: int) -> list[Token]:
         """Return the files that a sentence may speak of as tokens behind it, so that "this photo" can point to one."""
         said = frozenset(words)
-        files = (("image", self.image, _PICTURE), ("clip", self.clip, _SOUND))
-        return [Token(name, name, kind, at, at) for kind, name, means in files if name and said & (means | _POINTS)]
+        files = (
+            ("image", self.image, claimed_words("of_pictures")),
+            ("clip", self.clip, claimed_words("of_recordings")),
+        )
+        return [
+            Token(name, name, kind, at, at)
+            for kind, name, means in files
+            if name and said & (means | claimed_words("points"))
+        ]
 
 
 class Sentence:
@@ -149,7 +148,7 @@ class StandIns:
 def is_reserved(name: str) -> bool:
     """Return whether a name would take a word of orders: "stop", "left", "5 m", "near the bed"."""
     said = [token.text for token in tokenise(name) if token.kind != "punct"]
-    said = said[1:] if said[:1] and said[0] in _DETERMINERS and len(said) > 1 else said
+    said = said[1:] if said[:1] and said[0] in claimed_words("determiners") and len(said) > 1 else said
     taken = claimed_words("reserved") | claimed_words("stops") | WORDS
     return bool(said) and (
         said[0] in claimed_words("leading") or all(word in taken or word[0].isdigit() for word in said)
@@ -238,13 +237,11 @@ def _is_unknown(found: list[str]) -> bool:
 
 @cache
 def _its_own(language: str) -> frozenset[str]:
-    """Return the words of a language that no other of the book has."""
     book = {name: sure | also for name, (sure, also) in _foreign_words().items()}
     return book[language].difference(*(words for name, words in book.items() if name != language))
 
 
 @cache
 def _foreign_words() -> dict[str, tuple[frozenset[str], frozenset[str]]]:
-    """Return for each language its words that English lacks, and those that it has too."""
     told = tomllib.loads(files("avlmaps.language").joinpath("foreign.toml").read_text(encoding="utf-8"))
     return {name: (frozenset(of["sure"].split()), frozenset(of["also"].split())) for name, of in told.items()}

@@ -6,34 +6,17 @@ each of its parts has its own place; so have several sounds of a question that s
 
 import re
 from collections.abc import Collection, Iterator, Sequence
+from functools import partial
 from itertools import pairwise
 
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import past_forms, sounding_thing, sounding_words, sounds_like, third_forms
+from avlmaps.language.rows import pattern, word_list
 from avlmaps.language.word_classes import listed
 
-# Whose way it is, and no sound's: "go back to where you came from".
-_WHO = ("you", "we", "i", "they", "he", "she", "robot")
-_NOT_OF_ANYBODY = "".join(f"(?<!\\b{who} )" for who in _WHO)
-_ORIGIN = re.compile(
-    rf"{_NOT_OF_ANYBODY}\b(?:come|comes|came|coming) from\b|\b(?:originat|emanat)(?:e|es|ed|ing)\b|"
-    r"\bfrom where (?:do|does|did|is|was|has)\b|\b(?:sources?|origins?) of\b|\b(?:its|their) (?:source|origin)\b|"
-    rf"\b(?:where|what|which \w+)\b(?!.*\b(?:{'|'.join(_WHO)}) c[ao]me from).*\bfrom\W*$"
-)
-_MAKER = re.compile(
-    r"\b(?:what|who|whatever|whoever|that|which|thing|one|something|somebody|someone|device|machine|is|was)"
-    r"(?: ?'s| is| was| keeps| kept)? (?:made|makes|making|causes|caused|causing|emits|emitted|emitting|produces|"
-    r"produced|producing|responsible for)\b(?! (?:of|from|in|by|up)\b)"
-)
-_ITSELF = re.compile(
-    r"\b(?:that|which|who|what|whatever|whoever)"
-    r"((?: ?'s| is| are| was| were| keeps| kept| has been| just| still| always| started| starts)*) (\w+)"
-)
-_HEARD = re.compile(r"\b(?:hear|hears|heard|hearing|listened)\b")
-_SOUND_OF = re.compile(r"\b(?:sounds?|noises?) of\b")
-_BREAKS = frozenset({"then", "finally", "and", "but", "or"})
-_RECORDINGS = frozenset({"recording", "clip", "audio", "tape", "sound", "noise"})
-_REFERS = frozenset({"it", "its", "that", "this", "they", "them", "their"})
+_TABLE = "source_words"
+_pattern = partial(pattern, _TABLE)
+_listed = partial(word_list, _TABLE)
 
 
 def asks_for_source(text: str, sound: Collection[str] = ()) -> bool:
@@ -47,18 +30,20 @@ def asks_for_source(text: str, sound: Collection[str] = ()) -> bool:
         sound: those among them that name the sound, where they are known.
     """
     text = text.lower()
-    if _ORIGIN.search(text):
+    if _pattern("origin").search(text):
         return True
-    if _HEARD.search(text):
+    if _pattern("heard").search(text):
         return False
-    return _MAKER.search(text) is not None or (_SOUND_OF.search(text) is None and _sounds_itself(text, sound))
+    return _pattern("maker").search(text) is not None or (
+        _pattern("sound_of").search(text) is None and _sounds_itself(text, sound)
+    )
 
 
 def _sounds_itself(text: str, sound: Collection[str]) -> bool:
     """Return whether a thing is named by the sound that it makes: "the phone that is ringing", "the beeping device"."""
     if any(sounding_thing(*pair) for pair in pairwise(re.findall(r"[\w-]+", text))):
         return True
-    for found in _ITSELF.finditer(text):
+    for found in _pattern("itself").finditer(text):
         verb = found[2]
         if verb not in sound if sound else verb in listed("silent"):
             continue
@@ -82,7 +67,7 @@ def seeks_source(tokens: Sequence[Token], own: Sequence[int], others: Collection
         others: the words of everything else that the command names.
     """
     if not own or tokens[own[0]].start == tokens[own[0]].end:  # a file that came along stands behind the sentence
-        own = [number for number, token in enumerate(tokens) if token.text in _RECORDINGS][:1]
+        own = [number for number, token in enumerate(tokens) if token.text in _listed("recordings")][:1]
     if not own:
         return False
     begin, end = min(own), max(own) + 1
@@ -102,7 +87,7 @@ def _behind(tokens: Sequence[Token], at: int, others: Collection[int]) -> Iterat
         if number < len(tokens) and not _is_break(tokens[number]) and number not in others:
             clause.append(tokens[number])
             continue
-        if not _REFERS.isdisjoint(token.text for token in clause):
+        if not _listed("refers").isdisjoint(token.text for token in clause):
             yield _text(clause)
         if number in others:
             return
@@ -110,7 +95,7 @@ def _behind(tokens: Sequence[Token], at: int, others: Collection[int]) -> Iterat
 
 
 def _is_break(token: Token) -> bool:
-    return token.kind == "punct" or token.text in _BREAKS
+    return token.kind == "punct" or token.text in _listed("breaks")
 
 
 def _text(tokens: Sequence[Token]) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from avlmaps.language import intents as act
+from avlmaps.language.claims import claimed_words
 from avlmaps.language.intents import Clarify, Intent, Pick, Refuse, Side, Target, TargetKind
 from avlmaps.language.lexer import Token, is_amount
 from avlmaps.language.names import class_words, is_known, may_name, near_names
@@ -14,15 +15,8 @@ _FILES = {
     TargetKind.IMAGE: "Which picture? Attach it, or name its file in the sentence.",
     TargetKind.CLIP: "Which recording? Attach it, or name its file in the sentence.",
 }
-_PICTURES = frozenset({"photo", "picture", "image", "photograph", "snapshot", "pic"})
-_RECORDINGS = frozenset({"recording", "clip"})
-_STRAIGHT = frozenset({
-    "forward", "forwards", "ahead", "straight", "back", "backward", "backwards", "reverse", "onward", "onwards",
-})  # fmt: skip
-_TURNS = frozenset({"turn", "rotate", "spin", "pivot"})
 _PRONOUNS = ("it", "there", "that", "them", "this")
 _SHORT = 3  # letters; shorter words are spelt like too many others
-_THESE = frozenset({"this", "that", "the", "my", "attached", "these"})
 _COMPASS = {0: "north", 45: "north-east", 90: "east", 135: "south-east", 180: "south", 225: "south-west", 270: "west",
             315: "north-west"}  # fmt: skip
 _ORDINALS = {2: "second", 3: "third", 4: "fourth", 5: "fifth"}
@@ -159,8 +153,8 @@ def lacks_file(tokens: Sequence[Token]) -> Clarify | None:
     """Return the question for the file that a sentence speaks of and that did not come along; None where none lacks."""
     words = [token.text for token in tokens]
     for before, word in pairwise(words):
-        if before in _THESE and word in _PICTURES | _RECORDINGS:
-            kind = TargetKind.IMAGE if word in _PICTURES else TargetKind.CLIP
+        if before in claimed_words("these") and word in claimed_words("pictures") | claimed_words("recordings"):
+            kind = TargetKind.IMAGE if word in claimed_words("pictures") else TargetKind.CLIP
             return None if any(token.kind == str(kind) for token in tokens) else missing_file(kind)
     return None
 
@@ -177,7 +171,7 @@ def unclear(tokens: Sequence[Token]) -> Clarify:
         return file
     words = [token.text for token in tokens]
     for at, word in enumerate(words):
-        of_these = at > 0 and words[at - 1] in _THESE
+        of_these = at > 0 and words[at - 1] in claimed_words("these")
         named = words[at + 1] if at + 1 < len(words) else ""
         if of_these and word in listed("choices") and (named == "one" or is_known(named) or may_name(named)):
             return Clarify(f"I cannot choose the {word} {named} from the map. Say what it is near.")
@@ -185,9 +179,13 @@ def unclear(tokens: Sequence[Token]) -> Clarify:
     if strange is not None:
         return unknown(strange)
     names = any(is_known(word) for word in words)
-    if not names and not _STRAIGHT.isdisjoint(words) and not any(is_amount(tokens, at) for at in range(len(tokens))):
+    if (
+        not names
+        and not claimed_words("straight_on").isdisjoint(words)
+        and not any(is_amount(tokens, at) for at in range(len(tokens)))
+    ):
         return Clarify("How far? Say it like: go forward 2 metres.")
-    if not names and not _TURNS.isdisjoint(words):
+    if not names and not claimed_words("turn_verbs").isdisjoint(words):
         choices = ("left", "right", "around")
         return Clarify("Turn which way? Say left, right, around, or an angle.", choices)
     pronoun = next((word for word in _PRONOUNS if word in words), None)

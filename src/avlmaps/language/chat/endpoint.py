@@ -163,7 +163,6 @@ class Endpoint:
         raise LanguageError(f"No chat model is named for {self._settings.shown_url}: set AVLMAPS_CHAT_MODEL{choice}.")
 
     def _models(self) -> tuple[str, ...]:
-        """Return the models that the server offers, none where it does not say."""
         try:
             raw = self._asked("models", monotonic() + min(self._settings.timeout_s, _MOST_MODELS_WAIT_S))
             return tuple(model.id for model in _decoded(raw, _Models).data)
@@ -270,7 +269,6 @@ class Endpoint:
 
 
 def _kind_of(fault: EndpointFault) -> str:
-    """Return the row of a fault's sentence."""
     if fault.kind != "status":
         return fault.kind
     if fault.code == "insufficient_quota":

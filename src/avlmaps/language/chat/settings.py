@@ -124,7 +124,6 @@ def _split(url: str) -> SplitResult | None:
 
 
 def _read(name: str, text: str) -> Any:
-    """Return the value of a setting from the text of its variable."""
     kind, wanted = _KINDS.get(name, (str, "text"))
     if name in ("temperature", "seed") and text.lower() == "none":
         return None

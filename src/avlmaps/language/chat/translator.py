@@ -117,7 +117,6 @@ class ChatTranslator:
             self._rounds_used += 1
 
     def _asked(self, messages: tuple[Message, ...], deadline: float) -> ModelReply:
-        """Return the answer to a conversation, from the file where there is one."""
         settings, replay = self._settings, self._replay
         replayed = replay if replay and not replay.recording else None
         if self._model is None:
@@ -131,13 +130,11 @@ class ChatTranslator:
         return answer
 
     def _server(self) -> Endpoint:
-        """Return the endpoint, made when it is first needed: a replay needs no key."""
         if self._endpoint is None:
             self._endpoint = Endpoint(self._settings)
         return self._endpoint
 
     def _notes(self, model: str, corrected: Sequence[str], read: int, written: int) -> tuple[str, ...]:
-        """Return the notes on how a program came about."""
         replay = self._replay
         replayed = replay is not None and not replay.recording
         where = f"replayed from {replay.path}" if replay and replayed else f"at {self._settings.shown_url}"

@@ -307,7 +307,6 @@ def is_doubtful(tokens: Sequence[Token], used: frozenset[int], *, waits: bool = 
 
 
 def _is_name(token: Token, said: set[str]) -> bool:
-    """Return whether a word is the name of a thing or a room that no reading has."""
     if token.kind != "word" or token.text in said or token.text in claimed_words("no_names") or len(token.text) < 3:
         return False
     return any(lexicon().find(token.text, kind) is not None for kind in (EntryKind.THING, EntryKind.ROOM))

@@ -509,7 +509,6 @@ def _check_assignable(line: int, name: str) -> str:
 
 
 def _checked_target(node: ast.expr) -> list[str]:
-    """Return the names on the left side of an assignment: one, or several."""
     line = node.lineno
     if isinstance(node, ast.Subscript):
         raise refused(line, "a list is not changed but made again, as in `a = a + [b]`")

@@ -223,7 +223,6 @@ _RESERVED = frozenset({
 
 
 def _counted(intents: Sequence[Intent]) -> Counter[Target]:
-    """Return how often each target is said, in the order of the words."""
     return Counter(target for intent in intents for target in targets_of(intent))
 
 
