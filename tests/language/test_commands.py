@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import AvlmapsError, LanguageError
 from avlmaps.language.commands import read_command
-from avlmaps.language.intents import Clarify, Go, If, Pick, Refuse, Return, Target, TargetKind, targets_of
+from avlmaps.language.intents import Clarify, Go, If, Pick, Refuse, Return, StopAt, Target, TargetKind, targets_of
 from avlmaps.language.learned_translator import LearnedTranslator, UnclearError, command_to_program
 from avlmaps.language.program import parse_program
 from avlmaps.language.program.writing import write_program
@@ -140,6 +140,8 @@ NEAREST_SOFA = Go(thing("sofa", Pick.NEAREST))
         ("go to the kitchen unless there is no sofa", If(thing("sofa"), (Go(KITCHEN),))),
         ("go to the sofa if there is one, else come back", If(thing("sofa"), (Go(thing("sofa")),), (Return(),))),
         ("Check whether we have a sofa and if so go to it", If(thing("sofa"), (NEAREST_SOFA,))),
+        ("If the map contains a sofa, approach it to within half a metre; if not, go to the kitchen instead.",
+         If(thing("sofa"), (StopAt(thing("sofa", Pick.NEAREST), 0.5),), (Go(KITCHEN),))),
         ("is there a sofa? if so go there", If(thing("sofa"), (NEAREST_SOFA,))),
     ],
 )  # fmt: skip
@@ -154,7 +156,8 @@ def test_a_command_may_depend_on_whether_there_is_a_thing(command: str, meant: I
     "command",
     ["if there is a person in the kitchen go to the sofa", "if it rains go to the sofa", "if the door is open go there",
      "if there is a sofa drive through the wall", "go to the kitchen unless there is no fridge there",
-     "if there is a sofa stop going to the kitchen", "when you have been to the kitchen, no sofa"],
+     "if there is a sofa stop going to the kitchen", "if there is a sofa, and a chair, go to the sofa",
+     "when you have been to the kitchen, no sofa"],
 )  # fmt: skip
 def test_what_a_map_cannot_say_is_no_condition(command: str) -> None:
     assert read_command(command).stops is not None

@@ -28,8 +28,7 @@ from avlmaps.language.intents import (
 )
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import describes, is_entry, sounding_words, sounds_like
-from avlmaps.language.rows import filled, table, word_list
-from avlmaps.language.word_classes import pattern_of
+from avlmaps.language.word_classes import filled, pattern_of, table, word_list
 
 _ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
 _MARKS = {TargetKind.AREA: "@", TargetKind.SOUND: "$"}

@@ -17,7 +17,7 @@ import numpy as np
 from avlmaps.core.errors import BackendError
 from avlmaps.language.lexer import tokenise
 from avlmaps.language.rephrase import rewritten
-from avlmaps.language.rows import filled, table, words_of
+from avlmaps.language.word_classes import filled, table, words_of
 from avlmaps.perception.embedded.words import WordPieces
 from avlmaps.perception.networks import open_network
 

@@ -14,8 +14,8 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.lexer import without_spoken_end
 from avlmaps.language.names import mended, sounding_words
-from avlmaps.language.rows import filled, pattern, table, words_of
 from avlmaps.language.sentence import OwnName, stand_ins
+from avlmaps.language.word_classes import filled, pattern, table, words_of
 
 NUMBERS = {
     "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10,

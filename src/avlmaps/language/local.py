@@ -125,7 +125,7 @@ def meaning(program: str) -> tuple[Intent, ...] | None:
     """Return the intents of a program that the grammar allows; None for any other."""
     try:
         found = _block(ast.parse(program).body)
-    except (SyntaxError, ValueError, KeyError, TypeError):
+    except (SyntaxError, ValueError, KeyError, TypeError, AttributeError):
         return None
     return tuple(_joined(found)) or None
 

@@ -14,10 +14,9 @@ from avlmaps.language.learned.decision import NameResolver, is_doubtful, kind_of
 from avlmaps.language.learned.reader import Read, ReadingLimits, learned_reader
 from avlmaps.language.list_questions import SUPPORTED
 from avlmaps.language.names import is_entry, is_known, sounding_forms, sounds_like, third_forms
-from avlmaps.language.rows import pattern, word_list
 from avlmaps.language.sentence import ASK, Attachments, Sentence, language_of, stand_ins
 from avlmaps.language.verbalise import lacks_file
-from avlmaps.language.word_classes import listed, load_word_classes
+from avlmaps.language.word_classes import listed, load_word_classes, pattern, word_list
 
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
 _NO_USE = f"What serves that purpose is not known; name the thing, like: {_EXAMPLE}."

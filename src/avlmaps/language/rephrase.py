@@ -14,8 +14,7 @@ from typing import Any
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import sounding_forms, third_forms
-from avlmaps.language.rows import filled, pattern, table, words_of
-from avlmaps.language.word_classes import listed, load_word_classes
+from avlmaps.language.word_classes import filled, listed, load_word_classes, pattern, table, words_of
 
 _TURNS = frozenset({
     "turn", "rotate", "yaw", "spin", "pivot", "swivel", "left", "right", "by", "clockwise", "counterclockwise",

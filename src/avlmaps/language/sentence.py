@@ -5,12 +5,10 @@ in the place of each, since what was learnt reads such words best; what was read
 """
 
 import re
-import tomllib
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from importlib.resources import files
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
@@ -21,6 +19,7 @@ from avlmaps.language.lexer import WORDS, Token, in_figures, tokenise
 from avlmaps.language.names import class_words, is_entry, is_known, respelt, sounding_words
 from avlmaps.language.rephrase import forms, in_degrees, rewritten
 from avlmaps.language.verbalise import phrase
+from avlmaps.language.word_classes import table
 from avlmaps.perception.embedded.words import is_word
 
 OwnName = tuple[str, bool]
@@ -243,5 +242,5 @@ def _its_own(language: str) -> frozenset[str]:
 
 @cache
 def _foreign_words() -> dict[str, tuple[frozenset[str], frozenset[str]]]:
-    told = tomllib.loads(files("avlmaps.language").joinpath("foreign.toml").read_text(encoding="utf-8"))
-    return {name: (frozenset(of["sure"].split()), frozenset(of["also"].split())) for name, of in told.items()}
+    told = table("foreign").items()
+    return {name: (frozenset(of["sure"].split()), frozenset(of["also"].split())) for name, of in told}

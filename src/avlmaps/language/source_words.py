@@ -11,8 +11,7 @@ from itertools import pairwise
 
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import past_forms, sounding_thing, sounding_words, sounds_like, third_forms
-from avlmaps.language.rows import pattern, word_list
-from avlmaps.language.word_classes import listed
+from avlmaps.language.word_classes import listed, pattern, word_list
 
 _TABLE = "source_words"
 _pattern = partial(pattern, _TABLE)

@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass
 from functools import cache, partial
 
-from avlmaps.language.rows import pattern, table
+from avlmaps.language.word_classes import pattern, table
 
 _TABLE = "storey_words"
 _pattern = partial(pattern, _TABLE, flags=re.IGNORECASE)

@@ -1,6 +1,7 @@
-"""The words that the reader knows before it learns, read once: classes of phrases, and lists.
+"""The words that the reader knows before it learns: tables of English (`*.toml`), data for people.
 
-`word_classes.toml` is data for people. A class is a list of phrases with ``[optional]`` and ``(one|another)`` parts.
+Rows are regular expressions that use words of their table by name. Of `word_classes.toml`, a class is a list of phrases
+with ``[optional]`` and ``(one|another)`` parts.
 """
 
 import re
@@ -12,6 +13,38 @@ from importlib.resources import files
 from typing import Any
 
 from avlmaps.core.words import forms_of
+
+
+@cache
+def table(name: str) -> dict[str, Any]:
+    """Return a table as it is written."""
+    return tomllib.loads(files("avlmaps.language").joinpath(f"{name}.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def word_list(name: str, words: str) -> frozenset[str]:
+    """Return the words of a list of a table."""
+    return frozenset(table(name)["lists"][words].split())
+
+
+@cache
+def words_of(name: str) -> Mapping[str, str]:
+    """Return the regular expression of each word of a table; one may use those before it."""
+    words: dict[str, str] = {}
+    for word, text in table(name)["words"].items():
+        words[word] = filled(text, words)
+    return words
+
+
+def filled(text: str, words: Mapping[str, str]) -> str:
+    """Return a regular expression with ``{name}`` replaced by the words of that name."""
+    return re.sub(r"\{([a-z_]+)\}", lambda found: f"(?:{words[found[1]]})", text)
+
+
+@cache
+def pattern(name: str, word: str, flags: int = 0) -> re.Pattern[str]:
+    """Return what finds one of the words of a table."""
+    return re.compile(words_of(name)[word], flags)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +71,7 @@ def load_word_classes() -> WordClasses:
     Raises:
         ValueError: a list is malformed.
     """
-    data = tomllib.loads(files("avlmaps.language").joinpath("word_classes.toml").read_text(encoding="utf-8"))
+    data = table("word_classes")
     data["words"]["GO"] += " | " + " | ".join(f for verb in data["lists"]["motion"].split() for f in forms_of(verb))
     words: dict[str, frozenset[str]] = {}
     classes: dict[str, list[str]] = {}
@@ -56,7 +89,7 @@ def load_word_classes() -> WordClasses:
 @cache
 def listed(name: str) -> frozenset[str]:
     """Return the words of a list."""
-    return frozenset(load_word_classes().lists[name].split())
+    return word_list("word_classes", name)
 
 
 def expanded(text: str) -> list[str]:
