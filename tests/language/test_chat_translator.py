@@ -190,8 +190,9 @@ def test_what_no_correction_mends_is_told_at_once(server: ChatServer, reply: Any
     ],
 )
 def test_an_injected_command_stays_one_line_of_data_and_the_program_is_judged_all_the_same(
-    server: ChatServer, command: str
+    server: ChatServer, command: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("avlmaps.language.chat.translator.check_order", lambda command: None)  # the gate may ask first
     server.answer(_block("import os\nos.system('id')"))
     with pytest.raises(LanguageError, match="no usable program"):
         _translator(server, rounds=0).program_for(command)
