@@ -109,7 +109,7 @@ def test_late_frames_are_dropped_and_counted(tmp_path: Path) -> None:
     [
         (dict(stamp_s=0.5), r"at 0.5 s is out of order \(1.1 s\)"),
         (dict(stamp_s=1.1), "repeats the last frame"),
-        (dict(rgb=np.zeros((30, 40, 3), np.uint8)), "has 40x30 pixels, its camera 80x60"),
+        (dict(rgb=np.zeros((30, 40, 3), np.uint8)), "40x30 pixels .* the camera 80x60"),
         (dict(camera=replace(CAMERA, fx=90.0)), "another camera"),
         (dict(depth_m=None), "must be an array of numbers, not NoneType"),
         (dict(world_from_camera=None), "must be an array of numbers, not NoneType"),
@@ -337,8 +337,8 @@ def test_channels_that_are_not_the_microphones_and_directions_out_of_order_cost_
         live.add_audio(four, 0.0)
         for chunk, said in (
             (avlmaps.ChannelSound(four.samples[:2], 16_000), "2 channel.s., but 4 microphone.s. are described"),
-            (avlmaps.Sound(four.samples[0], 16_000), "1 channel.s., those before 4"),
-            (avlmaps.ChannelSound(four.samples, 8_000), "8000 samples a second, those before 16000"),
+            (avlmaps.Sound(four.samples[0], 16_000), "in 1 channel.s.; 16000 in 4"),
+            (avlmaps.ChannelSound(four.samples, 8_000), "8000 samples a second in 4 channel.s.; 16000"),
         ):
             with pytest.raises(avlmaps.AudioError, match=said):
                 live.add_audio(chunk)

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from recording_scenes import CAMERA, pose_line, save_depth, shot, shots, write_folder
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.faults import stop_at_first
 from avlmaps.recordings.formats.file_recording import natural_key
-from avlmaps.recordings.formats.tables import POSE, named_order, read_table, split_header, unread_notice
+from avlmaps.recordings.formats.tables import POSE, named_order, read_table, split_header
 from avlmaps.recordings.open import open_recording
 
 # How others call the eight columns of a pose.
@@ -34,21 +33,21 @@ def test_named_columns_stand_in_any_order(
     lines = [separator.join(names[at] for at in order)]
     lines += [separator.join(repr(float(row[at])) for at in order) for row in rows]
     file.write_text("\n".join(lines))
-    assert np.array_equal(read_table(file, (8,), stop_at_first, names=POSE).values, rows)
+    assert np.array_equal(read_table(file, (8,), names=POSE).values, rows)
 
 
 @pytest.mark.parametrize("comment", ["# timestamp tx ty tz qw qx qy qz", "#time, x, y, z, q_w, q_x, q_y, q_z"])
 def test_a_comment_that_names_the_columns_is_followed(tmp_path: Path, comment: str) -> None:
     file = tmp_path / "groundtruth.txt"
     file.write_text(f"# ground truth\n{comment}\n0 1 2 3 1 0 0 0\n# the end\n")
-    table = read_table(file, (8,), stop_at_first, names=POSE)
+    table = read_table(file, (8,), names=POSE)
     assert table.values.tolist() == [[0, 1, 2, 3, 0, 0, 0, 1]]
 
 
 def test_a_comment_that_names_no_columns_is_none(tmp_path: Path) -> None:
     file = tmp_path / "groundtruth.txt"
     file.write_text("# a walk of eight words in the kitchen\n# file: 'rgbd.bag'\n0 1 2 3 0 0 0 1\n")
-    assert read_table(file, (8,), stop_at_first, names=POSE).values.tolist() == [[0, 1, 2, 3, 0, 0, 0, 1]]
+    assert read_table(file, (8,), names=POSE).values.tolist() == [[0, 1, 2, 3, 0, 0, 0, 1]]
 
 
 def test_units_in_a_header_are_followed() -> None:
@@ -150,7 +149,6 @@ def test_a_key_about_the_camera_is_read_or_refused(tmp_path: Path, params: objec
 def test_a_key_about_nothing_that_matters_is_a_notice(tmp_path: Path) -> None:
     recording = open_recording(replica(tmp_path / "room0", {"camera": {**NUMBERS, "scale": 1000.0}, "author": "me"}))
     assert "cam_params.json has keys that are not read: author." in recording.notices
-    assert unread_notice(tmp_path / "a.json", {"a": 1}, ("a",)) == ()
 
 
 @pytest.mark.parametrize(("separator", "slash"), [(" ", "\\"), ("\t", "/"), (",", "/")])

@@ -38,10 +38,6 @@ def _short_sound(path: Path) -> None:
     soundfile.write(path / "audio.flac", np.zeros(8000), 8000)
 
 
-def _foreign_text(path: Path) -> None:
-    (path / "events.csv").write_bytes(b"category,onset_s\nfrapp\xe9,1.0\n")
-
-
 FAULTS: list[tuple[Callable[[Path], object], str, str, int | None, bool]] = [
     (_lose_a_frame, "rgb/000002.png is missing; restore it", "rgb/000002.png", None, False),
     (lambda p: _cut(p / "depth/000003.png"), "000003.png is truncated (120 bytes)", "depth/000003.png", None, False),
@@ -81,14 +77,6 @@ FAULTS: list[tuple[Callable[[Path], object], str, str, int | None, bool]] = [
         False,
     ),
     (_short_sound, "audio.flac ends at 1.00 s, but the frames continue to 2.00 s;", "audio.flac", None, False),
-    (_foreign_text, "events.csv, line 2: this is not UTF-8 text; save the file as UTF-8.", "events.csv", 2, False),
-    (
-        lambda p: (p / "objects.json").write_text("[{"),
-        "objects.json is not JSON in UTF-8 (Input data was truncated); fix the file.",
-        "objects.json",
-        None,
-        False,
-    ),
     (
         lambda p: _replace_line(p / "recording.json", 1, '{"schema_version": 9}'),
         "recording.json has schema version 9; this avlmaps reads version 1: update avlmaps.",

@@ -16,8 +16,7 @@ from avlmaps.maps.store.folder import PARTS, is_map_or_free, read_info, remove_p
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo
 from avlmaps.maps.store.tables import SUFFIX, key_of
 from avlmaps.perception.encoders import Encoders
-from avlmaps.recordings.formats.file_recording import LARGEST_BUDGET_BYTES
-from avlmaps.recordings.types import Recording
+from avlmaps.recordings.types import LARGEST_BUDGET_BYTES, Recording
 
 BUILD_VERSION = 7  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
 

@@ -195,38 +195,51 @@ class AudioTrack:
 
 
 def write_flac(path: Path, sound: Sound | Iterable[Sound]) -> None:
-    """Write a sound, or the blocks of a long one, as 16-bit FLAC; a kill leaves the old file or the new one.
+    """Write a sound, or the blocks of a long one, as 16-bit FLAC; see ``write_samples``.
 
     Args:
         path: the file; its folder must exist.
-        sound: what to write; blocks must share one rate. Samples beyond [-1, 1] are clipped.
+        sound: what to write; blocks must share one rate.
 
     Raises:
         AudioError: there is not one block, or the disk is full.
+    """
+    blocks = iter([sound] if isinstance(sound, Sound) else sound)
+    first = next(blocks, None)
+    if first is None:
+        raise AudioError(f"There is no sound to write to {path}; give at least one block.")
+
+    def samples() -> Iterator[np.ndarray]:
+        for block in chain([first], blocks):
+            if block.rate_hz != first.rate_hz:
+                raise ValueError(f"a block has {block.rate_hz} samples a second, the first had {first.rate_hz}")
+            yield block.samples[:, None]
+
+    write_samples(path, samples(), first.rate_hz, 1)
+
+
+def write_samples(path: Path, blocks: Iterable[Float[np.ndarray, "n m"]], rate_hz: int, channels: int) -> None:
+    """Write samples of channels as 16-bit FLAC (up to 8), or WAV by the suffix; a kill leaves the old file or the new.
+
+    Samples beyond [-1, 1] are clipped.
+
+    Raises:
+        AudioError: the disk is full.
     """
     import soundfile
 
     from avlmaps.core.files import replace_atomically
 
-    blocks = iter([sound] if isinstance(sound, Sound) else sound)
-    first = next(blocks, None)
-    if first is None:
-        raise AudioError(f"There is no sound to write to {path}; give at least one block.")
+    kind = "WAV" if path.suffix.lower() == ".wav" else "FLAC"
     # Written by name: through a stream of ours, libsndfile would report a full disk on standard error by itself.
     with replace_atomically(path) as stream:
         try:
-            with soundfile.SoundFile(stream.name, "w", first.rate_hz, 1, "PCM_16", format="FLAC") as file:
-                for block in chain([first], blocks):
-                    _write_block(file, block, first.rate_hz)
+            with soundfile.SoundFile(stream.name, "w", rate_hz, channels, "PCM_16", format=kind) as file:
+                for block in blocks:
+                    for at in range(0, len(block), rate_hz):  # a second at a time: long writes have crashed
+                        file.write(np.clip(block[at : at + rate_hz], -1.0, 1.0))
         except (soundfile.SoundFileError, AssertionError) as error:  # it asserts that all samples were taken
             raise AudioError(f"{path} could not be written ({error or 'the disk may be full'}).") from error
-
-
-def _write_block(file: Any, block: Sound, rate_hz: int) -> None:
-    if block.rate_hz != rate_hz:
-        raise ValueError(f"a block has {block.rate_hz} samples a second, the first had {rate_hz}")
-    for at in range(0, len(block.samples), rate_hz):  # a second at a time: long writes have crashed
-        file.write(np.clip(block.samples[at : at + rate_hz], -1.0, 1.0))
 
 
 def _checked(samples: Float[np.ndarray, " n"], path: Path, rate_hz: int, at: int) -> Float[np.ndarray, " n"]:

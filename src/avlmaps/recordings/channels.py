@@ -1,7 +1,7 @@
 """Sound of several microphones at once, and sound that comes piece by piece: reading, writing, faults of channels."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.numbers import as_number
-from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, Sound, require_rate
+from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, Sound, require_rate, write_samples
 from avlmaps.recordings.containers import channel_power
 from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
 
@@ -21,7 +21,6 @@ _DEAD_DB = 40.0  # a channel this much below the loudest holds nothing of use
 _QUIET = 0.01  # share of the loudest's power; a fainter channel is not the one that is heard
 _PAUSE_S, _PAUSES = 0.05, 200  # of digital silence; the number that is read at once
 _FULL_SCALE, _CLIPPED = 0.999, 1e-3
-_WAV = ".wav"
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,25 +125,8 @@ def read_channels(track: AudioTrack, onset_s: float, offset_s: float) -> Channel
 
 
 def write_channels(path: Path, sound: ChannelSound) -> None:
-    """Write sound of several channels as 16-bit FLAC (up to 8) or WAV, by the file's suffix; all or nothing.
-
-    Raises:
-        AudioError: the disk is full.
-    """
-    import soundfile
-
-    from avlmaps.core.files import replace_atomically
-
-    kind = "WAV" if path.suffix.lower() == _WAV else "FLAC"
-    with replace_atomically(path) as stream:
-        try:
-            with soundfile.SoundFile(
-                stream.name, "w", sound.rate_hz, len(sound.samples), "PCM_16", format=kind
-            ) as file:
-                for at in range(0, sound.samples.shape[1], sound.rate_hz):  # a second at a time: long writes crash
-                    file.write(np.clip(sound.samples[:, at : at + sound.rate_hz].T, -1.0, 1.0))
-        except (soundfile.SoundFileError, AssertionError) as error:
-            raise AudioError(f"{path} could not be written ({error or 'the disk may be full'}).") from error
+    """Write sound of several channels; see ``audio.write_samples``."""
+    write_samples(path, [sound.samples.T], sound.rate_hz, len(sound.samples))
 
 
 def channel_faults(track: AudioTrack) -> list[str]:
@@ -355,15 +337,12 @@ class GrowingTrack:
         """When it ends until now, None before its first sample."""
         return None if not self._count else self._start_s + self._count / self._rate_hz
 
-    def add(self, chunk: Any, stamp_s: Any = None) -> list[Sound]:
+    def add(self, chunk: Any, stamp_s: Any = None) -> None:
         """Take a piece of sound.
 
         Args:
             chunk: a ``Sound``: mono samples and their rate; or a ``ChannelSound``, of one number of channels.
             stamp_s: when its first sample sounds, on the clock of the frames; None where the one before ended.
-
-        Returns:
-            What was added of the first channel, silence before it included.
 
         Raises:
             AudioError: it is no sound, has another rate or other channels, repeats what came, or is of another clock.
@@ -374,12 +353,13 @@ class GrowingTrack:
             raise AudioError(f"stamp_s of a piece of sound must be a finite number of seconds, not {stamp_s!r}.")
         channels, count = sound.samples.shape
         if not count:
-            return []
+            return
         end_s = self.end_s
         if end_s is None:
             self._rate_hz, self.channels = sound.rate_hz, channels
             self._start_s = 0.0 if at_s is None else at_s
-            return self._append([sound])
+            self._append([sound])
+            return
         late_s = 0.0 if at_s is None else at_s - end_s
         if late_s > LONGEST_GAP_S:
             raise AudioError(
@@ -387,13 +367,12 @@ class GrowingTrack:
                 f"({end_s:.3f} s), more than {LONGEST_GAP_S:.0f} s; give stamps of the frames' clock."
             )
         if late_s >= GAP_S:
-            added = self._append([*_filling(channels, round(late_s * sound.rate_hz), sound.rate_hz), sound])
+            self._append(_filling(channels, round(late_s * sound.rate_hz), sound.rate_hz))
             self.gaps, self.gap_s = self.gaps + 1, self.gap_s + late_s
-            return added
         if late_s <= -GAP_S:
             sound = self._rest_of(sound, -late_s, end_s)
             self.overlaps += 1
-        return self._append([sound])
+        self._append([sound])
 
     def _rest_of(self, sound: ChannelSound, early_s: float, end_s: float) -> ChannelSound:
         known = round(early_s * sound.rate_hz)
@@ -405,19 +384,20 @@ class GrowingTrack:
             )
         return ChannelSound(sound.samples[:, known:], sound.rate_hz)
 
-    def _append(self, sounds: list[ChannelSound]) -> list[Sound]:
+    def _append(self, sounds: Iterable[ChannelSound]) -> None:
+        count = 0
         try:
             with self._file.open("r+b" if self._file.exists() else "xb") as stream:
                 stream.seek(_BYTES * self.channels * self._count)  # what a full disk left half written is written again
                 for sound in sounds:
                     stream.write(np.ascontiguousarray(sound.samples.T, np.float32).data)
+                    count += sound.samples.shape[1]
         except OSError as fault:
             raise AudioError(
                 f"{self._file} cannot be written ({fault.strerror or fault}), so that a piece of sound is lost; make "
                 "room for it."
             ) from fault
-        self._count += sum(sound.samples.shape[1] for sound in sounds)
-        return [sound.channel(0) for sound in sounds]
+        self._count += count
 
 
 def _filling(channels: int, count: int, rate_hz: int) -> Iterator[ChannelSound]:
@@ -432,22 +412,14 @@ def _checked_piece(chunk: Any, rate_hz: int, channels: int) -> ChannelSound:
             f"A piece of sound must be an avlmaps.Sound(samples, rate_hz), not {type(chunk).__name__}; of several "
             "channels an avlmaps.ChannelSound."
         )
-    if chunk.rate_hz < LOWEST_RATE_HZ:
-        raise AudioError(f"A piece of sound has {chunk.rate_hz} samples a second; {LOWEST_RATE_HZ} are needed.")
-    if rate_hz and chunk.rate_hz != rate_hz:
-        raise AudioError(
-            f"A piece of sound has {chunk.rate_hz} samples a second, those before {rate_hz}; a map has one track, give "
-            "one rate."
-        )
     samples = chunk.samples if isinstance(chunk, ChannelSound) else chunk.samples[None]
-    if channels and len(samples) != channels:
+    wanted_hz, wanted = rate_hz or max(chunk.rate_hz, LOWEST_RATE_HZ), channels or len(samples)
+    if (chunk.rate_hz, len(samples)) != (wanted_hz, wanted):
         raise AudioError(
-            f"A piece of sound has {len(samples)} channel(s), those before {channels}; a map has one track, give all "
-            "of its channels."
+            f"A piece of sound has {chunk.rate_hz} samples a second in {len(samples)} channel(s); {wanted_hz} in "
+            f"{wanted} are needed: a map has one track, of one rate with all of its channels."
         )
-    if not np.isfinite(samples).all():
-        raise AudioError("A piece of sound holds samples that are not finite numbers; leave it out.")
     peak = float(np.abs(samples).max(initial=0.0))
-    if peak > _LARGEST:
-        raise AudioError(f"A piece of sound holds samples as large as {peak:.0f}; they must lie in [-1, 1].")
+    if not peak <= _LARGEST:  # NaN is not
+        raise AudioError(f"A piece of sound holds samples as large as {peak:.3g}; they must lie in [-1, 1].")
     return ChannelSound(np.clip(samples, -1.0, 1.0), chunk.rate_hz)

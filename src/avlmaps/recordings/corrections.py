@@ -193,20 +193,16 @@ class Corrections:
 
     def words(self, spelled: Callable[[str, str], str] = option) -> str:
         """Return them as the options that give them, as the reader of a sentence spells options."""
-        said: list[str] = []
-        if self.depth_unit_m is not None:
-            said.append(spelled("depth-unit", f"{self.depth_unit_m:g}"))
-        if self.intrinsics:
-            said.append(spelled("intrinsics", " ".join(map(_camera_words, self.intrinsics))))
-        if self.poses:
-            said.append(spelled("poses", " ".join(self.poses)))
-        if self.camera_axes is not None:
-            said.append(spelled("camera-axes", str(self.camera_axes)))
-        if self.pose_delay_s is not None:
-            said.append(spelled("pose-delay", f"{self.pose_delay_s:g}"))
-        if self.up_in_world is not None:
-            said.append(spelled("up", ",".join(f"{value:g}" for value in self.up_in_world)))
-        return " ".join(said)
+        unit, delay = self.depth_unit_m, self.pose_delay_s
+        rows = (
+            ("depth-unit", "" if unit is None else f"{unit:g}"),
+            ("intrinsics", " ".join(map(_camera_words, self.intrinsics))),
+            ("poses", " ".join(self.poses)),
+            ("camera-axes", self.camera_axes or ""),
+            ("pose-delay", "" if delay is None else f"{delay:g}"),
+            ("up", ",".join(f"{value:g}" for value in self.up_in_world or ())),
+        )
+        return " ".join(spelled(name, value) for name, value in rows if value)
 
 
 NONE = Corrections()
@@ -252,6 +248,7 @@ class CorrectedRecording(Subset):
         self.given, self.topics = given, whole.topics
         self.rig = corrected_rig(whole.rig, given.intrinsics, whole.path)
         self._scale = 1.0 if given.depth_unit_m is None else given.depth_unit_m / whole.stored_depth_unit_m
+        self.stored_depth_unit_m = whole.stored_depth_unit_m * self._scale
         self.notices = (*whole.notices, *self.lost)
         self.posed = whole.posed * len(at) / max(len(whole), 1)
         self.world_from_camera = reread_poses(world_from_camera, given)
@@ -270,18 +267,6 @@ class CorrectedRecording(Subset):
         depth_m = frame.depth_m if self._scale == 1.0 else frame.depth_m * np.float32(self._scale)
         pose = self.world_from_camera[index]
         return replace(frame, depth_m=depth_m, world_from_camera=pose, rig=self.rig)
-
-    @property
-    def depth_units_per_m(self) -> float:
-        """Units of the depth files in a metre, as corrected."""
-        whole = self.whole
-        stored_so = np.isclose(whole.stored_depth_unit_m * whole.depth_units_per_m, 1.0)
-        return whole.depth_units_per_m / self._scale if stored_so else whole.depth_units_per_m
-
-    @property
-    def stored_depth_unit_m(self) -> float:
-        """Metres of one unit of the depth as stored, as corrected."""
-        return self.whole.stored_depth_unit_m * self._scale
 
     @cached_property
     def fingerprint(self) -> str:

@@ -1,7 +1,8 @@
 """Faults of a recording and their reports: opening stops at the first fault, the validator lists them all."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,17 +29,57 @@ class Fault:
         return self.sentence
 
 
-Report = Callable[[Fault], None]
+_listed: ContextVar[list[Fault] | None] = ContextVar("_listed", default=None)
 
 
-def stop_at_first(fault: Fault) -> None:
-    """Refuse to continue where a fault is fatal; pass over any other.
+def report(sentence: str, file: Path | None = None, line: int | None = None, *, fatal: bool = True) -> None:
+    """Add a fault to the list of ``listed``; outside of it, stop at a fatal one and pass over any other.
+
+    Args:
+        sentence: see ``Fault``.
+        file: where it is.
+        line: in the file.
+        fatal: whether the recording cannot be opened because of it.
 
     Raises:
-        RecordingError: the fault is fatal.
+        RecordingError: it is fatal, and no list is made.
     """
-    if fault.fatal:
-        raise RecordingError(fault.sentence)
+    found = _listed.get()
+    if found is not None:
+        found.append(Fault(sentence, file, line, fatal))
+    elif fatal:
+        raise RecordingError(sentence)
+
+
+_noted: ContextVar[list[str] | None] = ContextVar("_noted", default=None)
+
+
+def note(*sentences: str) -> None:
+    """Add sentences to the notices of the recording that is being opened."""
+    if (found := _noted.get()) is not None:
+        found += sentences
+
+
+@contextmanager
+def noted() -> Generator[list[str]]:
+    """Gather what is noted within."""
+    found: list[str] = []
+    token = _noted.set(found)
+    try:
+        yield found
+    finally:
+        _noted.reset(token)
+
+
+@contextmanager
+def listed() -> Generator[list[Fault]]:
+    """List every fault that is reported within, in place of stopping at the first."""
+    found: list[Fault] = []
+    token = _listed.set(found)
+    try:
+        yield found
+    finally:
+        _listed.reset(token)
 
 
 @contextmanager

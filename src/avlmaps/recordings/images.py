@@ -24,7 +24,7 @@ from avlmaps.core.files import PICTURE_BYTES, checked_size, open_regular, read_r
 from avlmaps.core.poses import apply
 from avlmaps.core.rvl import decode_rvl
 from avlmaps.recordings.containers import checked_media
-from avlmaps.recordings.faults import readable
+from avlmaps.recordings.faults import note, readable
 
 COLOUR_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp")
 DEPTH_SUFFIXES = (".png", ".npy", ".tif", ".tiff")
@@ -215,10 +215,7 @@ def decode_colour(path: Path, content: bytes, camera: Pinhole) -> UInt8[np.ndarr
     """Decode a colour picture that was read before; ``path`` is for the sentences. Errors as of ``read_colour``."""
     import cv2
 
-    _check_outside(path, content, camera)
-    bgr = decode_picture(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-    if bgr is None:
-        raise _undecodable(path, content)
+    bgr = _decoded(path, content, camera, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if bgr.shape[:2] != (camera.height, camera.width):
         bgr = exif_turn(content).applied(bgr)
     _check_size(path, bgr.shape, camera)
@@ -229,13 +226,17 @@ def read_mask(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w"]:
     """Read an 8-bit picture of one channel that belongs to a depth picture; errors as of ``read_colour``."""
     import cv2
 
-    content = read_bytes(path)
-    _check_outside(path, content, camera)
-    mask = decode_picture(content, cv2.IMREAD_GRAYSCALE)
-    if mask is None:
-        raise _undecodable(path, content)
+    mask = _decoded(path, read_bytes(path), camera, cv2.IMREAD_GRAYSCALE)
     _check_size(path, mask.shape, camera)
     return mask
+
+
+def _decoded(path: Path, content: bytes, camera: Pinhole, flags: int) -> np.ndarray:
+    _check_outside(path, content, camera)
+    picture = decode_picture(content, flags)
+    if picture is None:
+        raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
+    return picture
 
 
 def decode_picture(content: bytes, flags: int) -> np.ndarray | None:
@@ -251,10 +252,6 @@ def decode_picture(content: bytes, flags: int) -> np.ndarray | None:
     with suppress(OSError, ValueError, MemoryError, SyntaxError), _opened(content) as picture:  # HEIC
         return np.ascontiguousarray(np.asarray(picture.convert("RGB"))[..., ::-1])
     return None
-
-
-def _undecodable(path: Path, content: bytes) -> RecordingError:
-    return RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
 
 
 def _check_outside(path: Path, content: bytes, camera: Pinhole) -> None:
@@ -274,17 +271,15 @@ def file_turn(path: Path) -> DisplayTurn:
         return DisplayTurn()
 
 
-def turn_notices(folder: Path, names: Sequence[str]) -> tuple[str, ...]:
-    """Return a notice where a few of the colour files are to be shown turned, or nothing."""
+def note_turn(folder: Path, names: Sequence[str]) -> None:
+    """Note where a few of the colour files are to be shown turned."""
     spread = _some(len(names))
     turned = {at: turn for at in spread if (turn := file_turn(folder / names[at]))}
-    if not turned:
-        return ()
-    at, turn = next(iter(turned.items()))
-    return (
-        f"{names[at]} is to be shown {turn.words} (its EXIF), as {len(turned)} of {len(spread)} pictures looked "
-        "at; they are read as they are stored, like depth, unless the intrinsics are of the turned size.",
-    )
+    for at, turn in list(turned.items())[:1]:
+        note(
+            f"{names[at]} is to be shown {turn.words} (its EXIF), as {len(turned)} of {len(spread)} pictures looked "
+            "at; they are read as they are stored, like depth, unless the intrinsics are of the turned size."
+        )
 
 
 def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.ndarray, "h w"]:
@@ -300,9 +295,12 @@ def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.nd
     """
     if path.suffix == ".npy":
         return _npy_depth(path, camera)
-    content = read_bytes(path)
-    _check_outside(path, content, camera)
-    raw = decode_depth(path, content)
+    import cv2
+
+    raw = _decoded(path, read_bytes(path), camera, cv2.IMREAD_UNCHANGED)
+    if str(raw.dtype) not in ("uint16", "float32") or raw.ndim != 2:
+        kind = f"{raw.dtype.itemsize * 8}-bit with {raw.shape[2] if raw.ndim == 3 else 1} channel(s)"
+        raise RecordingError(f"{path} is {kind}; depth must be a 16-bit PNG with one channel.")
     _check_size(path, raw.shape, camera)
     return metres(raw, units_per_m)
 
@@ -328,20 +326,6 @@ def decode_rvl_depth(path: Path, content: bytes, head: int) -> UInt16[np.ndarray
         return decode_rvl(content[head:], width, height)
     except ValueError as error:
         raise RecordingError(f"{path} is cut off or damaged: {error}.") from None
-
-
-def decode_depth(path: Path, content: bytes) -> np.ndarray:
-    """Return a depth picture as it is stored: uint16, or float32 of a TIFF."""
-    import cv2
-
-    picture_size(path, content)
-    raw = decode_picture(content, cv2.IMREAD_UNCHANGED)
-    if raw is None:
-        raise _undecodable(path, content)
-    if str(raw.dtype) not in ("uint16", "float32") or raw.ndim != 2:
-        kind = f"{raw.dtype.itemsize * 8}-bit with {raw.shape[2] if raw.ndim == 3 else 1} channel(s)"
-        raise RecordingError(f"{path} is {kind}; depth must be a 16-bit PNG with one channel.")
-    return raw
 
 
 def _depth_shape(path: Path, stored: np.ndarray) -> tuple[int, int]:
@@ -501,35 +485,29 @@ class VideoFrames:
 
     def _open(self) -> Any:
         import av
-        from av.error import FFmpegError
 
-        try:
+        with self._told(), readable(self.path, "give the video"):
             checked_media(self.path)
-        except FileNotFoundError:
-            raise RecordingError(f"There is no video {self.path}.") from None
-        except OSError as error:
-            raise RecordingError(f"{self.path} cannot be read ({error.strerror or error}); check the file.") from None
-        try:
             container = av.open(str(self.path))
-        except FFmpegError as error:
-            raise RecordingError(f"{self.path} cannot be read as a video ({error}); is it cut short?") from error
         if not container.streams.video:
             raise RecordingError(f"{self.path} has no video stream.")
         return container
+
+    @contextmanager
+    def _told(self) -> Generator[None]:
+        from av.error import FFmpegError
+
+        try:
+            yield
+        except FFmpegError as error:
+            raise RecordingError(f"{self.path} cannot be read as a video ({error}); is it cut short?") from error
 
     def _stream(self) -> Any:
         return self._container.streams.video[0]
 
     def _read_stamps(self) -> np.ndarray:
-        from av.error import FFmpegError
-
-        try:
-            return self._stamps_of_packets()
-        except FFmpegError as error:
-            raise RecordingError(f"{self.path} cannot be read as a video ({error}); is it cut short?") from error
-
-    def _stamps_of_packets(self) -> np.ndarray:
-        stamps = [packet.pts for packet in self._container.demux(self._stream()) if packet.pts is not None]
+        with self._told():
+            stamps = [packet.pts for packet in self._container.demux(self._stream()) if packet.pts is not None]
         if not stamps:
             raise RecordingError(f"{self.path} has a video stream without a single frame.")
         return np.unique(np.array(stamps, np.int64))

@@ -25,7 +25,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.corrections import Corrections, PoseKind
-from avlmaps.recordings.faults import Fault, Report, readable
+from avlmaps.recordings.faults import readable, report
 from avlmaps.recordings.microphones import MicrophoneNumbers
 from avlmaps.recordings.types import BaseHeight
 
@@ -140,7 +140,7 @@ class _Version(msgspec.Struct):
     schema_version: int
 
 
-def read_description(folder: Path, report: Report) -> Description:
+def read_description(folder: Path) -> Description:
     """Read ``recording.json``."""
     path = folder / DESCRIPTION
     try:
@@ -149,7 +149,7 @@ def read_description(folder: Path, report: Report) -> Description:
         if fault:
             raise RecordingError(f"{path}: {fault}; fix the file.")
     except RecordingError as error:
-        report(Fault(str(error), path))
+        report(str(error), path)
         raise
     return description
 

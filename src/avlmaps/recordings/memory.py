@@ -109,21 +109,13 @@ def next_of(frame: Frame, last_stamp_s: float | None, rig: Rig) -> Frame:
 
 # A picture whose middle depth is farther than this was given in millimetres: 0.2 m of them are more.
 FARTHEST_MIDDLE_M = 200.0
-_FARTHEST_MIDDLE_CM = 900.0  # and in centimetres it would be a room
 # One that has no depth beyond this was given in kilometres, or divided twice.
 _NEAREST_FARTHEST_M = 0.02
 
 _EXACT = 1e-12
 
 
-def given_frame(
-    index: int,
-    rgb: Any,
-    depth_m: Any,
-    camera: Any,
-    world_from_camera: Any,
-    stamp_s: Any,
-) -> Frame:
+def given_frame(index: int, rgb: Any, depth_m: Any, camera: Any, world_from_camera: Any, stamp_s: Any) -> Frame:
     """Return a frame of a program's arrays, which are copied.
 
     Args:
@@ -160,26 +152,24 @@ def given_frame(
 
 
 def _numbers(name: str, what: str, given: Any) -> np.ndarray:
+    kind = type(given).__name__
     try:
         array = np.ma.filled(given, 0) if np.ma.isMaskedArray(given) else np.asarray(given)
+        reason = "" if array.dtype.kind in "fiu" else str(array.dtype)
     except (ValueError, TypeError, RuntimeError) as fault:  # rows of several lengths, or a tensor of a GPU
-        raise RecordingError(
-            f"{what} of {name} must be an array of numbers, not {type(given).__name__} ({fault})."
-        ) from None
-    if array.dtype.kind not in "fiu":
-        raise RecordingError(
-            f"{what} of {name} must be an array of numbers, not {type(given).__name__} ({array.dtype})."
-        )
+        array, reason = np.zeros(0), str(fault)
+    if reason:
+        raise RecordingError(f"{what} of {name} must be an array of numbers, not {kind} ({reason}).")
     return array
 
 
 def _colours(name: str, given: Any) -> UInt8[np.ndarray, "h w 3"]:
     rgb = _numbers(name, "rgb", given)
     if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape or rgb.dtype != np.uint8:
-        hint = "; colours from 0 to 1 times 255" if rgb.dtype.kind == "f" else ""
-        hint = "; leave the fourth channel out" if rgb.ndim == 3 and rgb.shape[2] == 4 else hint
-        hint = "; put the channels last: rgb.transpose(1, 2, 0)" if rgb.ndim == 3 and rgb.shape[0] == 3 else hint
-        raise RecordingError(f"rgb of {name} must be uint8 of shape (h, w, 3), not {rgb.dtype} of {rgb.shape}{hint}.")
+        raise RecordingError(
+            f"rgb of {name} must be uint8 of shape (h, w, 3), not {rgb.dtype} of {rgb.shape}; colours are 0 to 255, "
+            "channels are last (rgb.transpose(1, 2, 0)) and without a fourth."
+        )
     return np.array(rgb, order="C")
 
 
@@ -187,54 +177,40 @@ def _depths(name: str, given: Any) -> Float[np.ndarray, "hd wd"]:
     depth = _numbers(name, "depth_m", given)
     if depth.ndim == 3 and depth.shape[2] == 1:
         depth = depth[:, :, 0]
-    if depth.ndim != 2 or 0 in depth.shape:
-        raise RecordingError(f"depth_m of {name} must have shape (h, w), not {depth.shape}.")
-    if depth.dtype.kind != "f":
+    if depth.ndim != 2 or 0 in depth.shape or depth.dtype.kind != "f":
+        most = f" up to {depth.max()}" if depth.size else ""
         raise RecordingError(
-            f"depth_m of {name} must be floats in metres, not {depth.dtype} up to {depth.max()}; millimetres are "
-            "divided by 1000.0."
+            f"depth_m of {name} must be floats in metres of shape (h, w), not {depth.dtype} of {depth.shape}{most}; "
+            "millimetres are divided by 1000.0."
         )
     depth = np.array(depth, np.float32, order="C")
     depth[~np.isfinite(depth)] = 0.0
     seen = depth[depth != 0.0]
-    if (seen < 0.0).any():
-        raise RecordingError(f"depth_m of {name} holds negative depths, down to {seen.min():.4g} m; 0 says none.")
-    middle_m, farthest_m = (float(np.median(seen)), float(seen.max())) if len(seen) else (1.0, 1.0)
-    if middle_m > FARTHEST_MIDDLE_M or farthest_m < _NEAREST_FARTHEST_M:
-        unit = "millimetres" if middle_m > _FARTHEST_MIDDLE_CM else "centimetres, or millimetres of what is near"
+    least, middle, most = (float(seen.min()), float(np.median(seen)), float(seen.max())) if len(seen) else (1.0,) * 3
+    if least < 0.0 or middle > FARTHEST_MIDDLE_M or most < _NEAREST_FARTHEST_M:
+        unit = ", which looks like millimetres or centimetres" if middle > FARTHEST_MIDDLE_M else ""
         raise RecordingError(
-            f"depth_m of {name} must be in metres; its median is {middle_m:,.4g} and its largest {farthest_m:,.4g}"
-            f"{f', which looks like {unit}' if middle_m > FARTHEST_MIDDLE_M else ''}."
+            f"depth_m of {name} must be in metres; its median is {middle:,.4g}, its least {least:.4g} and its largest "
+            f"{most:,.4g}{unit}."
         )
     return depth
 
 
 def _rig(name: str, camera: Any, rgb: np.ndarray, depth: np.ndarray) -> Rig:
     (height, width), (depth_height, depth_width) = rgb.shape[:2], depth.shape
-    if isinstance(camera, Rig):
-        wanted = (camera.rgb.width, camera.rgb.height), (camera.depth.width, camera.depth.height)
-        if wanted != ((width, height), (depth_width, depth_height)):
-            raise RecordingError(
-                f"The rig of {name} has pictures of {_size(wanted[0])} and depths of {_size(wanted[1])}; rgb has "
-                f"{_size((width, height))} and depth_m {_size((depth_width, depth_height))}."
-            )
-        return camera
-    if not isinstance(camera, Pinhole):
+    if not isinstance(camera, Pinhole | Rig):
         raise RecordingError(
             f"camera of {name} must be an avlmaps.Pinhole(fx, fy, cx, cy, width, height) or an avlmaps.Rig, not "
             f"{type(camera).__name__}."
         )
-    if (camera.width, camera.height) != (width, height):
-        raise RecordingError(
-            f"rgb of {name} has {_size((width, height))} pixels, its camera {_size((camera.width, camera.height))}."
-        )
-    if abs(depth_width * height - depth_height * width) > max(width, height, depth_width, depth_height):
-        raise RecordingError(
-            f"depth_m of {name} has {_size((depth_width, depth_height))} pixels, rgb {_size((width, height))}: not one "
-            "view; give an avlmaps.Rig with both cameras."
-        )
-    return Rig(camera, camera.resized(depth_width, depth_height))
-
-
-def _size(size: tuple[int, int]) -> str:
-    return f"{size[0]}x{size[1]}"
+    alike = abs(depth_width * height - depth_height * width) <= max(width, height, depth_width, depth_height)
+    if isinstance(camera, Pinhole) and (camera.width, camera.height) == (width, height) and alike:
+        return Rig(camera, camera.resized(depth_width, depth_height))
+    own = camera if isinstance(camera, Rig) else Rig(camera, camera)
+    wanted = (own.rgb.height, own.rgb.width), (own.depth.height, own.depth.width)
+    if isinstance(camera, Rig) and wanted == (rgb.shape[:2], depth.shape):
+        return camera
+    raise RecordingError(
+        f"rgb of {name} has {width}x{height} pixels and depth_m {depth_width}x{depth_height}, the camera "
+        f"{own.rgb.width}x{own.rgb.height}; where depth is not the same view give an avlmaps.Rig with both cameras."
+    )

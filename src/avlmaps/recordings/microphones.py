@@ -102,36 +102,30 @@ class Microphones:
             if name != "delay_s" or given is not None:
                 object.__setattr__(self, name, _numbers(given, name))
         place = self.position_m
-        if place.ndim != 2 or place.shape[1] != 3 or not 1 <= len(place) <= MOST_CHANNELS:
+        if (
+            place.ndim != 2
+            or place.shape[1] != 3
+            or not 1 <= len(place) <= MOST_CHANNELS
+            or not np.isfinite(place).all()
+        ):
             raise RecordingError(
-                f"The microphones' positions have shape {place.shape}; give three numbers for each of 1 to "
-                f"{MOST_CHANNELS} channels."
+                f"The microphones' positions have shape {place.shape}; give three finite numbers, metres, for each of "
+                f"1 to {MOST_CHANNELS} channels."
             )
-        if not np.isfinite(place).all():
-            raise RecordingError("A microphone's position is NaN or infinite; measure it in metres.")
-        if self.delay_s is not None and self.delay_s.shape != (len(place),):
+        late = np.zeros(len(place)) if self.delay_s is None else self.delay_s
+        if late.shape != (len(place),) or not (np.abs(late) <= MOST_DELAY_S).all():  # NaN is not
             raise RecordingError(
-                f"There are delays of {self.delay_s.size} channels for {len(place)} microphones; give one for each."
+                f"The delays of the channels are {late.tolist()} s; give one for each of the {len(place)}, at most "
+                f"{MOST_DELAY_S:g} s either way, or align the files of the channels first."
             )
         self._require_channels()
-        late = np.zeros(0) if self.delay_s is None else self.delay_s
-        if not (np.abs(late) <= MOST_DELAY_S).all():  # NaN is not
-            raise RecordingError(
-                f"A channel's delay is {late[~(np.abs(late) <= MOST_DELAY_S)][0]:g} s; it is in seconds and at most "
-                f"{MOST_DELAY_S:g} either way, so align the files of the channels first."
-            )
         poses.orthonormalize(self.camera_from_robot, "the robot's frame in the camera, microphones.camera_from_robot,")
         for one, other in itertools.combinations(range(len(place)), 2):
             apart_m = float(np.linalg.norm(place[one] - place[other]))
-            if apart_m < LEAST_APART_M:
+            if not LEAST_APART_M <= apart_m <= MOST_APART_M:
                 raise RecordingError(
-                    f"The microphones of channels {one + 1} and {other + 1} are {apart_m:.3g} m apart, which shows no "
-                    f"direction; give their true places, at least {LEAST_APART_M:g} m apart."
-                )
-            if apart_m > MOST_APART_M:
-                raise RecordingError(
-                    f"The microphones of channels {one + 1} and {other + 1} are {apart_m:.3g} m apart, more than the "
-                    f"{MOST_APART_M:g} m of a robot; give positions in metres (not in cm or mm)."
+                    f"The microphones of channels {one + 1} and {other + 1} are {apart_m:.3g} m apart, and those of a "
+                    f"robot that show a direction {LEAST_APART_M:g} to {MOST_APART_M:g} m; give their places in metres."
                 )
 
     def _require_channels(self) -> None:
@@ -213,13 +207,13 @@ def given_microphones(given: Any) -> Microphones:
     Raises:
         RecordingError: it is none of them, or ``microphones_named`` refuses it.
     """
-    if isinstance(given, str | Path):
-        return microphones_named(str(given))
-    if not isinstance(given, Microphones):
+    if isinstance(given, Microphones):
+        return given
+    if not isinstance(given, str | Path):
         raise RecordingError(
             f"microphones are an avlmaps.Microphones, a name ({', '.join(PRESETS)}) or a JSON file; not {given!r}."
         )
-    return given
+    return microphones_named(str(given))
 
 
 def write_microphones(path: Path, microphones: Microphones) -> None:

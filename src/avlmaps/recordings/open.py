@@ -26,7 +26,6 @@ from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import with_microphones
 from avlmaps.recordings.corrections import Corrections, corrected
-from avlmaps.recordings.faults import Report, stop_at_first
 from avlmaps.recordings.microphones import microphones_named
 from avlmaps.recordings.types import Recording
 
@@ -49,8 +48,7 @@ class Format:
         looks_for: what makes a folder or file this format, in words.
         matches: the same as a quick test.
         opener: ``package.module:function`` (ours begin with a dot), or a key of the module's ``OPENERS``; called with
-            the path, and with ``report=`` if it tells faults.
-        tells_faults: whether the opener takes ``report``.
+            the path; it says faults by ``faults.report``, so that all of them can be listed.
         has_topics: whether the opener takes topics by name, and several files of one recording.
     """
 
@@ -58,21 +56,13 @@ class Format:
     looks_for: str
     matches: Callable[[Path], bool]
     opener: str
-    tells_faults: bool = True
     has_topics: bool = False
 
-    def open(
-        self,
-        path: Path,
-        report: Report = stop_at_first,
-        topics: Mapping[str, str] | None = None,
-        more: Sequence[Path] = (),
-    ) -> Recording:
+    def open(self, path: Path, topics: Mapping[str, str] | None = None, more: Sequence[Path] = ()) -> Recording:
         """Open a recording with this format's opener.
 
         Args:
             path: the recording.
-            report: called with every fault.
             topics: names by what they are for.
             more: further files of the same recording.
         """
@@ -89,7 +79,7 @@ class Format:
         elif topics:
             raise RecordingError(f"{path} is of the format {self.name}, which has no topics; leave them out.")
         else:
-            recording = opener(path, report=report) if self.tells_faults else opener(path)
+            recording = opener(path)
         settle_sound(recording)
         if is_in_future(recording.begins_s):
             when = datetime.fromtimestamp(min(recording.begins_s, _YEAR_9999_S), UTC).date()
@@ -149,12 +139,7 @@ def _is_rosbag(path: Path) -> bool:
 
 
 FORMATS: tuple[Format, ...] = (
-    Format(
-        "folder",
-        "recording.json with rgb/ (or rgb.mp4), depth/ and poses.csv",
-        _is_folder,
-        ".folder:open_folder",
-    ),
+    Format("folder", "recording.json with rgb/ (or rgb.mp4), depth/ and poses.csv", _is_folder, ".folder:open_folder"),
     Format(
         "7scenes",
         "frame-000000.color.jpg or .png, .depth.png and .pose.txt",
@@ -165,18 +150,10 @@ FORMATS: tuple[Format, ...] = (
     Format("replica", "traj.txt and results/", holds("traj.txt", "results"), ".layouts:replica"),
     Format("scannet", "color/, depth/, pose/ and intrinsic/", holds("color", "depth", "pose"), ".layouts:scannet"),
     Format(
-        "avlmaps",
-        "poses.txt and rgb/ (with depth/ of .npy)",
-        holds("poses.txt", "rgb"),
-        ".avlmaps_layout:open_avlmaps",
+        "avlmaps", "poses.txt and rgb/ (with depth/ of .npy)", holds("poses.txt", "rgb"), ".avlmaps_layout:open_avlmaps"
     ),
     Format(
-        "rosbag",
-        "a .bag, .mcap or .db3 file, or a folder of them",
-        _is_rosbag,
-        ".rosbag:open_rosbag",
-        tells_faults=False,
-        has_topics=True,
+        "rosbag", "a .bag, .mcap or .db3 file, or a folder of them", _is_rosbag, ".rosbag:open_rosbag", has_topics=True
     ),
     Format(
         "record3d",
@@ -190,12 +167,7 @@ FORMATS: tuple[Format, ...] = (
         holds("odometry.csv", "camera_matrix.csv"),
         ".scans:open_stray_scanner",
     ),
-    Format(
-        "nerfstudio",
-        "transforms.json with depth_file_path",
-        holds("transforms.json"),
-        ".scans:open_nerfstudio",
-    ),
+    Format("nerfstudio", "transforms.json with depth_file_path", holds("transforms.json"), ".scans:open_nerfstudio"),
     Format(
         "polycam",
         "keyframes/ with images/, depth/ and cameras/",
@@ -233,10 +205,7 @@ FORMATS: tuple[Format, ...] = (
         ".listed:open_rtabmap_export",
     ),
     Format(
-        "rtabmap",
-        "a .db file of RTAB-Map",
-        lambda path: _called("rtabmap:is_rtabmap", path),
-        ".rtabmap:open_rtabmap",
+        "rtabmap", "a .db file of RTAB-Map", lambda path: _called("rtabmap:is_rtabmap", path), ".rtabmap:open_rtabmap"
     ),
 )
 _BUILT_IN = frozenset(known.name for known in FORMATS)
@@ -268,33 +237,17 @@ def _brought(name: str, target: str) -> Format:
     module, _, attribute = target.partition(":")
     try:
         brought = getattr(importlib.import_module(module), attribute)
+        if not isinstance(brought, Format) or brought.name != name:
+            raise TypeError("it is no Format of that name")
     except Exception as fault:  # an import runs another's code
         raise RecordingError(
             f"The recording format {name!r} cannot be loaded from {target} ({fault}); fix or remove the package that "
             "brings it."
         ) from fault
-    if not isinstance(brought, Format) or brought.name != name:
-        raise RecordingError(
-            f"The entry point {name!r} of {ENTRY_POINT_GROUP} leads to {target}, which is no Format of that name; fix "
-            "or remove the package that brings it."
-        )
     return brought
 
 
 _EXPORT = "export its colour, depth and poses as a folder of recording.json, rgb/, depth/ and poses.csv"
-
-
-@dataclass(frozen=True, slots=True)
-class _Unreadable:
-    """Something that is recognised and not read.
-
-    Attributes:
-        matches: recognises it.
-        why: what it is, what is missing, and what to do: a sentence without its subject.
-    """
-
-    matches: Callable[[Path], bool]
-    why: str
 
 
 def _suffix(*suffixes: str) -> Callable[[Path], bool]:
@@ -311,61 +264,53 @@ def _euroc_cameras(path: Path) -> bool:
     return _euroc(path) and some_name(inside, "cam[0-9]*")
 
 
-_UNREADABLE = (
-    _Unreadable(
+# What is recognised and not read: a test, and what it is, what is missing and what to do, without its subject.
+_UNREADABLE: tuple[tuple[Callable[[Path], bool], str], ...] = (
+    (
         _euroc_cameras,
         "is a recording of EuRoC's layout: an IMU and cameras without depth, from which no map is built; compute depth "
         "from the stereo pair first, and give a folder of recording.json, rgb/, depth/ and poses.csv.",
     ),
-    _Unreadable(
+    (
         _euroc,
         "holds measurements of an IMU and no pictures, from which no map can be built; record colour and depth "
         "beside it.",
     ),
-    _Unreadable(
+    (
         _suffix(".sens"),
         "is ScanNet's packed recording; unpack it with ScanNet's SensReader (color/, depth/, pose/, intrinsic/), and "
         "open that folder.",
     ),
-    _Unreadable(
+    (
         lambda path: some_name(path, "frame-*.depth.pgm"),
         "is of 3RScan, or unpacked by ScanNet's C++ reader: its .depth.pgm is not read; convert it to 16-bit .png, "
         "or unpack the .sens with the Python reader (color/, depth/, pose/, intrinsic/).",
     ),
-    _Unreadable(
+    (
         _suffix(".svo", ".svo2"),
         f"is a recording of a ZED camera, which its own SDK alone reads; {_EXPORT} with it, or record a ROS bag.",
     ),
-    _Unreadable(
-        _suffix(".oni", ".klg", ".rrf", ".rrd", ".xef"),
-        f"is a packed recording that is not read; {_EXPORT}.",
-    ),
-    _Unreadable(
-        _suffix(".db"),
-        "is no database of RTAB-Map (it is no SQLite file); copy it again.",
-    ),
-    _Unreadable(
+    (_suffix(".oni", ".klg", ".rrf", ".rrd", ".xef"), f"is a packed recording that is not read; {_EXPORT}."),
+    (_suffix(".db"), "is no database of RTAB-Map (it is no SQLite file); copy it again."),
+    (
         _suffix(".ply", ".pcd", ".las", ".laz", ".obj", ".glb", ".usdz", ".splat"),
         "is a finished model, without the pictures that a map is built from; give the recording it was made of.",
     ),
-    _Unreadable(
+    (
         lambda path: some_name(path, "scene_*_*.depth"),
         "is ICL-NUIM in POV-Ray's own files; download its TUM RGB-D compatible PNGs and open those.",
     ),
-    _Unreadable(
+    (
         _suffix(".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz", ".7z", ".rar"),
         "is an archive; unpack it, and give the folder or the file inside.",
     ),
-    _Unreadable(
+    (
         lambda path: some_name(path, "image_[0-9]*") or (path / "sequences").is_dir(),
         f"is of KITTI's layout: cameras without depth, and poses of twelve numbers a line; {_EXPORT} (poses as stamp, "
         "position and quaternion).",
     ),
-    _Unreadable(
-        holds("lowres_wide", "lowres_depth"),
-        f"is of ARKitScenes' layout, which is not read; {_EXPORT}.",
-    ),
-    _Unreadable(
+    (holds("lowres_wide", "lowres_depth"), f"is of ARKitScenes' layout, which is not read; {_EXPORT}."),
+    (
         holds("images", "sparse"),
         "is a reconstruction of COLMAP, whose scale is not metres and which has no depth; record with a depth "
         f"camera, or {_EXPORT}.",
@@ -375,7 +320,7 @@ _UNREADABLE = (
 
 def why_unreadable(path: Path) -> str:
     """Return a sentence about a place that is recognised and not read, or nothing."""
-    return next((f"{path} {known.why}" for known in _UNREADABLE if known.matches(path)), "")
+    return next((f"{path} {why}" for matches, why in _UNREADABLE if matches(path)), "")
 
 
 # Files that a map's folder holds and no recording's does.
@@ -389,7 +334,6 @@ def open_recording(
     topics: Mapping[str, str] | None = None,
     corrections: Corrections | None = None,
     microphones: Path | str | None = None,
-    report: Report = stop_at_first,
 ) -> Recording:
     """Open a recording in place: nothing is copied, and no picture is read before it is needed.
 
@@ -401,7 +345,6 @@ def open_recording(
         corrections: what someone knows better than the files; a notice repeats it.
         microphones: where those of the track's channels are, instead of the recording's own: a JSON file, or a name
             (``microphones.PRESETS``); a notice repeats it.
-        report: called with every fault.
 
     Raises:
         RecordingError: there is nothing there, it is of no known format, or it cannot be used.
@@ -415,7 +358,7 @@ def open_recording(
     found = find_format(path, format)
     if audio is not None and found.has_topics and not (topics or {}).get("audio"):
         topics = {**(topics or {}), "audio": "none"}  # its own sound need not be readable
-    recording = found.open(lasting_path(path), report, topics, [lasting_path(one) for one in more])
+    recording = found.open(lasting_path(path), topics, [lasting_path(one) for one in more])
     if audio is not None:
         directions = None if recording.audio is None else recording.audio.directions
         recording.audio = replace(AudioTrack.open(lasting_path(audio)), directions=directions)

@@ -4,19 +4,28 @@ Some frames of a recording, as a recording: every other one for a map, the good 
 """
 
 import hashlib
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int, UInt8
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.files import sampled_digest
 from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings.audio import AudioTrack
+
+# Small files are read whole for a fingerprint, of large ones evenly spread blocks and the end, up to a share of this.
+# The end of a PNG holds a checksum of all its pixels; of larger JPEG, NPY and bags a change between the blocks is not
+# seen.
+RECORDING_BUDGET_BYTES = 1 << 30
+_LEAST_BUDGET_BYTES, LARGEST_BUDGET_BYTES = 4096, 1 << 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +141,7 @@ class Recording(ABC):
             each frame has its own.
         begins_s: what the clock of its files said at time 0, seconds: since 1970 where their stamps are dates.
         posed: share of the frames that are used: with a pose, on one clock; the others are left out.
+        stored_depth_unit_m: metres of one unit of the depth as it is stored; 1 where that is floats in metres.
     """
 
     path: Path
@@ -147,6 +157,12 @@ class Recording(ABC):
     trajectory: Trajectory | None = None
     begins_s: float = 0.0
     posed: float = 1.0
+    stored_depth_unit_m: float = 1e-3
+
+    @property
+    def depth_units_per_m(self) -> float:
+        """Units of depth PNGs in a metre; 1000 where depth is stored otherwise."""
+        return 1000.0 if self.stored_depth_unit_m == 1.0 else round(1.0 / self.stored_depth_unit_m, 6)
 
     @property
     def walk(self) -> Trajectory:
@@ -161,22 +177,49 @@ class Recording(ABC):
             RecordingError: its pictures are missing, truncated or of another size; the sentence names the file.
         """
 
+    def file_groups(self) -> list[tuple[Path, Sequence[str]]]:
+        """Return the files that it is read from, but for its sound: folders, and the names in or below each."""
+        if not self.path.is_dir():
+            return [(self.path.parent, [self.path.name])]
+        return [(self.path, sorted(str(f.relative_to(self.path)) for f in self.path.rglob("*") if f.is_file()))]
+
     @cached_property
-    @abstractmethod
     def fingerprint(self) -> str:
         """A hex SHA-256 that changes when the recording does.
 
-        It covers poses, intrinsics and every file's name, size and content. Small files are read whole, of large ones
-        evenly spread blocks and the end (see ``recordings.content``). Where a copy lies and when its files were
+        It covers poses, stamps, cameras and every file's name and content. Where a copy lies and when its files were
         written makes no difference.
         """
+        digest, up = hashlib.sha256(), np.zeros(3) if self.up_in_world is None else self.up_in_world
+        digest.update(f"{self.format} {_numbers(self.rig)} {self.depth_units_per_m}".encode())
+        for numbers in (up, self.stamps_s, self.world_from_camera):
+            # Rounded, so that another machine's last bit makes no other recording; + 0.0 turns -0.0 into 0.0.
+            digest.update(np.ascontiguousarray(np.round(numbers, 9) + 0.0, "<f8").tobytes())
+        for folder, names in self._every_file():
+            add_files(digest, folder, names)
+        if self.audio is not None:
+            digest.update(f"{self.audio.start_s}".encode())
+        return digest.hexdigest()
 
     def change_stamp(self) -> str:
         """Return a word that changes when a file of the recording is written; in a copy it is another.
 
         A build takes it at its beginning and its end, so that a recording that changes meanwhile makes no map.
         """
-        return ""
+        digest = hashlib.sha256()
+        for folder, names in self._every_file():
+            for name in names:
+                try:
+                    found = os.stat(f"{folder}{os.sep}{name}")  # noqa: PTH116 - of a million files
+                    digest.update(f"{found.st_size} {found.st_mtime_ns} {found.st_ino}\n".encode())
+                except OSError:
+                    digest.update(b"missing\n")
+        return digest.hexdigest()
+
+    def _every_file(self) -> list[tuple[Path, Sequence[str]]]:
+        own = self.audio is None or self.audio.label  # what was unpacked from a file is part of that
+        sound = () if own or self.audio is None else self.audio.files or (self.audio.path,)
+        return [*self.file_groups(), *((file.parent, [file.name]) for file in sound)]
 
     def name(self, index: int) -> str:
         """Return the recording's name of a frame, without reading it."""
@@ -189,16 +232,6 @@ class Recording(ABC):
     def depth_file(self, index: int) -> Path | None:
         """Return the 16-bit PNG file of a frame's depth (0 and 65535 say none), where it is one."""
         return None
-
-    @property
-    def depth_units_per_m(self) -> float:
-        """How many units of such a file make a metre."""
-        return 1000.0
-
-    @property
-    def stored_depth_unit_m(self) -> float:
-        """How many metres one unit of the depth makes as it is stored; 1 where it is stored as floats in metres."""
-        return 1.0 / self.depth_units_per_m
 
     def __len__(self) -> int:
         return len(self.stamps_s)
@@ -223,8 +256,27 @@ class Recording(ABC):
         return float(self.stamps_s[-1] - self.stamps_s[0]) if len(self) > 1 else 0.0
 
 
+def budget_bytes(files: int) -> int:
+    """Return how much of each of a recording's files is read for its fingerprint."""
+    return min(max(RECORDING_BUDGET_BYTES // max(files, 1), _LEAST_BUDGET_BYTES), LARGEST_BUDGET_BYTES)
+
+
+def add_files(digest: Any, folder: Path, names: Sequence[str]) -> None:
+    """Add names and contents of files below a folder to a hash of ``hashlib``."""
+    budget, prefix = budget_bytes(len(names)), f"{folder}{os.sep}"  # joining a million paths the long way takes seconds
+    for name in names:
+        digest.update(f"{name}\0".encode(errors="surrogateescape"))
+        digest.update(sampled_digest(prefix + name, budget))
+
+
+def _numbers(rig: Rig) -> list[float]:
+    cameras = [[c.fx, c.fy, c.cx, c.cy, float(c.width), float(c.height)] for c in (rig.rgb, rig.depth)]
+    return [*cameras[0], *cameras[1], *map(float, rig.rgb_from_depth.ravel())]
+
+
 _AS_WHOLE = (
     "path", "format", "rig", "up_in_world", "audio", "notices", "base_height", "trajectory", "begins_s", "posed",
+    "stored_depth_unit_m",
 )  # fmt: skip
 
 
@@ -266,16 +318,6 @@ class Subset(Recording):
     def depth_file(self, index: int) -> Path | None:
         """Return the frame's depth file in the whole recording."""
         return self.whole.depth_file(int(self.indices[index]))
-
-    @property
-    def depth_units_per_m(self) -> float:
-        """The whole recording's."""
-        return self.whole.depth_units_per_m
-
-    @property
-    def stored_depth_unit_m(self) -> float:
-        """The whole recording's."""
-        return self.whole.stored_depth_unit_m
 
     def change_stamp(self) -> str:
         """Of the whole recording."""

@@ -148,12 +148,7 @@ class RecordingWriter:
         take_file(depth, self.path / "depth" / f"{name}.png", link)
         self._log(name, stamp_s, world_from_camera)
 
-    def set_audio(
-        self,
-        audio: Any,
-        start_s: float = 0.0,
-        microphones: Microphones | None = None,
-    ) -> None:
+    def set_audio(self, audio: Any, start_s: float = 0.0, microphones: Microphones | None = None) -> None:
         """Give the recording its sound track.
 
         A FLAC, WAV or OGG file is copied as it is; samples, and the sound of a video, are written as FLAC.

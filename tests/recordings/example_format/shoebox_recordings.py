@@ -1,16 +1,13 @@
 """A format of its own: a folder of shots, each an NPZ of ``rgb``, ``depth_m``, ``world_from_camera``, ``stamp_s`` and
 ``k``."""
 
-import hashlib
 import zipfile
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.formats.file_recording import add_files
 from avlmaps.recordings.open import Format, some_name
 from avlmaps.recordings.types import Frame, Recording
 
@@ -43,17 +40,10 @@ class Shoebox(Recording):
         pose = self.world_from_camera[index]
         return Frame(index, self.name(index), float(self.stamps_s[index]), rgb, depth_m, pose, self.rig)
 
-    @cached_property
-    def fingerprint(self) -> str:
-        digest = hashlib.sha256()
-        add_files(digest, self.path, [file.name for file in self.files])
-        return digest.hexdigest()
-
 
 FORMAT = Format(
     "shoebox",
     "shot_*.npz",
     lambda path: some_name(path, "shot_*.npz"),
     "shoebox_recordings:Shoebox",
-    tells_faults=False,
 )

@@ -457,11 +457,7 @@ _DOOR = (
         _silent,
         "Check the microphone, and which input was recorded: nothing that sounded then is in the map.",
     ),
-    Suspicion(
-        Reason.SOUND,
-        _clipped,
-        "What is loud may be taken for another sound.",
-    ),
+    Suspicion(Reason.SOUND, _clipped, "What is loud may be taken for another sound."),
     Suspicion(
         Reason.GEOMETRY,
         _contradiction,

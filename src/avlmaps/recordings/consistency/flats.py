@@ -81,24 +81,32 @@ class Flats:
 
     def lens(self) -> tuple[float, float] | None:
         """Return k1 of a wide lens whose distortion was not taken out, and the bend at the corners; None without."""
-        bend = self._bend()
-        if not bend.is_enough(_FEWEST_BENT) or bend.middle < 0.0 or not bend.beyond(_LEAST_BEND, _LEAST_QUARTER):
+        quarter, middle, enough = self._bend()
+        if not enough or middle < _LEAST_BEND or quarter < _LEAST_QUARTER:
             return None
         camera = self.sample.rig.depth
-        corner = bend.middle * ((camera.width / 2.0 / camera.fx) ** 2 + (camera.height / 2.0 / camera.fy) ** 2)
+        corner = middle * ((camera.width / 2.0 / camera.fx) ** 2 + (camera.height / 2.0 / camera.fy) ** 2)
         within = corner * 0.67  # there both conventions of a lens are compared
-        return (1.0 / (1.0 + within) - 1.0) * bend.middle / ((1.0 + within) ** 2 * within), corner
+        return (1.0 / (1.0 + within) - 1.0) * middle / ((1.0 + within) ** 2 * within), corner
 
     @property
     def lens_would_show(self) -> bool:
         """Whether there are enough surfaces to show a lens."""
-        return self._bend().is_enough(_FEWEST_BENT)
+        return self._bend()[2]
 
-    def _bend(self) -> "_Spread":
-        most = np.quantile(self.sure, _MOST_SURE) if len(self.sure) else 0.0
+    def _bend(self) -> tuple[float, float, bool]:
+        """Return the first quartile and the middle of the bends, and whether there are enough, not all of one view."""
+        weight = np.minimum(self.sure, np.quantile(self.sure, _MOST_SURE)) if len(self.sure) else self.sure
+        if not weight.sum() > 0.0:
+            return 0.0, 0.0, False
+        order = np.argsort(self.bend)
+        sums = np.cumsum(weight[order])
+        quarter, middle = self.bend[order[np.searchsorted(sums, np.array([0.25, 0.5]) * sums[-1])]].tolist()
         camera = self.sample.world_from_camera[self.frame]
-        seen = np.hstack([self.normal, camera[:, :3, 2], camera[:, :3, 3]])
-        return _Spread.of(self.bend, np.minimum(self.sure, most), seen)
+        seen = np.hstack([self.normal, camera[:, :3, 2], camera[:, :3, 3]])  # nearly the same rows are one view
+        _, view = np.unique((seen / _VIEW).round(), axis=0, return_inverse=True)
+        count, views = (float(w.sum() ** 2 / (w @ w)) for w in (weight, np.bincount(view.reshape(-1), weight)))
+        return quarter, middle, count >= _FEWEST_BENT and views >= _FEWEST_VIEWS
 
     def levels(self) -> "Levels":
         """Return the largest level surface of each frame."""
@@ -165,38 +173,6 @@ def _grown(
         sure = 1.0 / (np.linalg.inv(matrix)[3, 3] * max(float(left[mine] @ left[mine]) / count, 1e-12))
         yield (*plane.tolist(), count / len(known), bend, sure)
         free &= np.abs(left) >= 2.0 * _NEAR * inverse
-
-
-@dataclass(frozen=True, slots=True)
-class _Spread:
-    low: float
-    middle: float
-    high: float
-    count: float
-    views: float
-
-    @staticmethod
-    def of(
-        values: Float[np.ndarray, " n"], weight: Float[np.ndarray, " n"], seen: Float[np.ndarray, "n k"]
-    ) -> "_Spread":
-        """Return those of values; nearly the same rows of ``seen`` are one view."""
-        if not len(values) or not weight.sum() > 0.0:
-            return _Spread(0.0, 0.0, 0.0, 0.0, 0.0)
-        order = np.argsort(values)
-        sums = np.cumsum(weight[order])
-        rows = order[np.searchsorted(sums, np.array([0.25, 0.5, 0.75]) * sums[-1])]
-        _, view = np.unique((seen / _VIEW).round(), axis=0, return_inverse=True)
-        count, views = (float(w.sum() ** 2 / (w @ w)) for w in (weight, np.bincount(view.reshape(-1), weight)))
-        low, middle, high = values[rows].tolist()
-        return _Spread(low, middle, high, count, views)
-
-    def is_enough(self, fewest: float) -> bool:
-        """Return whether there are enough values, not all of one view."""
-        return self.count >= fewest and self.views >= _FEWEST_VIEWS
-
-    def beyond(self, least: float, quarter: float) -> bool:
-        """Return whether the middle is as far from 0, and its nearer quartile."""
-        return (self.middle >= least and self.low >= quarter) or (-self.middle >= least and -self.high >= quarter)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """A few frames of a recording at low resolution, and which of them see the same place: what the check looks at."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -185,15 +186,18 @@ def _apart(pose: Float[np.ndarray, "n 4 4"]) -> list[tuple[int, int]]:
         off = np.abs(np.log(away_m / APART_M))
     off[(ahead < least) | (upright < least) | np.tri(len(rows), dtype=bool)] = np.inf
     off += 0.2 * np.abs(np.subtract.outer(rows, rows)) / len(pose)  # of pairs as far apart, the sooner ones
-    found: list[tuple[int, int]] = []
     near = max(1, len(rows) // (3 * APART))
-    for _ in range(APART):
+    return [(int(rows[a]), int(rows[b])) for a, b in _least(off, APART, near, len(rows))]
+
+
+def _least(off: Float[np.ndarray, "a b"], count: int, near_a: int, near_b: int) -> Iterator[tuple[int, int]]:
+    """Yield where a table is least, each time beyond so many rows and columns around those before; it is changed."""
+    for _ in range(count if off.size else 0):
         a, b = (int(i) for i in np.unravel_index(int(np.argmin(off)), off.shape))
         if not np.isfinite(off[a, b]):
-            break
-        found.append((int(rows[a]), int(rows[b])))
-        off[max(0, a - near) : a + near + 1] = np.inf
-    return found
+            return
+        yield a, b
+        off[max(0, a - near_a) : a + near_a + 1, max(0, b - near_b) : b + near_b + 1] = np.inf
 
 
 def pairs_across(pose: Float[np.ndarray, "n 4 4"], at: int) -> Int[np.ndarray, "p 2"]:
@@ -208,13 +212,7 @@ def pairs_across(pose: Float[np.ndarray, "n 4 4"], at: int) -> Int[np.ndarray, "
     seen &= np.einsum("abi,bi->ab", to_one, others_ahead) >= np.cos(VIEW_RAD) * np.linalg.norm(to_one, axis=-1)
     off_m[~seen | (ahead @ others_ahead.T < np.cos(ACROSS_RAD))] = np.inf
     near = [max(1, len(some) // (2 * ACROSS)) for some in rows]
-    found: list[tuple[int, int]] = []
-    while len(found) < ACROSS and off_m.size:
-        a, b = (int(i) for i in np.unravel_index(int(np.argmin(off_m)), off_m.shape))
-        if not np.isfinite(off_m[a, b]):
-            break
-        found.append((int(rows[0][a]), int(rows[1][b])))
-        off_m[max(0, a - near[0]) : a + near[0] + 1, max(0, b - near[1]) : b + near[1] + 1] = np.inf
+    found = [(rows[0][a], rows[1][b]) for a, b in _least(off_m, ACROSS, *near)]
     return np.array(found, np.int64).reshape(-1, 2)
 
 

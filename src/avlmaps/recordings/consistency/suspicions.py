@@ -148,15 +148,9 @@ _SINGLE = (
         "They look cut to too few bits, so that they begin again at 0: write them whole, or 0 where too far.",
     ),
     Suspicion(
-        Reason.DEPTH,
-        _frozen,
-        "The camera or its driver may have hung; record again, or leave these frames out.",
+        Reason.DEPTH, _frozen, "The camera or its driver may have hung; record again, or leave these frames out."
     ),
-    Suspicion(
-        Reason.MOTION,
-        _frozen_pose,
-        "The poses froze there: check the odometry, or leave these frames out.",
-    ),
+    Suspicion(Reason.MOTION, _frozen_pose, "The poses froze there: check the odometry, or leave these frames out."),
     Suspicion(
         Reason.COLOUR,
         _blue,

@@ -34,8 +34,8 @@ from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, left_out, list_names, open_audio
+from avlmaps.recordings.faults import note, report
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, left_out, list_names, open_audio, opener
 from avlmaps.recordings.formats.tables import POSE, pinhole, read_table, rigid
 from avlmaps.recordings.images import first_picture_size
 
@@ -76,9 +76,9 @@ def reference_map_from_world(first_habitat_from_base: Float[np.ndarray, "4 4"]) 
     return poses.inverse(base_poses(first_habitat_from_base))
 
 
-def read_habitat_poses(path: Path, report: Report = stop_at_first) -> Float[np.ndarray, "n 4 4"]:
+def read_habitat_poses(path: Path) -> Float[np.ndarray, "n 4 4"]:
     """Read ``poses.txt``: a line holds px py pz qx qy qz qw, or a 4x4 matrix row by row."""
-    table = read_table(path, (7, 16), report, names=POSE[1:])
+    table = read_table(path, (7, 16), names=POSE[1:])
     values = table.values
     if values.shape[1] == 16:
         return values.reshape(-1, 4, 4)
@@ -87,19 +87,21 @@ def read_habitat_poses(path: Path, report: Report = stop_at_first) -> Float[np.n
     for row in np.flatnonzero(wild):
         line = int(table.lines[row])
         sentence = f"{path}, line {line}: the quaternion has length {norm[row]:.3g}, so this is not a rotation."
-        report(Fault(sentence, path, line))
+        report(sentence, path, line)
     return rigid(values[:, :3], values[:, 3:])
 
 
-def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
+@opener
+def open_avlmaps(path: Path) -> FileRecording:
     """Open a scene of the data set, or one of its ``audio_video`` sequences, in place."""
-    given, notices = read_camera_file(path / "camera.json")
-    habitat_from_body = read_habitat_poses(path / "poses.txt", report)
+    given = read_camera_file(path / "camera.json")
+    if not os.path.lexists(path / "camera.json"):
+        note(f"The stamps are counted at {RATE_HZ:g} frames/s, since poses.txt has none.")
+    habitat_from_body = read_habitat_poses(path / "poses.txt")
     colour = _numbered(path / "rgb", (".png", ".jpg"))
     depth = _numbered(path / "depth", (".npy", ".png")) if (path / "depth").is_dir() else {}
-    numbers, more = _complete(path, colour, depth, len(habitat_from_body), report)
-    notices += more
-    world_from_camera, notice = camera_poses(habitat_from_body[numbers], given)
+    numbers = _complete(path, colour, depth, len(habitat_from_body))
+    world_from_camera = camera_poses(habitat_from_body[numbers], given)
     shots = Shots(
         names=[f"{number:06d}" for number in numbers],
         colour=[f"rgb/{colour[number]}" for number in numbers],
@@ -109,16 +111,14 @@ def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
     )
     rig = rig_of(path, shots, given)
     level = next(iter(sorted(path.glob("output_level_*.wav"))), None)
-    audio, sound = (AudioTrack.open(level), ()) if level else open_audio(path)
+    audio = AudioTrack.open(level) if level else open_audio(path)
     return FileRecording.settled(
-        path, "avlmaps", rig, shots, (*notices, notice, *sound), report, lambda _: path / "poses.txt",
+        path, "avlmaps", rig, shots, lambda _: path / "poses.txt",
         up_in_world=np.array([0.0, 0.0, 1.0]), audio=audio,
     )  # fmt: skip
 
 
-def _complete(
-    path: Path, colour: dict[int, str], depth: dict[int, str], poses_count: int, report: Report
-) -> tuple[list[int], list[str]]:
+def _complete(path: Path, colour: dict[int, str], depth: dict[int, str], poses_count: int) -> list[int]:
     numbers = [n for n in sorted(colour) if n < poses_count and (not depth or n in depth)]
     if not numbers:
         raise RecordingError(
@@ -127,10 +127,11 @@ def _complete(
         )
     partial = len(colour.keys() | depth.keys() | set(range(poses_count))) - len(numbers)
     lost = f"{partial} frame(s) lack their picture, their depth or their line in poses.txt; left out."
-    notices = left_out(path, report, lost) if partial else []
+    if partial:
+        left_out(path, lost)
     if not depth:
-        notices.append("There is no depth, so only sounds and views can be mapped.")
-    return numbers, notices
+        note("There is no depth, so only sounds and views can be mapped.")
+    return numbers
 
 
 def _numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, str]:
@@ -138,33 +139,31 @@ def _numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, str]:
     return {int(stem): name for stem, name in stems if stem.isascii() and stem.isdigit()}
 
 
-def read_camera_file(path: Path) -> tuple[CameraFile, list[str]]:
-    """Return the content of ``camera.json``, or the defaults where there is none, and the notices about it."""
+def read_camera_file(path: Path) -> CameraFile:
+    """Return the content of ``camera.json``, or the defaults where there is none."""
     if not os.path.lexists(path):
-        return CameraFile(), [f"The stamps are counted at {RATE_HZ:g} frames/s, since poses.txt has none."]
+        return CameraFile()
     try:
         given = decode_json(read_regular(path, DESCRIPTION_BYTES), CameraFile)
     except (msgspec.DecodeError, UnicodeDecodeError, OSError) as error:
         raise RecordingError(f"{path} is not as it should be ({error}); fix the file.") from None
     if not given.rate_hz > 0.0:
         raise RecordingError(f"{path}: rate_hz is {given.rate_hz}; it must be positive.")
-    return given, []
+    return given
 
 
-def camera_poses(
-    habitat_from_body: Float[np.ndarray, "n 4 4"], given: CameraFile
-) -> tuple[Float[np.ndarray, "n 4 4"], str]:
-    """Turn poses as they stand in the file into the camera's poses in our world; return their type in words as well."""
+def camera_poses(habitat_from_body: Float[np.ndarray, "n 4 4"], given: CameraFile) -> Float[np.ndarray, "n 4 4"]:
+    """Turn poses as they stand in the file into the camera's poses in our world, and note what they are taken for."""
     pose_type, how = given.pose_type, "as camera.json says"
     if pose_type is None:
         upward = habitat_from_body[np.isfinite(habitat_from_body[:, 1, 1]), 1, 1]
         pose_type = "camera_base" if len(upward) and np.median(upward) < 0.0 else "mobile_base"
         how = f"their y axis points {'down' if pose_type == 'camera_base' else 'up'}"
     if pose_type == "camera_base":
-        return WORLD_FROM_HABITAT @ habitat_from_body, f"The poses are taken for the camera's own ({how})."
-    camera = base_from_camera(given.camera_height_m)
-    notice = f"The poses are taken for the robot's base ({how}), with the camera {given.camera_height_m:g} m above it."
-    return WORLD_FROM_HABITAT @ habitat_from_body @ camera, notice
+        note(f"The poses are taken for the camera's own ({how}).")
+        return WORLD_FROM_HABITAT @ habitat_from_body
+    note(f"The poses are taken for the robot's base ({how}), with the camera {given.camera_height_m:g} m above it.")
+    return WORLD_FROM_HABITAT @ habitat_from_body @ base_from_camera(given.camera_height_m)
 
 
 def rig_of(path: Path, shots: Shots, given: CameraFile) -> Rig:

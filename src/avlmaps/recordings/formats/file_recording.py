@@ -1,22 +1,14 @@
-"""Recordings whose pictures are files, or are unpacked on demand: what the readers have in common.
+"""Recordings whose pictures are files, or are unpacked on demand: what the readers have in common."""
 
-The fingerprint covers the content of files, read whole where small and in samples where large: up to a budget, else in
-evenly spread blocks that add up to it, its end among them. The budget of a file is a share of
-``RECORDING_BUDGET_BYTES``. The end of a PNG holds a checksum of all its pixels, so that a changed depth picture is
-always another one; of larger JPEG, NPY and bags a change between the sampled blocks is not seen. Times of change make
-no difference, so that a copy is the same recording.
-"""
-
-import hashlib
 import os
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from functools import cached_property
+from functools import wraps
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, ParamSpec, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
@@ -24,18 +16,16 @@ from jaxtyping import Float, Float32, UInt8
 from avlmaps.core import poses, timeline
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import AudioError, NoAudioStreamError, RecordingError
-from avlmaps.core.files import sampled_digest
 from avlmaps.core.wording import option
 from avlmaps.recordings import images
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.faults import Fault, Report
+from avlmaps.recordings.faults import note, noted, report
 from avlmaps.recordings.images import VideoFrames
 from avlmaps.recordings.plausible import date_fault, plausible_walk, repeat_fault
 from avlmaps.recordings.types import BaseHeight, Frame, Recording
 
-RECORDING_BUDGET_BYTES = 1 << 30
-LEAST_BUDGET_BYTES = 4096
-LARGEST_BUDGET_BYTES = 1 << 24
+P = ParamSpec("P")
+Opened = TypeVar("Opened", bound=Recording)
 R = TypeVar("R", bound="ShotsRecording")
 _SHOWN = 3
 _TRACKS = ("audio", "sound")
@@ -47,29 +37,17 @@ _FILMS = (".mp4", ".mov", ".mkv", ".webm")
 _NUMBER = re.compile(r"([0-9]+(?:\.[0-9]+)?)")
 
 
-def budget_bytes(files: int) -> int:
-    """Return how much of each of a recording's files is read."""
-    return min(max(RECORDING_BUDGET_BYTES // max(files, 1), LEAST_BUDGET_BYTES), LARGEST_BUDGET_BYTES)
+def opener(open_it: Callable[P, Opened]) -> Callable[P, Opened]:
+    """Make a function that opens a recording give it what is noted meanwhile as its notices."""
 
+    @wraps(open_it)
+    def opened(*args: P.args, **kwargs: P.kwargs) -> Opened:
+        with noted() as found:
+            recording = open_it(*args, **kwargs)
+        recording.notices = tuple(dict.fromkeys((*found, *recording.notices)))
+        return recording
 
-def add_files(digest: Any, folder: Path, names: Sequence[str]) -> None:
-    """Add names and contents of files below a folder to a hash of ``hashlib``."""
-    budget, prefix = budget_bytes(len(names)), f"{folder}{os.sep}"  # joining a million paths the long way takes seconds
-    for name in names:
-        digest.update(f"{name}\0".encode(errors="surrogateescape"))
-        digest.update(sampled_digest(prefix + name, budget))
-
-
-def stamp_of(folder: Path, names: Sequence[str], files: Iterable[Path]) -> str:
-    """Return a hash over sizes and times of change of files, without opening them."""
-    digest, prefix = hashlib.sha256(), f"{folder}{os.sep}"
-    for path in (*(prefix + name for name in names), *map(str, files)):
-        try:
-            found = os.stat(path)  # noqa: PTH116
-            digest.update(f"{found.st_size} {found.st_mtime_ns} {found.st_ino}\n".encode())
-        except OSError:
-            digest.update(b"missing\n")
-    return digest.hexdigest()
+    return opened
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,59 +89,49 @@ class Shots:
         )
 
 
-def settle(
-    path: Path, shots: Shots, report: Report, pose_file: Callable[[int], Path] | None
-) -> tuple[Shots, tuple[str, ...]]:
+def settle(path: Path, shots: Shots, pose_file: Callable[[int], Path] | None) -> Shots:
     """Leave out what cannot be used, put the rest in the order of time and make the rotations orthonormal.
 
     Args:
         path: the recording, for the sentences.
         shots: as found.
-        report: called with each invalid pose; lost tracking (NaN, infinity) is a notice, not a fault to stop at.
-        pose_file: the file that holds the pose of shot i; None where the reader checked the poses itself.
-
-    Returns:
-        The usable shots, and a sentence for each thing that was done.
+        pose_file: the file that holds the pose of shot i; None where the reader checked the poses itself. Lost tracking
+            (NaN, infinity) is a notice, not a fault to stop at.
     """
-    notices: list[str] = []
     tracked = np.isfinite(shots.world_from_camera).all(axis=(1, 2))
     if not tracked.all():
         lost = np.flatnonzero(~tracked).tolist()
         names = [shots.names[i] for i in lost]
-        notices.append(f"{len(lost)} frame(s) without a pose (lost tracking) are left out: {_some(names)}.")
+        note(f"{len(lost)} frame(s) without a pose (lost tracking) are left out: {_some(names)}.")
         for i, name in zip(lost, names, strict=True):
             if pose_file is not None:
                 sentence = f"{pose_file(i)}: the pose of frame {name} is NaN or infinite; the frame is left out."
-                report(Fault(sentence, pose_file(i), fatal=False))
+                report(sentence, pose_file(i), fatal=False)
     kept = np.flatnonzero(tracked)
     shots = shots.take(kept)
     if pose_file is not None:
-        shots = _orthonormal(shots, report, [pose_file(int(i)) for i in kept])
+        shots = _orthonormal(shots, [pose_file(int(i)) for i in kept])
     # Names of files; the numbers of a database's nodes have no dot.
     if twins := sorted(name for name in set(shots.colour) & set(shots.depth) if "." in name):
-        report(Fault(f"{path} names {twins[0]} as colour and as depth; each frame needs a picture of both.", path))
+        report(f"{path} names {twins[0]} as colour and as depth; each frame needs a picture of both.", path)
     if fault := date_fault(shots.stamps_s, "frames") or repeat_fault(shots.stamps_s, "frames"):
-        report(Fault(f"{path}: {fault}", path))
+        report(f"{path}: {fault}", path)
     order = timeline.in_order(shots.stamps_s, "frames")
     shots = shots.take(order.index)
     walk = plausible_walk(shots.stamps_s, shots.world_from_camera[:, :3, 3], shots.names)
     shots = shots.take(walk.index)
     for sentence in walk.notices:
-        report(Fault(f"{path}: {sentence}", path, fatal=False))
+        report(f"{path}: {sentence}", path, fatal=False)
     if walk.fault:
-        report(Fault(f"{path}: {walk.fault}", path))
+        report(f"{path}: {walk.fault}", path)
     if len(shots.names) == 0:
-        report(Fault(f"{path} has no frame with a usable pose, so there is nothing to map.", path))
-    return shots, (
-        *notices,
-        *images.turn_notices(path, shots.colour),
-        *order.notices,
-        *walk.notices,
-        *timeline.gap_notices(shots.stamps_s, "frames"),
-    )
+        report(f"{path} has no frame with a usable pose, so there is nothing to map.", path)
+    images.note_turn(path, shots.colour)
+    note(*order.notices, *walk.notices, *timeline.gap_notices(shots.stamps_s, "frames"))
+    return shots
 
 
-def _orthonormal(shots: Shots, report: Report, pose_files: Sequence[Path]) -> Shots:
+def _orthonormal(shots: Shots, pose_files: Sequence[Path]) -> Shots:
     labels = [f"frame {name}" for name in shots.names]
     try:
         mended = poses.orthonormalize_all(shots.world_from_camera, labels)
@@ -175,7 +143,7 @@ def _orthonormal(shots: Shots, report: Report, pose_files: Sequence[Path]) -> Sh
                 good.append(poses.orthonormalize(shots.world_from_camera[i], f"{label} ({pose_files[i]})"))
                 kept.append(i)
             except RecordingError as error:
-                report(Fault(str(error), pose_files[i]))
+                report(str(error), pose_files[i])
         shots = shots.take(np.array(kept, np.int64))
         mended = np.array(good).reshape(-1, 4, 4)
     return replace(shots, world_from_camera=mended)
@@ -224,8 +192,6 @@ class ShotsRecording(Recording):
         format: str,
         rig: Rig,
         shots: Shots,
-        notices: Iterable[str],
-        report: Report,
         pose_file: Callable[[int], Path] | None,
         **more: Any,
     ) -> R:
@@ -234,16 +200,14 @@ class ShotsRecording(Recording):
         ``more`` may say of how many frames these are those with a pose (``posed``).
         """
         found = len(shots.names)
-        shots, settled = settle(path, shots, report, pose_file)
+        shots = settle(path, shots, pose_file)
         more["posed"] = more.get("posed", 1.0) * (len(shots.names) / found if found else 1.0)
-        sound: tuple[str, ...] = ()
         if "audio" not in more:
-            more["audio"], sound = open_audio(path)
+            more["audio"] = open_audio(path)
         if more["audio"] is None and (video := more.get("video")) is not None:
             with suppress(NoAudioStreamError):
                 more["audio"] = AudioTrack.open(video.path, start_s=-video.start_s)
-        told = tuple(dict.fromkeys((*notices, *settled, *sound)))  # of frames and of their poses the same may be said
-        return cls(path=path, format=format, rig=rig, shots=shots, notices=told, **more)
+        return cls(path=path, format=format, rig=rig, shots=shots, **more)
 
     def frame(self, index: int) -> Frame:
         """Read one frame; see ``Recording.frame``."""
@@ -286,6 +250,11 @@ class FileRecording(ShotsRecording):
     trajectory: timeline.Trajectory | None = None
     base_height: BaseHeight | None = None
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        in_metres = len(self.shots.depth) > 0 and self.shots.depth[0].endswith(".npy")
+        self.stored_depth_unit_m = 1.0 if in_metres else 1.0 / self.depth_units
+
     def _colour(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
         if self.video is not None:
             return self.video.picture(self.shots.video_frames[index])
@@ -312,37 +281,10 @@ class FileRecording(ShotsRecording):
             return None
         return self.path / self.shots.depth[index]
 
-    @property
-    def depth_units_per_m(self) -> float:
-        """Units of the depth files in a metre."""
-        return self.depth_units
-
-    @property
-    def stored_depth_unit_m(self) -> float:
-        """Metres of one unit of the depth files: of an NPY 1, since it holds metres."""
-        in_metres = len(self.shots.depth) > 0 and self.shots.depth[0].endswith(".npy")
-        return 1.0 if in_metres else 1.0 / self.depth_units
-
-    @cached_property
-    def fingerprint(self) -> str:
-        """A hex SHA-256 over poses, stamps, cameras and every file's content; see ``Recording.fingerprint``."""
-        digest = hashlib.sha256()
-        geometry_digest(digest, self, f" {self.depth_units}")
-        add_files(digest, self.path, self._names())
-        if self.audio is not None:
-            files = self.audio.files or (self.audio.path,)
-            add_files(digest, self.audio.path.parent, [file.name for file in files])
-            digest.update(f"{self.audio.start_s}".encode())
-        return digest.hexdigest()
-
-    def change_stamp(self) -> str:
-        """Return a hash over every file's size and time of change; see ``Recording.change_stamp``."""
-        files = [*(self.audio.files or (self.audio.path,))] if self.audio is not None else []
-        return stamp_of(self.path, self._names(), files)
-
-    def _names(self) -> list[str]:
+    def file_groups(self) -> list[tuple[Path, Sequence[str]]]:
+        """Return the video, the pictures and the confidences, and no other file of the folder."""
         video = [self.video.path.name] if self.video is not None else []
-        return [*video, *self.shots.colour, *self.shots.depth, *self.shots.confidence]
+        return [(self.path, [*video, *self.shots.colour, *self.shots.depth, *self.shots.confidence])]
 
 
 @runtime_checkable
@@ -364,11 +306,21 @@ class StoredRecording(ShotsRecording):
 
     Attributes:
         pictures: where they lie; ``colour`` and ``depth`` of the shots are names that it knows.
-        depth_unit_m: metres of one unit of the depth as stored; 1 for floats.
+        stored_depth_unit_m: metres of one unit of the depth as stored; 1 for floats.
+        files: where they are not ``path`` alone.
+        topics: of a bag.
+        base_height: where the robot's base is under the camera, where that is known.
     """
 
     pictures: Pictures
-    depth_unit_m: float = 1.0
+    stored_depth_unit_m: float = 1.0
+    files: Sequence[Path] = ()
+    topics: Mapping[str, str] = field(default_factory=dict[str, str])
+    base_height: BaseHeight | None = None
+
+    def file_groups(self) -> list[tuple[Path, Sequence[str]]]:
+        """Return the files; see ``Recording.file_groups``."""
+        return [(file.parent, [file.name]) for file in self.files] or super().file_groups()
 
     def _colour(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
         return self.pictures.colour(self.shots.colour[index], self.rig.rgb)
@@ -376,49 +328,11 @@ class StoredRecording(ShotsRecording):
     def _depth_m(self, index: int) -> Float32[np.ndarray, "h w"]:
         return self.pictures.depth(self.shots.depth[index], self.rig.depth)
 
-    @property
-    def stored_depth_unit_m(self) -> float:
-        """Metres of one unit of the depth as stored."""
-        return self.depth_unit_m
 
-    @cached_property
-    def fingerprint(self) -> str:
-        """A hex SHA-256 over poses, stamps, cameras and the files' content; see ``Recording.fingerprint``."""
-        digest = hashlib.sha256()
-        geometry_digest(digest, self)
-        for file in self._files():
-            add_files(digest, file.parent, [file.name])
-        return digest.hexdigest()
-
-    def change_stamp(self) -> str:
-        """Return a hash over the files' sizes and times of change; see ``Recording.change_stamp``."""
-        return stamp_of(self.path.parent, (), self._files())
-
-    def _files(self) -> list[Path]:
-        own = sorted(f for f in self.path.rglob("*") if f.is_file()) if self.path.is_dir() else [self.path]
-        return [*own, *([self.audio.path] if self.audio is not None else [])]
-
-
-def geometry_digest(digest: Any, recording: Recording, more: str = "") -> None:
-    """Add a recording's format, cameras, up direction, stamps and poses to a hash of ``hashlib``."""
-    digest.update(f"{recording.format} {_numbers(recording.rig)}{more}".encode())
-    up = np.zeros(3) if recording.up_in_world is None else recording.up_in_world
-    for numbers in (up, recording.stamps_s, recording.world_from_camera):
-        # Rounded, so that another machine's last bit makes no other recording; + 0.0 turns -0.0 into 0.0.
-        digest.update(np.ascontiguousarray(np.round(numbers, 9) + 0.0, "<f8").tobytes())
-
-
-def _numbers(rig: Rig) -> list[float]:
-    def camera(c: Pinhole) -> list[float]:
-        return [c.fx, c.fy, c.cx, c.cy, float(c.width), float(c.height)]
-
-    return [*camera(rig.rgb), *camera(rig.depth), *map(float, rig.rgb_from_depth.ravel())]
-
-
-def left_out(path: Path, report: Report, sentence: str, file: Path | None = None) -> list[str]:
-    """Report that something of a recording is not used, and return it as a notice."""
-    report(Fault(f"{path}: {sentence}", file or path, fatal=False))
-    return [sentence]
+def left_out(path: Path, sentence: str, file: Path | None = None) -> None:
+    """Report and note that something of a recording is not used."""
+    report(f"{path}: {sentence}", file or path, fatal=False)
+    note(sentence)
 
 
 def sizes(path: Path, shots: Shots) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -455,8 +369,8 @@ def _counted(digits: str) -> int | Decimal:
     return Decimal(digits) if "." in digits else int(digits)
 
 
-def open_audio(folder: Path, start_s: float = 0.0) -> tuple[AudioTrack | None, tuple[str, ...]]:
-    """Open the sound track that someone put beside a recording's files, and say where it was not certain which.
+def open_audio(folder: Path, start_s: float = 0.0) -> AudioTrack | None:
+    """Open the sound track that someone put beside a recording's files, and note where it was not certain which.
 
     A file that is called ``audio`` or ``sound``, in any case and container, is the track; else the only sound file that
     is there, also in a folder ``audio`` or ``sound``.
@@ -466,18 +380,18 @@ def open_audio(folder: Path, start_s: float = 0.0) -> tuple[AudioTrack | None, t
         if inside.name.casefold() in _TRACKS and inside.is_dir():
             named, others = _sound_files(inside)
     if named:
-        return AudioTrack.open(named[0], start_s=start_s), ()
+        return AudioTrack.open(named[0], start_s=start_s)
     if len(others) == 1:
         try:
             track = AudioTrack.open(others[0], start_s=start_s)
+            note(f"{others[0].name} is taken for the sound track ({option('audio', 'FILE')} gives another).")
+            return track
         except AudioError as error:
-            return None, (f"The recording has no sound track: {error}",)
-        return track, (f"{others[0].name} is taken for the sound track ({option('audio', 'FILE')} gives another).",)
-    if others:
+            note(f"The recording has no sound track: {error}")
+    if len(others) > 1:
         names = _some([file.name for file in others])
-        said = f"There are {len(others)} sound files ({names}), and none is called audio: give one ({option('audio')})."
-        return None, (said,)
-    return None, ()
+        note(f"There are {len(others)} sound files ({names}), and none is called audio: give one ({option('audio')}).")
+    return None
 
 
 def _sound_files(folder: Path) -> tuple[list[Path], list[Path]]:

@@ -16,8 +16,8 @@ from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import tracked
 from avlmaps.recordings.corrections import corrected
 from avlmaps.recordings.directions import DIRECTIONS, read_directions
-from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
+from avlmaps.recordings.faults import note, report
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, opener, settle
 from avlmaps.recordings.formats.tables import NAMED_FILE, POSE, named_order, read_table, split_header, text_lines
 from avlmaps.recordings.images import DisplayTurn, VideoFrames, file_turn, first_picture_size
 from avlmaps.recordings.layout import Description
@@ -31,25 +31,27 @@ _DATE_S = 1e8
 _MAX_QUATERNION_FAULT = 0.05
 
 
-def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
+@opener
+def open_folder(path: Path) -> Recording:
     """Open a recording in our own format."""
     if not (path / layout.DESCRIPTION).exists() and (path / layout.UNFINISHED).exists():
         sentence = f"{path} was never finished: its writer stopped before the end; record it again."
-        report(Fault(sentence, path / layout.UNFINISHED))
+        report(sentence, path / layout.UNFINISHED)
         raise RecordingError(sentence)
-    description = layout.read_description(path, report)
-    known = _read_poses(path, report)
+    description = layout.read_description(path)
+    known = _read_poses(path)
     video = _find_video(path, description)
-    found = _find_pictures(path, description, known, video, report)
+    found = _find_pictures(path, description, known, video)
     _check_sizes(path, description, found)
     _check_clocks(path, description, found, known)
-    shots, notices, start_s, trajectory = _pose_pictures(found, known)
-    shots, more = settle(path, shots, report, pose_file=None)
+    shots, start_s, trajectory = _pose_pictures(found, known)
+    shots = settle(path, shots, pose_file=None)
     first_s = 0.0 if found.stamps_s is None else float(found.stamps_s[0]) - start_s
     audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
     up = description.up_in_world
-    heard, sound = _open_audio(path, audio_start_s, video, first_s, description.placed)
-    audio, lone = _with_directions(path, heard, start_s)
+    heard = _open_audio(path, audio_start_s, video, first_s, description.placed)
+    audio = _with_directions(path, heard, start_s)
+    _note_turn(video)
     recording = FileRecording(
         path=path,
         format="folder",
@@ -58,7 +60,6 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
         depth_units=description.depth_units_per_m,
         up_in_world=None if up is None else np.array(up) / np.linalg.norm(up),
         audio=audio,
-        notices=(*_turned_notices(video), *notices, *more, *sound, *lone),
         video=video,
         trajectory=trajectory,
         begins_s=start_s + (description.begins_s or 0.0),
@@ -68,17 +69,18 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
     return corrected(recording, description.corrections())
 
 
-def _with_directions(path: Path, audio: AudioTrack | None, start_s: float) -> tuple[AudioTrack | None, tuple[str, ...]]:
+def _with_directions(path: Path, audio: AudioTrack | None, start_s: float) -> AudioTrack | None:
     file = path / DIRECTIONS
     if not file.exists():
-        return audio, ()
+        return audio
     if audio is None:
-        return None, (f"{DIRECTIONS} is not used, because the recording has no sound track.",)
+        note(f"{DIRECTIONS} is not used, because the recording has no sound track.")
+        return None
     directions = read_directions(file)
     if start_s and len(directions) and directions.stamp_s[0] > _DATE_S:
         directions = replace(directions, stamp_s=directions.stamp_s - start_s)
     directions.require_beside(audio.start_s, audio.end_s, str(file))
-    return replace(audio, directions=directions), ()
+    return replace(audio, directions=directions)
 
 
 def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> None:
@@ -125,28 +127,24 @@ def _check_clocks(folder: Path, description: Description, found: "_Pictures", kn
 
 def _open_audio(
     path: Path, start_s: float, video: VideoFrames | None, first_s: float, microphones: MicrophoneNumbers | None
-) -> tuple[AudioTrack | None, tuple[str, ...]]:
+) -> AudioTrack | None:
     if microphones is not None and microphones.files:
-        track, notices = AudioTrack.open(path / microphones.files[0], start_s=start_s), ()
+        track = AudioTrack.open(path / microphones.files[0], start_s=start_s)
     else:
-        track, notices = open_audio(path, start_s)
+        track = open_audio(path, start_s)
     if track is not None:
-        return track if microphones is None else tracked(track, microphones, path), notices
+        return track if microphones is None else tracked(track, microphones, path)
     if video is not None:
         with suppress(NoAudioStreamError):
-            return AudioTrack.open(video.path, start_s=start_s or first_s - video.start_s), notices
-    return None, notices
+            return AudioTrack.open(video.path, start_s=start_s or first_s - video.start_s)
+    return None
 
 
-def _turned_notices(video: VideoFrames | None) -> tuple[str, ...]:
-    if video is None or not video.turn:
-        return ()
-    if video.shown:
-        return (
-            f"{video.path.name} is to be shown {video.turn.words} (its display matrix); the frames are read so, as "
-            "players do, and depth must fit that.",
-        )
-    return (f"{video.path.name} is to be shown {video.turn.words}; the intrinsics are of the frames as stored.",)
+def _note_turn(video: VideoFrames | None) -> None:
+    if video is not None and video.turn:
+        how = "the intrinsics are of the frames as stored"
+        how = "the frames are read so, as players do, and depth must fit that" if video.shown else how
+        note(f"{video.path.name} is to be shown {video.turn.words} (its display matrix); {how}.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,32 +163,32 @@ class _Pictures:
     video_frames: Sequence[int] = ()
 
 
-def _read_poses(folder: Path, report: Report) -> _Poses:
+def _read_poses(folder: Path) -> _Poses:
     path = folder / layout.POSES
     if not os.path.lexists(path):
         raise RecordingError(f"{path} is missing; the recording needs it.")
-    table = read_table(path, (8,), report, names=POSE)
+    table = read_table(path, (8,), names=POSE)
     stamps_s, translation, quaternion = table.values[:, 0], table.values[:, 1:4], table.values[:, 4:8]
     length = np.linalg.norm(quaternion, axis=1)
     finite = np.isfinite(table.values).all(axis=1)
     rigid = np.abs(length - 1.0) <= _MAX_QUATERNION_FAULT
     for row in np.flatnonzero(~finite):
         line = int(table.lines[row])
-        report(Fault(f"{path}, line {line}: the pose is NaN or infinite; it is not used.", path, line, fatal=False))
+        report(f"{path}, line {line}: the pose is NaN or infinite; it is not used.", path, line, fatal=False)
     for row in np.flatnonzero(finite & ~rigid):
         line = int(table.lines[row])
         sentence = (
             f"{path}, line {line}: the quaternion has length {length[row]:.3g}, so this is not a rotation; "
             "write qx qy qz qw of length 1, or leave the line out."
         )
-        report(Fault(sentence, path, line))
+        report(sentence, path, line)
     for row in np.flatnonzero(np.diff(stamps_s) <= 0.0) + 1:
         line = int(table.lines[row])
         sentence = (
             f"{path}, line {line}: stamp {stamps_s[row]:.6f} s is not after that of the line before "
             f"({stamps_s[row - 1]:.6f} s); frames are sorted, or cut where the clock was reset."
         )
-        report(Fault(sentence, path, line, fatal=False))
+        report(sentence, path, line, fatal=False)
     usable = finite & rigid
     quaternion = np.where(usable[:, None], quaternion, (0.0, 0.0, 0.0, 1.0))
     pose = poses.from_quaternion(translation, quaternion)
@@ -217,9 +215,7 @@ def _find_video(folder: Path, description: Description) -> VideoFrames | None:
     return video
 
 
-def _find_pictures(
-    folder: Path, description: Description, known: _Poses, video: VideoFrames | None, report: Report
-) -> _Pictures:
+def _find_pictures(folder: Path, description: Description, known: _Poses, video: VideoFrames | None) -> _Pictures:
     """Find the pictures and their stamps: by frames.csv, else row by row with poses.csv, else by the rate."""
     if not (folder / "depth").is_dir():
         raise RecordingError(f"{folder / 'depth'} is missing; the recording needs it.")
@@ -232,7 +228,7 @@ def _find_pictures(
         )
     path = folder / layout.FRAMES
     if os.path.lexists(path):
-        rows = list(_listed(path, found, report))
+        rows = list(_listed(path, found))
         names = [name for name, _ in rows]
         stamps_s: Float[np.ndarray, " n"] | None = np.array([stamp for _, stamp in rows], np.float64)
         if not names:
@@ -242,25 +238,25 @@ def _find_pictures(
                 f"{len(lost)} of the {len(names)} names in {path} have no picture in {where}/ (the first is "
                 f"{lost[0]!r}); write the names of the files without their extension."
             )
-            report(Fault(sentence, path, fatal=len(lost) == len(names)))
+            report(sentence, path, fatal=len(lost) == len(names))
     else:
         names = list(found)
-        stamps_s = video.stamps_s if video else _stamps_without_list(folder, names, description, known, report)
+        stamps_s = video.stamps_s if video else _stamps_without_list(folder, names, description, known)
     colour = [f"rgb/{found.get(name, name + '.png')}" for name in names]
     if description.frames is not None and description.frames != len(names):
         where = path.name if os.path.lexists(path) else "rgb/"
         sentence = f"{folder / layout.DESCRIPTION} lists {description.frames} frames, but {where} has {len(names)}."
-        report(Fault(sentence, folder / layout.DESCRIPTION, fatal=False))
+        report(sentence, folder / layout.DESCRIPTION, fatal=False)
     depth = [f"depth/{name}.png" for name in names]
     if video is not None:
         return _Pictures(names, [], depth, stamps_s, range(len(names)))
     return _Pictures(names, colour, depth, stamps_s)
 
 
-def _listed(path: Path, found: dict[str, str], report: Report) -> Iterator[tuple[str, float]]:
+def _listed(path: Path, found: dict[str, str]) -> Iterator[tuple[str, float]]:
     files = {file: stem for stem, file in found.items()}
     at, factor, first = (0, 1), 1.0, True
-    for number, text in text_lines(path, report):
+    for number, text in text_lines(path):
         fields = [field.strip() for field in text.replace(";", ",").split(",")]
         try:
             if first and not any(map(_is_number, fields)):
@@ -272,7 +268,7 @@ def _listed(path: Path, found: dict[str, str], report: Report) -> Iterator[tuple
                 raise ValueError(f"{text[:40]!r} is not {layout.FRAMES_HEADER}; fix the line")
             yield files.get(name, name), float(fields[at[1]]) * factor
         except ValueError as error:
-            report(Fault(f"{path}, line {number}: {error}.", path, number))
+            report(f"{path}, line {number}: {error}.", path, number)
 
 
 def _is_number(field: str) -> bool:
@@ -284,7 +280,7 @@ def _is_number(field: str) -> bool:
 
 
 def _stamps_without_list(
-    folder: Path, names: list[str], description: Description, known: _Poses, report: Report
+    folder: Path, names: list[str], description: Description, known: _Poses
 ) -> Float[np.ndarray, " n"] | None:
     if len(names) == len(known.stamps_s):
         return None
@@ -294,45 +290,42 @@ def _stamps_without_list(
         f"{folder} has {len(names)} pictures in rgb/ and {len(known.stamps_s)} lines in {layout.POSES}; add "
         f"{layout.FRAMES} ({layout.FRAMES_HEADER}), or rgb_rate_hz in {layout.DESCRIPTION} and numbers as names."
     )
-    report(Fault(sentence, folder / layout.POSES))
+    report(sentence, folder / layout.POSES)
     return np.arange(len(names), dtype=np.float64)
 
 
-def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, tuple[str, ...], float, timeline.Trajectory | None]:
+def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, float, timeline.Trajectory | None]:
     """Give every picture a pose: its own row's, or one interpolated at its stamp where the poses allow it.
 
     Returns:
-        The shots, the notices about them, the date that was subtracted from the stamps, seconds, and the poses at
-        their own rate where they were interpolated.
+        The shots, the date that was subtracted from the stamps, seconds, and the poses at their own rate where they
+        were interpolated.
     """
     stamps_s = known.stamps_s if found.stamps_s is None else found.stamps_s
     start_s = 0.0
-    notices: list[str] = []
     finite_s = stamps_s[np.isfinite(stamps_s)]
     if len(finite_s) and finite_s.min() > _DATE_S:
         start_s = float(finite_s.min())
-        notices.append(f"The stamps are dates; time 0 is the first frame's, {start_s:.6f} s since 1970.")
+        note(f"The stamps are dates; time 0 is the first frame's, {start_s:.6f} s since 1970.")
     own_row = len(stamps_s) == len(known.stamps_s) and np.array_equal(stamps_s, known.stamps_s, equal_nan=True)
     covered, world_from_camera, known_at = np.ones(len(stamps_s), bool), known.world_from_camera, None
     if not own_row:
-        covered, world_from_camera, known_at, more = _interpolated(stamps_s, known)
-        notices += more
+        covered, world_from_camera, known_at = _interpolated(stamps_s, known)
     shots = Shots(found.names, found.colour, found.depth, stamps_s - start_s, world_from_camera, found.video_frames)
     if known_at is not None:
         known_at = timeline.Trajectory(known_at.stamps_s - start_s, known_at.world_from_body)
-    return shots.take(np.flatnonzero(covered)), tuple(notices), start_s, known_at
+    return shots.take(np.flatnonzero(covered)), start_s, known_at
 
 
 def _interpolated(
     stamps_s: Float[np.ndarray, " n"], known: _Poses
-) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], timeline.Trajectory | None, list[str]]:
-    """Return where a pose is known, the poses there (NaN elsewhere), all of them, and what cannot be used."""
-    notices: list[str] = []
+) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], timeline.Trajectory | None]:
+    """Return where a pose is known, the poses there (NaN elsewhere), and all of them."""
     usable = np.flatnonzero(known.usable)
     if len(usable) < len(known.usable):
-        notices.append(f"{len(known.usable) - len(usable)} pose(s) of {layout.POSES} are NaN and not used.")
+        note(f"{len(known.usable) - len(usable)} pose(s) of {layout.POSES} are NaN and not used.")
     order = timeline.in_order(known.stamps_s[usable], f"poses of {layout.POSES}")
-    notices += order.notices
+    note(*order.notices)
     rows = usable[order.index]
     covered, world_from_camera = np.zeros(len(stamps_s), bool), np.full((len(stamps_s), 4, 4), np.nan)
     trajectory = None
@@ -343,8 +336,8 @@ def _interpolated(
     if not covered.all():
         lost = int((~covered).sum())
         span = f"{known.stamps_s[rows].min():.2f} to {known.stamps_s[rows].max():.2f} s" if len(rows) else "none"
-        notices.append(
+        note(
             f"{lost} of {len(stamps_s)} frame(s) lie outside the poses of {layout.POSES} ({span}) or in a gap of them; "
             "left out."
         )
-    return covered, world_from_camera, trajectory, notices
+    return covered, world_from_camera, trajectory

@@ -33,25 +33,26 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES
 from avlmaps.recordings.corrections import from_opengl
-from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.faults import note, report
 from avlmaps.recordings.formats import avlmaps_layout
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, left_out, list_names, sizes
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, left_out, list_names, opener, sizes
 from avlmaps.recordings.formats.tables import (
     fitted_rig,
+    note_resized,
+    note_unread,
     pinhole,
     read_json,
     read_matrix,
     read_numbers,
     read_table,
-    resized_notice,
     rigid,
     text_lines,
-    unread_notice,
 )
 from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES, first_picture_size
 from avlmaps.recordings.open import why_unreadable
 
 RATE_HZ = 30.0
+_NOT_IN_ORDER = "The poses are not in the order of the pictures; they are matched by their numbers in the log."
 _NO_CLOCK = "The recording has no clock; 30 frames/s are assumed."
 _COLOUR = rf"({'|'.join(re.escape(suffix) for suffix in COLOUR_SUFFIXES)})"
 _DEPTH = rf"({'|'.join(re.escape(suffix) for suffix in DEPTH_SUFFIXES)})"
@@ -61,11 +62,10 @@ Poses = dict[int, Float[np.ndarray, "4 4"]]
 
 @dataclass(frozen=True, slots=True)
 class Cameras:
-    """The cameras of a layout, the units of depth in a metre, and a sentence for each thing that was assumed."""
+    """The cameras of a layout, and the units of depth in a metre."""
 
     rig: Rig
     units_per_m: float = 1000.0
-    notices: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,17 +99,18 @@ class Layout:
     name: str
     colour: Pattern
     depth: Pattern
-    poses: Callable[[Path, Sequence[int], Report], tuple[Poses, Callable[[int], Path], tuple[str, ...]]]
+    poses: Callable[[Path, Sequence[int]], tuple[Poses, Callable[[int], Path]]]
     cameras: Callable[[Path, Shots], Cameras]
     files: str
     up: tuple[float, float, float] | None = None
 
 
-def open_layout(layout: Layout, path: Path, report: Report = stop_at_first) -> FileRecording:
+@opener
+def open_layout(layout: Layout, path: Path) -> FileRecording:
     """Open a folder in place."""
     colour = layout.colour.files(path)
     depth = layout.depth.files(path)
-    known, file_of, notices = layout.poses(path, sorted(colour), report)
+    known, file_of = layout.poses(path, sorted(colour))
     numbers = [number for number in colour if number in depth and number in known]
     if not numbers:
         raise RecordingError(
@@ -119,7 +120,7 @@ def open_layout(layout: Layout, path: Path, report: Report = stop_at_first) -> F
         )
     if partial_frames := len((colour.keys() | depth.keys() | known.keys()) - set(numbers)):
         sentence = f"{partial_frames} frame(s) lack one of colour, depth and pose and are left out."
-        notices = (*notices, *left_out(path, report, sentence))
+        left_out(path, sentence)
     shots = Shots(
         names=[_digits(colour[number]) for number in numbers],
         colour=[colour[number] for number in numbers],
@@ -129,7 +130,7 @@ def open_layout(layout: Layout, path: Path, report: Report = stop_at_first) -> F
     )
     found = layout.cameras(path, shots)
     return FileRecording.settled(
-        path, layout.name, found.rig, shots, (*notices, *found.notices), report, lambda i: file_of(numbers[i]),
+        path, layout.name, found.rig, shots, lambda i: file_of(numbers[i]),
         depth_units=found.units_per_m, up_in_world=None if layout.up is None else np.array(layout.up),
         posed=len(numbers) / len(colour),
     )  # fmt: skip
@@ -143,9 +144,7 @@ def _digits(file: str) -> str:
 # Poses
 
 
-def _pose_files(
-    pattern: Pattern, path: Path, numbers: Sequence[int], report: Report
-) -> tuple[Poses, Callable[[int], Path], tuple[str, ...]]:
+def _pose_files(pattern: Pattern, path: Path, numbers: Sequence[int]) -> tuple[Poses, Callable[[int], Path]]:
     files = pattern.files(path)
     found: Poses = {}
     for number, name in files.items():
@@ -154,23 +153,20 @@ def _pose_files(
         except RecordingError as error:
             found[number] = np.full((4, 4), np.nan)
             if number in numbers:
-                report(Fault(str(error), path / name))
-    return found, lambda number: path / files[number], ()
+                report(str(error), path / name)
+    return found, lambda number: path / files[number]
 
 
-def _rows(
-    name: str, path: Path, numbers: Sequence[int], report: Report
-) -> tuple[Poses, Callable[[int], Path], tuple[str, ...]]:
-    table = read_table(path / name, (16,), report)
-    return dict(enumerate(table.values.reshape(-1, 4, 4))), lambda _: path / name, (_NO_CLOCK,)
+def _rows(name: str, path: Path, numbers: Sequence[int]) -> tuple[Poses, Callable[[int], Path]]:
+    table = read_table(path / name, (16,))
+    note(_NO_CLOCK)
+    return dict(enumerate(table.values.reshape(-1, 4, 4))), lambda _: path / name
 
 
-def _of_robot(
-    path: Path, numbers: Sequence[int], report: Report
-) -> tuple[Poses, Callable[[int], Path], tuple[str, ...]]:
+def _of_robot(path: Path, numbers: Sequence[int]) -> tuple[Poses, Callable[[int], Path]]:
     """Return the poses of VLMaps' and HOV-SG's files, in a world with z up."""
     files = Pattern("pose", r"(\d+)\.txt").files(path)
-    rows = {number: _numbers_of(path / name, report) for number, name in files.items()}
+    rows = {number: _numbers_of(path / name) for number, name in files.items()}
     lengths = {len(row) for row in rows.values() if len(row)}
     if len(lengths) > 1 or not lengths <= {7, 12, 16}:
         raise RecordingError(
@@ -184,37 +180,34 @@ def _of_robot(
         elif len(row) in (12, 16):
             pose[at] = np.vstack([row.reshape(-1, 4)[:3], [0.0, 0.0, 0.0, 1.0]])
     if lengths == {7}:
-        given, _ = avlmaps_layout.read_camera_file(path / "camera.json")
-        pose, notice = avlmaps_layout.camera_poses(pose, given)
+        pose = avlmaps_layout.camera_poses(pose, avlmaps_layout.read_camera_file(path / "camera.json"))
     else:
-        pose, notice = _of_matrices(pose)
-    return dict(zip(rows, pose, strict=True)), lambda number: path / files[number], (notice, _NO_CLOCK)
+        pose = _of_matrices(pose)
+    note(_NO_CLOCK)
+    return dict(zip(rows, pose, strict=True)), lambda number: path / files[number]
 
 
-def _of_matrices(pose: Float[np.ndarray, "n 4 4"]) -> tuple[Float[np.ndarray, "n 4 4"], str]:
+def _of_matrices(pose: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "n 4 4"]:
     usable = pose[np.isfinite(pose).all(axis=(1, 2))]
     down = usable[:, :3, 1].mean(axis=0) if len(usable) else np.zeros(3)
     axis = int(np.argmax(np.abs(down)))
     begins_there = len(usable) > 0 and np.allclose(usable[0], np.eye(4), atol=1e-3)
     if axis == 1 and down[1] > 0.0 and not begins_there:  # y up in Habitat's world, and in the camera
-        return avlmaps_layout.WORLD_FROM_HABITAT @ from_opengl(pose), (
-            "The poses are taken for those of a camera with y up that looks along -z, as HOV-SG's (their y axis points "
-            "up)."
-        )
+        note("The poses are taken for those of a camera with y up that looks along -z, as HOV-SG's (y points up).")
+        return avlmaps_layout.WORLD_FROM_HABITAT @ from_opengl(pose)
+    turned = "turned so that z is up" if axis == 1 else "in a world with z up"
+    note(f"The poses are taken for those of a camera with y down, {turned}.")
     if axis == 1:
-        turn = avlmaps_layout.WORLD_FROM_HABITAT @ np.diag([1.0, -1.0, -1.0, 1.0] if down[1] > 0.0 else [1.0] * 4)
-        return (
-            turn @ pose,
-            "The poses are taken for those of a camera with y down; turned so that z is up.",
-        )
-    return pose, "The poses are taken for those of a camera with y down, in a world with z up."
+        turn = np.diag([1.0, -1.0, -1.0, 1.0] if down[1] > 0.0 else [1.0] * 4)
+        return avlmaps_layout.WORLD_FROM_HABITAT @ turn @ pose
+    return pose
 
 
-def _numbers_of(file: Path, report: Report) -> Float[np.ndarray, " n"]:
+def _numbers_of(file: Path) -> Float[np.ndarray, " n"]:
     try:
         return read_numbers(file)
     except RecordingError as error:
-        report(Fault(str(error), file))
+        report(str(error), file)
         return np.zeros(0)
 
 
@@ -226,20 +219,17 @@ def _kinect(path: Path, shots: Shots) -> Cameras:
     rgb_size, depth_size = sizes(path, shots)
     places = (path / "camera-intrinsics.txt", path.parent / "camera-intrinsics.txt")
     file = next((place for place in places if place.is_file()), None)
-    notices: tuple[str, ...] = ()
     if file is None:
-        notices = ("There is no camera-intrinsics.txt; those of 7-Scenes are assumed (focal length 585 at 640x480).",)
+        note("There is no camera-intrinsics.txt; those of 7-Scenes are assumed (focal length 585 at 640x480).")
         depth = Pinhole(585.0, 585.0, 320.0, 240.0, 640, 480).resized(*depth_size)
     else:
         k = read_matrix(file, 3, 3).tolist()
         depth = pinhole(file, k[0][0], k[1][1], k[0][2], k[1][2], *depth_size)
     if depth_size == (640, 480) and depth.fx == depth.fy == 585.0:
         colour = Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480).resized(*rgb_size)
-        notice = (
-            "The intrinsics are a Kinect's depth camera's (585); for the colour camera 525 is used, which fits better."
-        )
-        return Cameras(Rig(colour, depth), notices=(*notices, notice))
-    return Cameras(Rig(depth.resized(*rgb_size), depth), notices=notices)
+        note("The intrinsics are a Kinect's depth camera's (585); for the colour camera 525 is used; it fits better.")
+        return Cameras(Rig(colour, depth))
+    return Cameras(Rig(depth.resized(*rgb_size), depth))
 
 
 _REPLICA = {"w": 1200, "h": 680, "fx": 600.0, "fy": 600.0, "cx": 599.5, "cy": 339.5, "scale": 6553.5}
@@ -266,18 +256,20 @@ def _replica(path: Path, shots: Shots) -> Cameras:
     rgb_size, depth_size = sizes(path, shots)
     places = (path / "cam_params.json", path.parent / "cam_params.json")
     file = next((place for place in places if os.path.lexists(place)), None)
-    notices: tuple[str, ...] = ("There is no cam_params.json; the camera of the published scenes is assumed.",)
     numbers: dict[str, Any] = dict(_REPLICA)
-    if file is not None:
+    if file is None:
+        note("There is no cam_params.json; the camera of the published scenes is assumed.")
+    else:
         plain = read_json(file, dict, DESCRIPTION_BYTES)[1]
         section = next((name for name in ("camera", "cam", "camera_params") if isinstance(plain.get(name), dict)), "")
-        notices = unread_notice(file, plain, (section,)) if section else ()
+        if section:
+            note_unread(file, plain, (section,))
         numbers = {}
         for key, value in (plain[section] if section else plain).items():
             name = _REPLICA_NAMES.get(key, key)
             if numbers.setdefault(name, value) != value:
                 raise RecordingError(f"{file} has {name} twice, as {numbers[name]} and as {value}; remove one of them.")
-        notices = (*notices, *unread_notice(file, numbers, (*_ReplicaCamera.__struct_fields__, *_REPLICA_IDLE)))
+        note_unread(file, numbers, (*_ReplicaCamera.__struct_fields__, *_REPLICA_IDLE))
     try:
         given = msgspec.convert(numbers, _ReplicaCamera)
     except msgspec.ValidationError as error:
@@ -286,31 +278,32 @@ def _replica(path: Path, shots: Shots) -> Cameras:
     if not scale > 0.0:
         raise RecordingError(f"{file} holds no camera: scale is {scale}; it must be positive; fix the file.")
     if given.scale is None:
-        notices = (*notices, f"cam_params.json has no scale of depth; {scale:g} units a metre are assumed.")
+        note(f"cam_params.json has no scale of depth; {scale:g} units a metre are assumed.")
     size = (given.w or rgb_size[0], given.h or rgb_size[1])
     camera = pinhole(file or path, given.fx, given.fy, given.cx + 0.5, given.cy + 0.5, *size)
-    return Cameras(Rig(camera.resized(*rgb_size), camera.resized(*depth_size)), scale, notices)
+    return Cameras(Rig(camera.resized(*rgb_size), camera.resized(*depth_size)), scale)
 
 
 def _scannet(path: Path, shots: Shots) -> Cameras:
     rgb_size, depth_size = sizes(path, shots)
     inside = path / "intrinsic"
-    rgb, notices = _centred(inside / "intrinsic_color.txt", rgb_size, (1296, 968))
-    depth, more = _centred(inside / "intrinsic_depth.txt", depth_size, (640, 480))
+    rgb = _centred(inside / "intrinsic_color.txt", rgb_size, (1296, 968))
+    depth = _centred(inside / "intrinsic_depth.txt", depth_size, (640, 480))
     body_from_rgb, body_from_depth = (
         poses.orthonormalize(read_matrix(file, 4, 4), str(file)) if file.is_file() else np.eye(4)
         for file in (inside / "extrinsic_color.txt", inside / "extrinsic_depth.txt")
     )
-    return Cameras(Rig(rgb, depth, poses.inverse(body_from_rgb) @ body_from_depth), notices=(*notices, *more))
+    return Cameras(Rig(rgb, depth, poses.inverse(body_from_rgb) @ body_from_depth))
 
 
-def _centred(file: Path, size: tuple[int, int], own_size: tuple[int, int]) -> tuple[Pinhole, tuple[str, ...]]:
+def _centred(file: Path, size: tuple[int, int], own_size: tuple[int, int]) -> Pinhole:
     k = read_matrix(file, 4, 4).tolist()
     for width, height in (size, own_size):
         camera = pinhole(file, k[0][0], k[1][1], k[0][2] + 0.5, k[1][2] + 0.5, width, height)
         # A principal point is at most this share of the picture's size away from its middle.
         if max(abs(camera.cx / width - 0.5), abs(camera.cy / height - 0.5)) <= 0.15:
-            return camera.resized(*size), resized_notice(camera, size)
+            note_resized(camera, size)
+            return camera.resized(*size)
     raise RecordingError(
         f"{file} has its centre at {k[0][2]:.1f}, {k[1][2]:.1f}, but the pictures are {size[0]}x{size[1]}; were they "
         "resized or cropped? Give the intrinsics of these pictures."
@@ -323,13 +316,10 @@ def _robot_camera(path: Path, shots: Shots) -> Cameras:
     for name in _OPEN3D:
         if os.path.lexists(path / name):
             return _open3d(path, shots)
-    given, _ = avlmaps_layout.read_camera_file(path / "camera.json")
-    rig = avlmaps_layout.rig_of(path, shots, given)
-    if given.fx is not None:
-        return Cameras(rig)
-    return Cameras(
-        rig, notices=("No file says the camera; a view of 90 degrees is assumed (camera.json: fx fy cx cy).",)
-    )
+    given = avlmaps_layout.read_camera_file(path / "camera.json")
+    if given.fx is None:
+        note("No file says the camera; a view of 90 degrees is assumed (camera.json: fx fy cx cy).")
+    return Cameras(avlmaps_layout.rig_of(path, shots, given))
 
 
 _OPEN3D = ("intrinsic.json", "camera_intrinsic.json", "intrinsics.json", "camera_primesense.json")
@@ -348,10 +338,10 @@ def _open3d(path: Path, shots: Shots) -> Cameras:
     """Return the camera of intrinsic.json (column by column, the first pixel's centre at 0, 0), or a PrimeSense."""
     file = next((path / name for name in _OPEN3D if os.path.lexists(path / name)), None)
     if file is None:
-        notice = "There is no intrinsic.json; a PrimeSense is assumed (focal length 525 at 640x480), as Open3D does."
-        return fitted_cameras(path, shots, Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480), path, 1000.0, (notice,))
+        note("There is no intrinsic.json; a PrimeSense is assumed (focal length 525 at 640x480), as Open3D does.")
+        return fitted_cameras(path, shots, Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480), path, 1000.0)
     given, plain = read_json(file, _Open3dCamera)
-    notices = unread_notice(file, plain, (*_Open3dCamera.__struct_fields__, *_OPEN3D_IDLE))
+    note_unread(file, plain, (*_Open3dCamera.__struct_fields__, *_OPEN3D_IDLE))
     k = given.intrinsic_matrix
     if len(k) != 9 or not given.depth_scale > 0.0:
         raise RecordingError(
@@ -361,15 +351,13 @@ def _open3d(path: Path, shots: Shots) -> Cameras:
     if k[6] == k[7] == 0.0:  # written by hand, row by row
         k = [k[i] for i in (0, 3, 6, 1, 4, 7, 2, 5, 8)]
     camera = pinhole(file, k[0], k[4], k[6] + 0.5, k[7] + 0.5, given.width, given.height)
-    more = resized_notice(camera, first_picture_size(path, shots.colour))
-    return fitted_cameras(path, shots, camera, file, given.depth_scale, (*notices, *more))
+    note_resized(camera, first_picture_size(path, shots.colour))
+    return fitted_cameras(path, shots, camera, file, given.depth_scale)
 
 
-def fitted_cameras(
-    path: Path, shots: Shots, camera: Pinhole, file: Path, units_per_m: float, notices: tuple[str, ...] = ()
-) -> Cameras:
+def fitted_cameras(path: Path, shots: Shots, camera: Pinhole, file: Path, units_per_m: float) -> Cameras:
     """Return one camera for colour and depth, at the size that each has."""
-    return Cameras(fitted_rig(camera, *sizes(path, shots), file), units_per_m, notices)
+    return Cameras(fitted_rig(camera, *sizes(path, shots), file), units_per_m)
 
 
 _LAYOUTS = (
@@ -422,7 +410,8 @@ def find_redwood_log(path: Path) -> Path | None:
     return next(iter(sorted(path.glob("*-traj.txt"))), None) if path.is_dir() else None
 
 
-def open_redwood(path: Path, report: Report = stop_at_first) -> FileRecording:
+@opener
+def open_redwood(path: Path) -> FileRecording:
     """Open a scene of Redwood or Open3D in place."""
     log = find_redwood_log(path)
     folder = next((name for name in ("color", "rgb", "image") if (path / name).is_dir()), None)
@@ -430,16 +419,14 @@ def open_redwood(path: Path, report: Report = stop_at_first) -> FileRecording:
         what = "trajectory.log" if log is None else "folder of colour pictures (color, rgb, image)"
         raise RecordingError(f"{path} has no {what}; the recording needs it.")
     colour, depth = list_names(path / folder, COLOUR_SUFFIXES), list_names(path / "depth", DEPTH_SUFFIXES)
-    ids, pose = _read_log(log, report)
+    ids, pose = _read_log(log)
     if not (colour and depth and len(pose)):
         raise RecordingError(f"{path} has {len(colour)} colour and {len(depth)} depth pictures and {len(pose)} poses.")
-    rows, notices = _matched(path, colour, depth, ids)
-    for sentence in notices:
-        left_out(path, report, sentence, log)
+    rows = _matched(path, log, colour, depth, ids)
     colour, depth = [colour[row[0]] for row in rows], [depth[row[1]] for row in rows]
     stamps_s = _microseconds(depth)
     if stamps_s is None:
-        notices.append(_NO_CLOCK)
+        note(_NO_CLOCK)
         stamps_s = np.array([row[3] for row in rows], np.float64) / RATE_HZ
     shots = Shots(
         names=[name.rsplit(".", 1)[0] for name in colour],
@@ -450,15 +437,15 @@ def open_redwood(path: Path, report: Report = stop_at_first) -> FileRecording:
     )
     found = _open3d(path, shots)
     return FileRecording.settled(
-        path, "redwood", found.rig, shots, (*notices, *found.notices), report, lambda _: log,
+        path, "redwood", found.rig, shots, lambda _: log,
         depth_units=found.units_per_m,
     )  # fmt: skip
 
 
 def _matched(
-    path: Path, colour: list[str], depth: list[str], ids: list[int]
-) -> tuple[list[tuple[int, int, int, int]], list[str]]:
-    """Return (row of colour, of depth, of the log, count) of each frame that has all three, and what was assumed.
+    path: Path, log: Path, colour: list[str], depth: list[str], ids: list[int]
+) -> list[tuple[int, int, int, int]]:
+    """Return (row of colour, of depth, of the log, count) of each frame that has all three.
 
     Pictures are matched by the numbers that their names begin with, if these differ from one another, else in order.
     The poses are matched by their own numbers where they skip frames, else in order.
@@ -480,16 +467,16 @@ def _matched(
     whole = sorted(of_colour.keys() & of_depth.keys() & of_pose.keys())
     if not whole:
         raise RecordingError(f"{path} has no frame with all of colour, depth and a pose.")
-    notices: list[str] = []
     if not len(colour) == len(depth) == len(ids) == len(whole):
-        notices.append(
+        sentence = (
             f"There are {len(colour)} colour pictures, {len(depth)} depth pictures and {len(ids)} poses; pictures are "
             f"matched {how}, poses {'by their numbers in the log' if by_id else 'in order'}, and {len(whole)} frames "
             "have all three."
         )
+        left_out(path, sentence, log)
     elif by_id:
-        notices.append("The poses are not in the order of the pictures; they are matched by their numbers in the log.")
-    return [(of_colour[n], of_depth[n], of_pose[n], n) for n in whole], notices
+        left_out(path, _NOT_IN_ORDER, log)
+    return [(of_colour[n], of_depth[n], of_pose[n], n) for n in whole]
 
 
 def _first_numbers(names: list[str]) -> list[int]:
@@ -498,9 +485,9 @@ def _first_numbers(names: list[str]) -> list[int]:
     return numbers if len(set(numbers)) == len(names) else []
 
 
-def _read_log(file: Path, report: Report) -> tuple[list[int], Float[np.ndarray, "n 4 4"]]:
+def _read_log(file: Path) -> tuple[list[int], Float[np.ndarray, "n 4 4"]]:
     """Read the numbers and the matrices of a log, which must be whole: after a lost line every pose is another's."""
-    lines = list(text_lines(file, report))
+    lines = list(text_lines(file))
     if len(lines) % 5:
         raise RecordingError(
             f"{file} has {len(lines)} lines, but each pose takes five (three whole numbers, then a 4x4 matrix); is it "

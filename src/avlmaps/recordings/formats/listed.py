@@ -21,16 +21,24 @@ from jaxtyping import Float
 from avlmaps.core import poses, timeline
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, left_out, list_names, natural_key, sizes
+from avlmaps.recordings.faults import note, report
+from avlmaps.recordings.formats.file_recording import (
+    FileRecording,
+    Shots,
+    left_out,
+    list_names,
+    natural_key,
+    opener,
+    sizes,
+)
 from avlmaps.recordings.formats.layouts import Z_UP, Cameras, Poses, fitted_cameras
 from avlmaps.recordings.formats.tables import (
     DISTORTED,
     POSE,
+    note_resized,
     pinhole,
     read_opencv_yaml,
     read_table,
-    resized_notice,
     rigid,
     text_lines,
 )
@@ -47,7 +55,6 @@ RATE_HZ = 30.0
 class _Stream:
     stamps_s: Float[np.ndarray, " n"]
     files: list[str]
-    notices: tuple[str, ...]
 
 
 TRAJECTORIES = ("groundtruth.txt", "CameraTrajectory.txt", "KeyFrameTrajectory.txt", "*[Tt]rajectory*.txt", "poses.txt")
@@ -71,54 +78,50 @@ def find_trajectory(path: Path) -> Path | None:
     return next((file for pattern in TRAJECTORIES for file in sorted(path.glob(pattern))), None)
 
 
-def open_tum(path: Path, report: Report = stop_at_first) -> FileRecording:
+@opener
+def open_tum(path: Path) -> FileRecording:
     """Open a sequence of the TUM RGB-D benchmark, or one laid out like it, in place.
 
     A colour and a depth picture make a frame where they are each other's nearest in time and at most 20 ms apart;
     the frame's stamp is the depth picture's, and its pose is interpolated there.
     """
-    colour, depth = (_stream(path / name, report) for name in ("rgb.txt", "depth.txt"))
+    colour, depth = (_stream(path / name) for name in ("rgb.txt", "depth.txt"))
     of_colour, of_depth = timeline.associate(colour.stamps_s, depth.stamps_s, _PAIR_TOLERANCE_S)
     if len(of_colour) == 0:
         raise RecordingError(
             f"{path}: no picture of rgb.txt ({len(colour.files)}) is within {_PAIR_TOLERANCE_S} s of one of depth.txt "
             f"({len(depth.files)}); check that both use one clock."
         )
-    notices = [*colour.notices, *depth.notices]
     if unpaired := len(colour.files) - len(of_colour):
-        notices.append(f"{unpaired} colour picture(s) have no depth picture within {_PAIR_TOLERANCE_S} s; left out.")
+        note(f"{unpaired} colour picture(s) have no depth picture within {_PAIR_TOLERANCE_S} s; left out.")
     rows: list[tuple[int, int]] = list(zip(of_colour.tolist(), of_depth.tolist(), strict=True))
     files = [(colour.files[i], depth.files[j]) for i, j in rows]
     start_s = min(colour.stamps_s[0], depth.stamps_s[0])
-    return _timed(path, "tum", depth.stamps_s[of_depth], files, float(start_s), notices, report)
+    return _timed(path, "tum", depth.stamps_s[of_depth], files, float(start_s))
 
 
-def open_orb_slam(path: Path, report: Report = stop_at_first) -> FileRecording:
+@opener
+def open_orb_slam(path: Path) -> FileRecording:
     """Open associated pictures with a trajectory of ORB-SLAM, or of another that writes TUM's columns, in place."""
     listed = find_associations(path)
     assert listed is not None
-    rows = _associations(listed, report)
+    rows = _associations(listed)
     order = timeline.in_order(np.array([row[0] for row in rows]), f"lines of {listed.name}")
     at: list[int] = order.index.tolist()
     kept = [rows[i] for i in at]
     stamps_s = np.array([row[0] for row in kept])
     if not kept:
         raise RecordingError(f"{listed} lists no frame, so there is nothing to map.")
-    return _timed(path, "orb-slam", stamps_s, [row[1:] for row in kept], stamps_s[0], list(order.notices), report)
+    note(*order.notices)
+    return _timed(path, "orb-slam", stamps_s, [row[1:] for row in kept], stamps_s[0])
 
 
 def _timed(
-    path: Path,
-    name: str,
-    stamps_s: Float[np.ndarray, " n"],
-    files: list[tuple[str, str]],
-    start_s: float,
-    notices: list[str],
-    report: Report,
+    path: Path, name: str, stamps_s: Float[np.ndarray, " n"], files: list[tuple[str, str]], start_s: float
 ) -> FileRecording:
     """Return the recording of pictures with stamps, whose poses lie in a table with stamps."""
     file = find_trajectory(path) or path / TRAJECTORIES[0]
-    trajectory, more = _trajectory(file, report)
+    trajectory = _trajectory(file)
     known_s = trajectory.stamps_s
     if fault := clock_fault(stamps_s, "pictures", known_s, f"poses of {file.name}"):
         raise RecordingError(f"{path}: {fault}")
@@ -129,7 +132,7 @@ def _timed(
             f"{stamps_s[-1]:.3f} s; check that both use one clock."
         )
     if not covered.all():
-        notices.append(f"{int((~covered).sum())} frame(s) lie outside {file.name} or in a gap of it; left out.")
+        note(f"{int((~covered).sum())} frame(s) lie outside {file.name} or in a gap of it; left out.")
     rows, stamps_s = np.flatnonzero(covered).tolist(), stamps_s[covered]
     shots = Shots(
         names=[Path(files[i][0]).stem for i in rows],
@@ -140,17 +143,17 @@ def _timed(
     )
     found, up_in_world = _tum_camera(path, shots)
     return FileRecording.settled(
-        path, name, found.rig, shots, (*notices, *more, *found.notices), report, None, depth_units=found.units_per_m,
+        path, name, found.rig, shots, None, depth_units=found.units_per_m,
         up_in_world=up_in_world, begins_s=float(start_s), posed=float(covered.mean()),
         trajectory=timeline.Trajectory(known_s - start_s, trajectory.world_from_body),
     )  # fmt: skip
 
 
-def _stream(path: Path, report: Report) -> _Stream:
+def _stream(path: Path) -> _Stream:
     """Read a list of ``stamp file``, in the order of time."""
     stamps: list[float] = []
     files: list[str] = []
-    for number, text in text_lines(path, report):
+    for number, text in text_lines(path):
         stamp, *rest = re.split(r"[\s,;]+", text, maxsplit=1)
         try:
             if not rest or not rest[0]:
@@ -159,55 +162,56 @@ def _stream(path: Path, report: Report) -> _Stream:
             files.append(rest[0] if "/" in rest[0] else rest[0].replace("\\", "/"))  # as Windows writes paths
         except ValueError:
             sentence = f"{path}, line {number}: {text[:40]!r} is not a stamp and a file; fix the line."
-            report(Fault(sentence, path, number))
+            report(sentence, path, number)
     if not files:
         raise RecordingError(f"{path} lists no picture, so there is nothing to map.")
     what = f"pictures of {path.name}"
     if fault := date_fault(np.array(stamps), f"the {what}") or repeat_fault(np.array(stamps), what):
         raise RecordingError(f"{path}: {fault}")
     order = timeline.in_order(np.array(stamps), f"pictures of {path.name}")
-    return _Stream(np.array(stamps)[order.index], [files[i] for i in order.index], order.notices)
+    note(*order.notices)
+    return _Stream(np.array(stamps)[order.index], [files[i] for i in order.index])
 
 
-def _trajectory(path: Path, report: Report) -> tuple[timeline.Trajectory, tuple[str, ...]]:
-    table = read_table(path, (8,), report, names=POSE)
+def _trajectory(path: Path) -> timeline.Trajectory:
+    table = read_table(path, (8,), names=POSE)
     values = table.values
     norm = np.linalg.norm(values[:, 4:8], axis=1) if len(values) else np.zeros(0)
     usable = np.isfinite(values).all(axis=1) & (np.abs(norm - 1.0) <= poses.MAX_ROTATION_FAULT)
     for row in np.flatnonzero(~usable):
         line = int(table.lines[row])
         sentence = f"{path}, line {line}: this is not a pose (NaN, or a quaternion of length {norm[row]:.3g}); unused."
-        report(Fault(sentence, path, line, fatal=False))
+        report(sentence, path, line, fatal=False)
     lost, values = int((~usable).sum()), values[usable]
     order = timeline.in_order(values[:, 0] if len(values) else np.zeros(0), f"poses of {path.name}")
     values = values[order.index]
     if len(values) == 0:
         raise RecordingError(f"{path} holds no usable pose, so there is nothing to map.")
-    notices = (f"{lost} line(s) of {path.name} are no poses and not used.",) if lost else ()
-    gaps = timeline.gap_notices(values[:, 0], f"poses in {path.name}")
-    pose = poses.from_quaternion(values[:, 1:4], values[:, 4:8])
-    return timeline.Trajectory(values[:, 0], pose), (*notices, *order.notices, *gaps)
+    if lost:
+        note(f"{lost} line(s) of {path.name} are no poses and not used.")
+    note(*order.notices, *timeline.gap_notices(values[:, 0], f"poses in {path.name}"))
+    return timeline.Trajectory(values[:, 0], poses.from_quaternion(values[:, 1:4], values[:, 4:8]))
 
 
 def _tum_camera(path: Path, shots: Shots) -> tuple[Cameras, Float[np.ndarray, "3"] | None]:
     rgb_size, depth_size = sizes(path, shots)
     for file in sorted((*path.glob("*.yaml"), *path.glob("*.yml"))):
         if found := _orb_camera(file, rgb_size):
-            camera, units, notices = found
-            return Cameras(Rig(camera.resized(*rgb_size), camera.resized(*depth_size)), units, notices), None
+            camera, units = found
+            return Cameras(Rig(camera.resized(*rgb_size), camera.resized(*depth_size)), units), None
     name = path.resolve().name.lower()
     key = next((k for k in _FREIBURG if k in name), "default")
     fx, fy, cx, cy = _FREIBURG[key]
     camera = Pinhole(fx, fy, cx + 0.5, cy + 0.5, 640, 480)
     rig = Rig(camera.resized(*rgb_size), camera.resized(*depth_size))
     if key == "default":
-        notice = "The folder is not called freiburg1, 2 or 3, so the default camera (525) is assumed; up is not known."
-        return Cameras(rig, 5000.0, (notice,)), None
+        note("The folder is not called freiburg1, 2 or 3, so the default camera (525) is assumed; up is not known.")
+        return Cameras(rig, 5000.0), None
     return Cameras(rig, 5000.0), np.array(Z_UP)
 
 
-def _orb_camera(file: Path, size: tuple[int, int]) -> tuple[Pinhole, float, tuple[str, ...]] | None:
-    """Return the camera of ORB-SLAM's settings, units of depth, and notices; None where the file has none."""
+def _orb_camera(file: Path, size: tuple[int, int]) -> tuple[Pinhole, float] | None:
+    """Return the camera of ORB-SLAM's settings, and units of depth; None where the file has none."""
     settings = read_opencv_yaml(file)
 
     def number(*names: str) -> float | None:
@@ -223,15 +227,16 @@ def _orb_camera(file: Path, size: tuple[int, int]) -> tuple[Pinhole, float, tupl
         raise RecordingError(f"{file} has the DepthMapFactor {units}; it must be positive: 1000 for millimetres.")
     width, height = number("width") or size[0], number("height") or size[1]
     camera = pinhole(file, fx, fy, cx + 0.5, cy + 0.5, round(width), round(height))
+    note_resized(camera, size)
     if any(abs(number(name) or 0.0) > 1e-9 for name in ("k1", "k2", "p1", "p2", "k3")):
-        return camera, units, (*resized_notice(camera, size), DISTORTED)
-    return camera, units, resized_notice(camera, size)
+        note(DISTORTED)
+    return camera, units
 
 
-def _associations(file: Path, report: Report) -> list[tuple[float, str, str]]:
+def _associations(file: Path) -> list[tuple[float, str, str]]:
     """Return (stamp or number, colour file, depth file) of each line, which may name either first."""
     rows: list[tuple[float, str, str]] = []
-    for number, text in text_lines(file, report):
+    for number, text in text_lines(file):
         words = text.split()
         try:
             if len(words) != 4:
@@ -239,17 +244,18 @@ def _associations(file: Path, report: Report) -> list[tuple[float, str, str]]:
             key, other_key, (one, other) = float(words[0]), float(words[2]), words[1::2]
         except ValueError:
             sentence = f"{file}, line {number}: {text[:40]!r} is not a number, a file, the number again and a file."
-            report(Fault(sentence, file, number))
+            report(sentence, file, number)
             continue
         one, other = one.removeprefix("./"), other.removeprefix("./")
         rows.append((other_key, other, one) if "depth" in one else (key, one, other))
     return rows
 
 
-def open_icl_nuim(path: Path, report: Report = stop_at_first) -> FileRecording:
+@opener
+def open_icl_nuim(path: Path) -> FileRecording:
     """Open a sequence of ICL-NUIM in place."""
     listed = path / "associations.txt"
-    rows = [(int(key), colour, depth) for key, colour, depth in _associations(listed, report)]
+    rows = [(int(key), colour, depth) for key, colour, depth in _associations(listed)]
     if not rows:
         raise RecordingError(f"{listed} lists no frame, so there is nothing to map.")
     truth = next(iter(sorted(path.glob("*.gt.freiburg"))), None)
@@ -258,12 +264,12 @@ def open_icl_nuim(path: Path, report: Report = stop_at_first) -> FileRecording:
             f"{path} has no poses: put ICL-NUIM's livingRoomN.gt.freiburg or trajN.gt.freiburg, or a trajectory with "
             f"stamps (CameraTrajectory.txt), beside {listed.name}."
         )
-    known = _freiburg(truth, report)
+    known = _freiburg(truth)
     posed = [row for row in rows if row[0] in known]
     if not posed:
         raise RecordingError(f"{truth} has a pose for none of the {len(rows)} frames of {listed.name}.")
-    lost = f"{len(rows) - len(posed)} frame(s) have no pose in {truth.name} and are left out."
-    notices = left_out(path, report, lost, truth) if len(posed) < len(rows) else []
+    if len(posed) < len(rows):
+        left_out(path, f"{len(rows) - len(posed)} frame(s) have no pose in {truth.name} and are left out.", truth)
     mirror, numbers = np.diag([1.0, -1.0, 1.0, 1.0]), np.array([row[0] for row in posed], np.float64)
     shots = Shots(
         names=[f"{number}" for number, _, _ in posed],
@@ -274,13 +280,13 @@ def open_icl_nuim(path: Path, report: Report = stop_at_first) -> FileRecording:
     )
     found = fitted_cameras(path, shots, Pinhole(481.20, 480.00, 320.0, 240.0, 640, 480), path, 5000.0)
     return FileRecording.settled(
-        path, "icl-nuim", found.rig, shots, notices, report, lambda _: truth, depth_units=found.units_per_m,
+        path, "icl-nuim", found.rig, shots, lambda _: truth, depth_units=found.units_per_m,
         up_in_world=np.array([0.0, -1.0, 0.0]), posed=len(posed) / len(rows),
     )  # fmt: skip
 
 
-def _freiburg(file: Path, report: Report) -> Poses:
-    rows = read_table(file, (8,), report, names=POSE).values
+def _freiburg(file: Path) -> Poses:
+    rows = read_table(file, (8,), names=POSE).values
     found = zip(rows[:, 0].tolist(), rigid(rows[:, 1:4], rows[:, 4:]), strict=True)
     return {int(number): pose for number, pose in found if np.isfinite(pose).all()}
 
@@ -295,7 +301,8 @@ def export_of(path: Path) -> str:
     return next((name for name in names if (path / f"{name}_depth").is_dir()), "")
 
 
-def open_rtabmap_export(path: Path, report: Report = stop_at_first) -> FileRecording:
+@opener
+def open_rtabmap_export(path: Path) -> FileRecording:
     """Open what rtabmap-export wrote, in place."""
     name = export_of(path)
     kinds = {"rgb": COLOUR_SUFFIXES, "depth": DEPTH_SUFFIXES, "calib": (".yaml", ".yml")}
@@ -310,14 +317,14 @@ def open_rtabmap_export(path: Path, report: Report = stop_at_first) -> FileRecor
             "`rtabmap-export --images --poses --poses_camera`."
         )
     camera, base_from_camera = _exported_camera(path / f"{name}_calib" / files["calib"][0])
-    table = read_table(file, (8, 9, 12), report)
+    table = read_table(file, (8, 9, 12))
     pose, own = _exported_poses(table.values)
     if file.name.endswith("_poses.txt") and not file.name.endswith("camera_poses.txt"):
         pose = pose @ base_from_camera
     whole = sorted(whole, key=natural_key)
-    rows, stamps_s, notices = _exported_rows(path, whole, own)
+    rows, stamps_s = _exported_rows(path, whole, own)
     if len(rows) < len(whole):
-        notices = (*notices, f"{len(whole) - len(rows)} frame(s) have no pose in {file.name} and are left out.")
+        note(f"{len(whole) - len(rows)} frame(s) have no pose in {file.name} and are left out.")
     shots = Shots(
         names=[whole[frame] for frame, _ in rows],
         colour=[f"{name}_rgb/{stems['rgb'][whole[frame]]}" for frame, _ in rows],
@@ -327,7 +334,7 @@ def open_rtabmap_export(path: Path, report: Report = stop_at_first) -> FileRecor
     )
     found = fitted_cameras(path, shots, camera, path / f"{name}_calib", 1000.0)
     return FileRecording.settled(
-        path, "rtabmap-export", found.rig, shots, notices, report, lambda _: file, up_in_world=np.array(Z_UP),
+        path, "rtabmap-export", found.rig, shots, lambda _: file, up_in_world=np.array(Z_UP),
         begins_s=float(stamps_s[0]), posed=len(rows) / len(whole),
     )  # fmt: skip
 
@@ -342,14 +349,14 @@ def _exported_poses(values: Float[np.ndarray, "n c"]) -> tuple[Float[np.ndarray,
 
 def _exported_rows(
     path: Path, stems: Sequence[str], own: Float[np.ndarray, "n c"]
-) -> tuple[list[tuple[int, int]], Float[np.ndarray, " k"], tuple[str, ...]]:
+) -> tuple[list[tuple[int, int]], Float[np.ndarray, " k"]]:
     keys = np.array([float(stem) if re.fullmatch(r"\d+(\.\d+)?", stem) else np.nan for stem in stems])
     for column in range(own.shape[1]):
         order = np.argsort(own[:, column], kind="stable")
         a, b = timeline.associate(np.sort(keys), own[order, column], 1e-3)
         if 2 * len(a) > min(len(keys), len(own)):
             frames = np.argsort(keys, kind="stable")[a]
-            return list(zip(frames.tolist(), order[b].tolist(), strict=True)), own[order[b], 0], ()
+            return list(zip(frames.tolist(), order[b].tolist(), strict=True)), own[order[b], 0]
     if len(own) != len(stems):
         raise RecordingError(
             f"{path} has {len(stems)} pictures and {len(own)} poses, and the names of the pictures are neither stamps "
@@ -357,8 +364,9 @@ def _exported_rows(
         )
     every = range(len(stems))
     stamps_s = own[:, 0] if own.shape[1] else np.array(every) / RATE_HZ
-    notices = () if own.shape[1] else ("The poses have no stamps; 30 frames/s are assumed.",)
-    return [(i, i) for i in every], stamps_s, notices
+    if not own.shape[1]:
+        note("The poses have no stamps; 30 frames/s are assumed.")
+    return [(i, i) for i in every], stamps_s
 
 
 def _exported_camera(file: Path) -> tuple[Pinhole, Float[np.ndarray, "4 4"]]:

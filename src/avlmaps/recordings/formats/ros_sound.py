@@ -5,7 +5,8 @@ bytes, and an AudioInfo on a topic of its own that says how they are coded. That
 samples and an AudioInfo (PortAudio's numbers of formats). What they declare is held against when the messages came.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
@@ -16,8 +17,9 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.wording import option
-from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, Sound, write_flac
+from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, write_samples
 from avlmaps.recordings.directions import DirectionTrack
+from avlmaps.recordings.faults import note
 from avlmaps.recordings.formats.ros_messages import pose_of, stamp_of
 
 STAMPED = "audio_common_msgs/msg/AudioStamped"
@@ -94,14 +96,13 @@ class PictureClock:
         first, last = self.stamps_s.min() - self.start_s, self.stamps_s.max() - self.start_s
         return bool(((times_s >= first) & (times_s <= last)).any())
 
-    def notices(self, topic: str) -> tuple[str, ...]:
-        """Return a notice where the sound was received on another clock than that of the pictures' stamps."""
-        if abs(self.apart_s) <= _APART_S:
-            return ()
-        return (
-            f"The stamps of the pictures are {self.apart_s:+.6g} s from when the bag received them; {topic} has no "
-            "stamps on their clock and is placed as they are.",
-        )
+    def note_apart(self, topic: str) -> None:
+        """Note where the sound was received on another clock than that of the pictures' stamps."""
+        if abs(self.apart_s) > _APART_S:
+            note(
+                f"The stamps of the pictures are {self.apart_s:+.6g} s from when the bag received them; {topic} has no "
+                "stamps on their clock and is placed as they are."
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,8 +145,8 @@ class SoundTopic:
     messages: Callable[[], Iterable[tuple[int, Any]]]
     clock: PictureClock
 
-    def times_s(self) -> tuple[Float[np.ndarray, " n"], tuple[str, ...]]:
-        """Return when each message sounds, seconds of the recording, and the notices about it.
+    def times_s(self) -> Float[np.ndarray, " n"]:
+        """Return when each message sounds, seconds of the recording.
 
         By the stamps in the messages where they lie among the pictures, else by when they were received.
         """
@@ -156,8 +157,9 @@ class SoundTopic:
             stamps.append(stamp_of(message) if getattr(message, "header", None) is not None else float("nan"))
         by_stamp = self.clock.of_stamps(np.array(stamps))
         if len(stamps) and np.isfinite(by_stamp).all() and self.clock.overlaps(by_stamp):
-            return by_stamp, ()
-        return self.clock.of_received(np.array(received) * 1e-9), self.clock.notices(self.name)
+            return by_stamp
+        self.clock.note_apart(self.name)
+        return self.clock.of_received(np.array(received) * 1e-9)
 
 
 def silences(
@@ -183,21 +185,18 @@ def silences(
     return float(behind_s[0]), silence_s
 
 
-def _gap_notice(topic: str, start_s: float, lengths_s: np.ndarray, silence_s: np.ndarray) -> tuple[str, ...]:
+def _note_gaps(topic: str, start_s: float, lengths_s: np.ndarray, silence_s: np.ndarray) -> None:
     gaps = np.flatnonzero(silence_s)
-    if len(gaps) == 0:
-        return ()
-    first = int(gaps[0])
-    at_s = start_s + float(lengths_s[:first].sum())
-    return (
-        f"{len(gaps)} gap(s) in the sound of {topic}, {silence_s.sum():.4g} s together (the first of "
-        f"{silence_s[first]:.3g} s at {at_s:.2f} s), are filled with silence: its messages are missing there.",
-    )
+    if len(gaps):
+        first = int(gaps[0])
+        at_s = start_s + float(lengths_s[:first].sum())
+        note(
+            f"{len(gaps)} gap(s) in the sound of {topic}, {silence_s.sum():.4g} s together (the first of "
+            f"{silence_s[first]:.3g} s at {at_s:.2f} s), are filled with silence: its messages are missing there."
+        )
 
 
-def extract_audio(
-    sound: SoundTopic, info: Any, folder: Path, pcm: Pcm | None = None
-) -> tuple[AudioTrack | None, tuple[str, ...]]:
+def extract_audio(sound: SoundTopic, info: Any, folder: Path, pcm: Pcm | None = None) -> AudioTrack | None:
     """Write audio messages into a file: samples as FLAC, a compressed stream (MP3 is the package's default) as it is.
 
     Where messages are missing the file is silent, so that what follows is still in time.
@@ -209,24 +208,26 @@ def extract_audio(
         pcm: says that the messages are plain 16-bit samples, against AudioInfo if need be.
 
     Returns:
-        The track, or None with a sentence that says why there is none; and the notices.
+        The track, or None where there is none, and why is noted.
     """
     first = next(iter(sound.messages()), None)
     if first is None:
-        return None, (f"The sound topic {sound.name} has no message.",)
-    times_s, notices = sound.times_s()
+        note(f"The sound topic {sound.name} has no message.")
+        return None
+    times_s = sound.times_s()
     if getattr(first[1], "__msgtype__", "") == STAMPED:
-        return _sampled(lambda: sampled_pieces(_messages(sound), sound.name), sound.name, folder, times_s, notices)
+        return _sampled(lambda: sampled_pieces(_messages(sound), sound.name), sound.name, folder, times_s)
     coding = (getattr(info, "coding_format", "") or "").lower()
     if pcm is None and coding in _PCM:
         sample_format = getattr(info, "sample_format", "") or "S16LE"
         if sample_format.upper() != "S16LE":
-            return None, (f"The sound on {sound.name} is {sample_format}; of plain samples only S16LE is read.",)
+            note(f"The sound on {sound.name} is {sample_format}; of plain samples only S16LE is read.")
+            return None
         pcm = Pcm.check_rate(int(info.sample_rate), int(info.channels), f"The AudioInfo of {sound.name}")
     if pcm is not None:
-        return _sampled(lambda: _plain(_messages(sound), pcm), sound.name, folder, times_s, notices)
+        return _sampled(lambda: _plain(_messages(sound), pcm), sound.name, folder, times_s)
     suffix = _coding_of(sound, _content(first[1]), coding, times_s)
-    return _compressed(sound, suffix, folder, times_s, notices)
+    return _compressed(sound, suffix, folder, times_s)
 
 
 def _messages(sound: SoundTopic) -> Iterator[Any]:
@@ -234,44 +235,35 @@ def _messages(sound: SoundTopic) -> Iterator[Any]:
 
 
 def _sampled(
-    pieces: Callable[[], Iterator[tuple[Pcm, np.ndarray]]],
-    topic: str,
-    folder: Path,
-    times_s: Float[np.ndarray, " n"],
-    notices: tuple[str, ...],
-) -> tuple[AudioTrack, tuple[str, ...]]:
+    pieces: Callable[[], Iterator[tuple[Pcm, np.ndarray]]], topic: str, folder: Path, times_s: Float[np.ndarray, " n"]
+) -> AudioTrack:
     """Write messages of samples, with silence where some are missing."""
-    import soundfile
-
     measured = [(len(samples), pcm) for pcm, samples in pieces()]
-    lengths_s = np.array([count / pcm.rate_hz for count, pcm in measured])
-    require_pace(topic, measured[0][1], lengths_s, times_s)
+    pcm, lengths_s = measured[0][1], np.array([count / pcm.rate_hz for count, pcm in measured])
+    require_pace(topic, pcm, lengths_s, times_s)
     start_s, silence_s = silences(times_s, lengths_s)
-    target = folder / "audio.flac"
-    every = pieces()
-    pcm, samples = next(every)
-    try:
-        with soundfile.SoundFile(target, "w", pcm.rate_hz, min(pcm.channels, _FLAC_CHANNELS), "PCM_16") as stream:
-            stream.write(samples)
-            for number, (other, more) in enumerate(every, start=1):
-                if other != pcm:
-                    raise RecordingError(
-                        f"The sound on {topic} changes from {pcm.rate_hz} to {other.rate_hz} samples a second, or from "
-                        f"{pcm.channels} to {other.channels} channel(s); give one file instead "
-                        f"({option('audio', 'FILE')})."
-                    )
-                _write_silence(stream, round(silence_s[number] * pcm.rate_hz))
-                stream.write(more)
-    except (soundfile.SoundFileError, AssertionError) as error:  # it asserts that all samples were taken
-        raise _cannot_write(topic, target, error) from None
+    target, channels = folder / "audio.flac", min(pcm.channels, _FLAC_CHANNELS)
+
+    def blocks() -> Iterator[np.ndarray]:
+        for missing_s, (own, samples) in zip(silence_s.tolist(), pieces(), strict=True):
+            if own != pcm:
+                raise RecordingError(
+                    f"The sound on {topic} changes from {pcm.rate_hz} to {own.rate_hz} samples a second, or from "
+                    f"{pcm.channels} to {own.channels} channel(s); give one file instead ({option('audio', 'FILE')})."
+                )
+            yield from _silence(round(missing_s * pcm.rate_hz), channels)
+            yield samples
+
+    with _room_for(topic, folder):
+        write_samples(target, blocks(), pcm.rate_hz, channels)
     track = AudioTrack.open(target, start_s=start_s, label=topic)
     if pcm.channels > 1 and track.channel is None:
-        notices = (
-            *notices,
+        note(
             f"The sound of {topic} has {pcm.channels} channels, of which the mean is heard; where their microphones "
-            f"are ({option('microphones', 'FILE')}) would show where sounds come from.",
+            f"are ({option('microphones', 'FILE')}) would show where sounds come from."
         )
-    return track, (*notices, *_gap_notice(topic, start_s, lengths_s, silence_s))
+    _note_gaps(topic, start_s, lengths_s, silence_s)
+    return track
 
 
 def require_pace(topic: str, said: Pcm, lengths_s: Float[np.ndarray, " n"], times_s: Float[np.ndarray, " n"]) -> None:
@@ -310,79 +302,66 @@ def _fits(total: float) -> str:
     return f"They hold {total:,.0f} samples of 16 bits a second in all channels{named}."
 
 
-def _write_silence(stream: Any, count: int) -> None:
-    while count > 0:
-        block = np.zeros((min(count, _SILENT_BLOCK), stream.channels), np.int16)
-        stream.write(block)
-        count -= len(block)
+@contextmanager
+def _room_for(topic: str, folder: Path) -> Generator[None]:
+    try:
+        yield
+    except (AudioError, OSError) as error:
+        reason = str(error).strip().rstrip(".") or "no room"
+        raise AudioError(
+            f"The sound of {topic} cannot be written to {folder} ({reason}); make room there, choose another folder "
+            f"for temporary files (TMPDIR), or leave the sound out ({option('topics', 'audio=none')})."
+        ) from None
 
 
-def _cannot_write(topic: str, target: Path, error: Exception) -> AudioError:
-    reason = str(error).strip().rstrip(".") or "no room"
-    return AudioError(
-        f"The sound of {topic} cannot be written to {target.parent} ({reason}); make room there, choose another folder "
-        f"for temporary files (TMPDIR), or leave the sound out ({option('topics', 'audio=none')})."
-    )
+def _silence(count: int, channels: int) -> Iterator[np.ndarray]:
+    for at in range(0, count, _SILENT_BLOCK):
+        yield np.zeros((min(_SILENT_BLOCK, count - at), channels), np.float32)
 
 
-def _compressed(
-    sound: SoundTopic, suffix: str, folder: Path, times_s: Float[np.ndarray, " n"], notices: tuple[str, ...]
-) -> tuple[AudioTrack, tuple[str, ...]]:
+def _compressed(sound: SoundTopic, suffix: str, folder: Path, times_s: Float[np.ndarray, " n"]) -> AudioTrack:
     """Write a compressed stream; where messages are missing it is cut, and each part decoded to its own place."""
     interval_s = np.diff(times_s)
     usual_s = float(np.median(interval_s)) if len(interval_s) else 0.0
     cuts = np.flatnonzero(interval_s > max(COMPRESSED_GAP_S, 5.0 * usual_s)) + 1
-    parts = [folder / f"part-{number}.{suffix}" for number in range(len(cuts) + 1)]
-    edges = [*cuts.tolist(), len(times_s)]
+    if len(cuts) and suffix != "mp3":  # other codings have a head that the later parts lack
+        raise RecordingError(
+            f"{len(cuts)} gap(s) in the sound of {sound.name} leave out {float(interval_s[cuts - 1].sum()):.3g} s, and "
+            f"{suffix} cannot be cut there, so that the rest would sound too early. {_otherwise()}"
+        )
+    edges = [0, *cuts.tolist(), len(times_s)]
+    parts = [folder / f"part-{number}.{suffix}" for number in range(len(edges) - 1)]
     every = _messages(sound)
-    try:
-        done = 0
-        for part, edge in zip(parts, edges, strict=True):
+    with _room_for(sound.name, folder):
+        for part, (begin, end) in zip(parts, pairwise(edges), strict=True):
             with part.open("wb") as stream:
-                for message in islice(every, edge - done):
-                    stream.write(_content(message))
-            done = edge
-    except OSError as error:
-        raise _cannot_write(sound.name, parts[0], error) from None
-    begins = [0, *cuts.tolist()]
-    start_s = float(times_s[0])
-    if len(parts) == 1:
-        track = AudioTrack.open(parts[0], start_s=start_s, label=sound.name)
+                stream.writelines(_content(message) for message in islice(every, end - begin))
+    tracks = [
+        AudioTrack.open(part, start_s=float(times_s[at]), label=sound.name)
+        for part, at in zip(parts, edges[:-1], strict=True)
+    ]
+    first = tracks[0]
+    if len(tracks) == 1:
         came_s = float(np.ptp(times_s)) + usual_s
-        if len(times_s) >= _FEWEST_MESSAGES and came_s >= _SHORTEST_S and track.duration_s > _AGREES * came_s:
+        if len(times_s) >= _FEWEST_MESSAGES and came_s >= _SHORTEST_S and first.duration_s > _AGREES * came_s:
             raise RecordingError(
                 f"The sound of {sound.name} does not agree with itself: its {len(times_s)} messages came within "
-                f"{came_s:.1f} s, and as {suffix} they last {track.duration_s:.1f} s. {_otherwise()}"
+                f"{came_s:.1f} s, and as {suffix} they last {first.duration_s:.1f} s. {_otherwise()}"
             )
-        return track, notices
-    if suffix != "mp3":  # other codings have a head that the later parts lack
-        whole_s = float(interval_s[cuts - 1].sum())
-        raise RecordingError(
-            f"{len(cuts)} gap(s) in the sound of {sound.name} leave out {whole_s:.3g} s, and {suffix} cannot be cut "
-            f"there, so that the rest would sound too early. {_otherwise()}"
-        )
-    tracks = [AudioTrack.open(part, start_s=float(times_s[at])) for part, at in zip(parts, begins, strict=True)]
-    return _joined(tracks, sound.name, folder, notices)
-
-
-def _joined(
-    tracks: list[AudioTrack], topic: str, folder: Path, notices: tuple[str, ...]
-) -> tuple[AudioTrack, tuple[str, ...]]:
-    target = folder / "audio.flac"
-    rate_hz, start_s = tracks[0].rate_hz, tracks[0].start_s
+        return first
     silence_s = np.array([0.0, *(max(b.start_s - a.end_s, 0.0) for a, b in pairwise(tracks))])
 
-    def blocks() -> Iterator[Sound]:
-        for track, gap_s in zip(tracks, silence_s.tolist(), strict=True):
-            for at in range(0, round(gap_s * rate_hz), _SILENT_BLOCK):
-                count = min(_SILENT_BLOCK, round(gap_s * rate_hz) - at)
-                yield Sound(np.zeros(count, np.float32), rate_hz)
-            yield from track.blocks()
+    def blocks() -> Iterator[np.ndarray]:
+        for track, missing_s in zip(tracks, silence_s.tolist(), strict=True):
+            yield from _silence(round(missing_s * first.rate_hz), 1)
+            yield from (block.samples[:, None] for block in track.blocks())
 
-    write_flac(target, blocks())
+    with _room_for(sound.name, folder):
+        write_samples(folder / "audio.flac", blocks(), first.rate_hz, 1)
+    joined = AudioTrack.open(folder / "audio.flac", start_s=first.start_s, label=sound.name)
     lengths_s = np.array([track.duration_s for track in tracks])
-    track = AudioTrack.open(target, start_s=start_s, label=topic)
-    return track, (*notices, *_gap_notice(topic, start_s, lengths_s, silence_s))
+    _note_gaps(sound.name, first.start_s, lengths_s, silence_s)
+    return joined
 
 
 def _coding_of(sound: SoundTopic, beginning: bytes, said: str, times_s: Float[np.ndarray, " n"]) -> str:
@@ -418,7 +397,8 @@ def _plain(messages: Iterable[Any], pcm: Pcm) -> Iterator[tuple[Pcm, np.ndarray]
     for message in messages:
         content = rest + _content(message)
         whole = len(content) // (2 * pcm.channels) * 2 * pcm.channels
-        yield pcm, np.frombuffer(content[:whole], "<i2").reshape(-1, pcm.channels)[:, :_FLAC_CHANNELS]
+        samples = np.frombuffer(content[:whole], "<i2").reshape(-1, pcm.channels)[:, :_FLAC_CHANNELS]
+        yield pcm, samples.astype(np.float32) / np.float32(1 << 15)
         rest = content[whole:]
 
 
@@ -440,10 +420,8 @@ def sampled_pieces(messages: Iterable[Any], topic: str) -> Iterator[tuple[Pcm, n
         yield pcm, np.clip(np.nan_to_num((whole - middle) / scale), -1.0, 1.0)
 
 
-def directions_of(
-    topic: str, messages: Callable[[], Iterator[tuple[int, Any]]], clock: PictureClock
-) -> tuple[DirectionTrack, tuple[str, ...]]:
-    """Return the directions on a topic, and notices.
+def directions_of(topic: str, messages: Callable[[], Iterator[tuple[int, Any]]], clock: PictureClock) -> DirectionTrack:
+    """Return the directions on a topic.
 
     Whole numbers are degrees, since whole radians are no angles; so are floats beyond a turn. A pose's yaw is its
     azimuth, or, where it is not turned, the direction to its position.
@@ -471,16 +449,13 @@ def directions_of(
     order = np.argsort(at_s, kind="stable")
     at_s, azimuth = at_s[order], azimuth[order]
     used = np.isfinite(azimuth) & np.append(np.diff(at_s) > 0.0, True)
-    notices: list[str] = []
     if not used.all():
-        notices.append(
-            f"{int((~used).sum())} of {len(used)} directions of {topic} are no numbers, or came at one moment."
-        )
+        note(f"{int((~used).sum())} of {len(used)} directions of {topic} are no numbers, or came at one moment.")
     at_s, azimuth = at_s[used], azimuth[used]
     if whole or np.abs(azimuth).max(initial=0.0) > BEYOND_A_TURN_RAD:
         azimuth = np.deg2rad(azimuth)
-        notices.append(f"The directions of {topic} are taken as degrees.")
-    return DirectionTrack.of(at_s, np.angle(np.exp(1j * azimuth))), tuple(notices)
+        note(f"The directions of {topic} are taken as degrees.")
+    return DirectionTrack.of(at_s, np.angle(np.exp(1j * azimuth)))
 
 
 def angle_of(message: Any) -> tuple[float, bool]:

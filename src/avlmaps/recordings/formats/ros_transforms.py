@@ -15,7 +15,6 @@ from jaxtyping import Bool, Float
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import inverse
 from avlmaps.core.timeline import Trajectory, in_order
-from avlmaps.recordings.faults import stop_at_first
 from avlmaps.recordings.formats.bags import Bag
 from avlmaps.recordings.formats.ros_messages import pose_of, stamp_of
 from avlmaps.recordings.formats.tables import POSE, read_table, rigid
@@ -196,11 +195,7 @@ class TransformTree:
         return reached
 
 
-_POSE_TYPES = (
-    "nav_msgs/msg/Odometry",
-    "geometry_msgs/msg/PoseWithCovarianceStamped",
-    "geometry_msgs/msg/PoseStamped",
-)
+_POSE_TYPES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs/msg/PoseStamped")
 _TRANSFORM_TYPE = "geometry_msgs/msg/TransformStamped"
 # What a robot calls its base (REP 105, REP 120).
 _BASES = ("base_footprint", "base_link")
@@ -347,7 +342,7 @@ def _tree_of_file(file: Path, camera_frame: str) -> TransformTree:
     Its columns are stamp tx ty tz qx qy qz qw, as TUM writes them, or what its header says.
     """
     tree = TransformTree()
-    rows = read_table(file, (8,), stop_at_first, names=POSE).values
+    rows = read_table(file, (8,), names=POSE).values
     for stamp_s, pose in zip(rows[:, 0].tolist(), rigid(rows[:, 1:4], rows[:, 4:]), strict=True):
         tree.add("world", camera_frame, pose, stamp_s, static=False)
     if not tree.moves(camera_frame):

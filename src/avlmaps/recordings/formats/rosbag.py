@@ -7,26 +7,25 @@ root (``map``, ``odom``), which by ROS's own convention (REP 103) has z up. Wher
 clouds of a LiDAR are projected into the colour camera.
 """
 
-import hashlib
 import shutil
 import tempfile
 import weakref
-from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from avlmaps.core.camera import Rig
+from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import apply, inverse
-from avlmaps.core.timeline import associate, gap_notices, in_order
+from avlmaps.core.timeline import associate, in_order
 from avlmaps.core.wording import option
 from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.faults import note
 from avlmaps.recordings.formats.bags import Bag
-from avlmaps.recordings.formats.file_recording import add_files, stamp_of
+from avlmaps.recordings.formats.file_recording import Shots, StoredRecording, opener
 from avlmaps.recordings.formats.ros_messages import (
     CLOUD_TYPES,
     PAIRING_TOLERANCE_S,
@@ -54,8 +53,7 @@ from avlmaps.recordings.formats.ros_sound import (
     extract_audio,
 )
 from avlmaps.recordings.formats.ros_transforms import TransformTree, base_height, find_motion, is_tf, no_pose, read_tf
-from avlmaps.recordings.plausible import plausible_walk, repeat_fault
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.plausible import repeat_fault
 
 _IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO_TYPES = ("sensor_msgs/msg/CameraInfo",)
@@ -65,14 +63,15 @@ _AUDIO_TYPES = ("audio_common_msgs/msg/AudioData", "audio_common_msgs/msg/AudioD
 CLOUD_TOLERANCE_S = 0.06
 
 
-def open_rosbag(path: Path, topics: Mapping[str, str] | None = None, more: Sequence[Path] = ()) -> "RosbagRecording":
+@opener
+def open_rosbag(path: Path, topics: Mapping[str, str] | None = None, more: Sequence[Path] = ()) -> StoredRecording:
     """Open a ROS 1 ``.bag``, a ROS 2 bag's folder, an ``.mcap`` or a ``.db3`` file, or the files of one walk."""
     known = [f.name for f in fields(RosTopics)]
     for name in topics or {}:
         if name not in known:
             raise RecordingError(f"There is no {name!r} among the topics that can be named: {', '.join(known)}.")
     try:
-        return RosbagRecording(Path(path), RosTopics(**(topics or {})), more)
+        return _opened(Bag(Path(path), more), RosTopics(**(topics or {})))
     except AttributeError as error:
         raise RecordingError(
             f"A message of {path} lacks a field ({error}); the bag's definition of it is damaged, or of another "
@@ -80,163 +79,147 @@ def open_rosbag(path: Path, topics: Mapping[str, str] | None = None, more: Seque
         ) from error
 
 
-class RosbagRecording(Recording):
-    """See the module's docstring."""
+@dataclass(eq=False)
+class _Pictures:
+    """Pictures of a bag by their numbers: when each message was received (ns), its stamp (s), and points in cameras."""
 
-    format = "rosbag"
+    bag: Bag
+    of_rgb: tuple[str, np.ndarray, np.ndarray]
+    of_depth: tuple[str, np.ndarray, np.ndarray]
+    camera_from_cloud: np.ndarray | None = None
 
-    def __init__(self, path: Path, topics: RosTopics, more: Sequence[Path] = ()) -> None:
-        self.path = path
-        self._bag = Bag(path, more)
-        self._rgb_topic, self._depth_topic = _image_topics(self._bag, topics)
-        self._of_points = self._depth_topic in self._bag.topics_of(CLOUD_TYPES)
-        named_tf = topics.pose if topics.pose and is_tf(self._bag, topics.pose) else ""
-        transforms, tf_topic = read_tf(self._bag, self._rgb_topic, named_tf)
-        mounts = transforms.mounts()
-        self.rig, rig_notices, camera_frame = _read_rig(self._bag, self._rgb_topic, self._depth_topic, mounts)
-        rgb_s, rgb_ns = _stamps(self._bag, self._rgb_topic)
-        depth_s, depth_ns = _stamps(self._bag, self._depth_topic)
-        what = "point clouds" if self._of_points else "depth images"
-        rgb_order, depth_order = in_order(rgb_s, "colour images"), in_order(depth_s, what)
-        rgb, depth = rgb_order.index, depth_order.index
-        tolerance_s = CLOUD_TOLERANCE_S if self._of_points else PAIRING_TOLERANCE_S
-        a, b = associate(depth_s[depth], rgb_s[rgb], tolerance_s)
-        others = () if topics.depth else _other_cameras(self._bag, self._rgb_topic, self._depth_topic)
-        notices = [*self._bag.notices, *others, *rig_notices, *rgb_order.notices, *depth_order.notices]
-        if len(a) < len(depth):
-            lost, within = len(depth) - len(a), f"{1000 * tolerance_s:.0f} ms"
-            notices.append(f"{lost} of {len(depth)} {what} have no colour image within {within}.")
-        stamps_s = rgb_s[rgb][b] if self._of_points else depth_s[depth][a]
-        motion = find_motion(self._bag, topics.pose, camera_frame, transforms, tf_topic, topics.directions)
-        tree = motion.tree
-        self.topics = {"rgb": self._rgb_topic, "depth": self._depth_topic, "pose": motion.topic}
-        if cycle := tree.cycle(camera_frame):
+    def colour(self, name: str, camera: Pinhole) -> np.ndarray:
+        return self._fitting(colour_of, self.of_rgb, name, camera)
+
+    def depth(self, name: str, camera: Pinhole) -> np.ndarray:
+        moved = self.camera_from_cloud
+        if moved is None:
+            return self._fitting(depth_of, self.of_depth, name, camera)
+
+        def seen(message: Any, what: str, camera: Pinhole) -> np.ndarray:
+            return depth_of_points(apply(moved[int(name)], points_of(message, what)), camera)
+
+        return self._fitting(seen, self.of_depth, name, camera)
+
+    def _fitting(
+        self,
+        decode: Callable[[Any, str, Pinhole], np.ndarray],
+        of: tuple[str, np.ndarray, np.ndarray],
+        name: str,
+        camera: Pinhole,
+    ) -> np.ndarray:
+        topic, received_ns, stamp_s = of[0], int(of[1][int(name)]), float(of[2][int(name)])
+        with self.bag.readable(topic):
+            what = f"{topic} at {stamp_s:.3f} s"
+            picture = decode(self.bag.message_at(topic, received_ns, stamp_s), what, camera)
+        if picture.shape[:2] != (camera.height, camera.width):
             raise RecordingError(
-                f"The transforms of {path} go round in a circle ({cycle}), so that the camera {camera_frame!r} is "
-                "nowhere; record /tf with one parent for each frame, or name odometry (pose=/odom)."
+                f"The picture {what} is {picture.shape[1]}x{picture.shape[0]}; "
+                f"its calibration says {camera.width}x{camera.height}."
             )
-        poses, known = tree.root_from(camera_frame, stamps_s)
-        if not known.any():
-            raise RecordingError(no_pose(path, camera_frame, stamps_s, tree))
-        if self._of_points:
-            self._camera_from_cloud, seen = _clouds_in_cameras(
-                self._bag, self._depth_topic, camera_frame, tree, depth_s[depth][a], poses
-            )
-            known &= seen
-        if not known.all():
-            notices.append(
-                f"{int((~known).sum())} of {len(known)} frames lie outside of the known poses and are left out."
-            )
-        self.posed = float(known.mean()) * min(len(rgb) / len(rgb_s), len(depth) / len(depth_s))
-        rows = np.flatnonzero(known)
-        walk = plausible_walk(stamps_s[rows], poses[rows, :3, 3], [f"{i:06d}" for i in range(len(rows))])
-        if walk.fault:
-            raise RecordingError(f"{path}: {walk.fault}")
-        rows = rows[walk.index]
-        notices += [*motion.notices, *tree.notices, *walk.notices]
-        if self._of_points:
-            self._camera_from_cloud = self._camera_from_cloud[rows]
-        self.begins_s = float(stamps_s[rows[0]])
-        self.stamps_s = stamps_s[rows] - self.begins_s
-        self.world_from_camera = poses[rows]
-        self._rgb_at = [(int(rgb_ns[rgb[i]]), float(rgb_s[rgb[i]])) for i in b[rows]]
-        self._depth_at = [(int(depth_ns[depth[i]]), float(depth_s[depth[i]])) for i in a[rows]]
-        self.up_in_world = np.array([0.0, 0.0, 1.0]) if motion.z_is_up else None
-        self.base_height = base_height(tree, camera_frame, float(stamps_s[rows[0]]))
-        clock = PictureClock.of(depth_ns[depth][a][rows], stamps_s[rows], self.begins_s)
-        self.audio, audio_notices = self._read_audio(topics, clock)
-        if topics.directions:
-            self.audio, said = self._with_directions(topics.directions, clock)
-            audio_notices = (*audio_notices, *said)
-        self.notices = (*notices, *gap_notices(self.stamps_s, "frames"), *audio_notices)
+        return picture
 
-    def frame(self, index: int) -> Frame:
-        """Read one frame."""
-        received_ns, stamp_s = self._rgb_at[index]
-        name = f"{self._rgb_topic} at {stamp_s:.3f} s"
-        with self._bag.readable(self._rgb_topic):
-            rgb = colour_of(self._bag.message_at(self._rgb_topic, received_ns, stamp_s), name, self.rig.rgb)
-        received_ns, stamp_s = self._depth_at[index]
-        name = f"{self._depth_topic} at {stamp_s:.3f} s"
-        with self._bag.readable(self._depth_topic):
-            message = self._bag.message_at(self._depth_topic, received_ns, stamp_s)
-            if self._of_points:
-                points = apply(self._camera_from_cloud[index], points_of(message, name))
-                depth_m = depth_of_points(points, self.rig.depth)
-            else:
-                depth_m = depth_of(message, name, self.rig.depth)
-        for picture, camera in ((rgb, self.rig.rgb), (depth_m, self.rig.depth)):
-            if picture.shape[:2] != (camera.height, camera.width):
-                raise RecordingError(
-                    f"The picture {name} is {picture.shape[1]}x{picture.shape[0]}; "
-                    f"its calibration says {camera.width}x{camera.height}."
-                )
-        return Frame(
-            index, f"{index:06d}", float(self.stamps_s[index]), rgb, depth_m, self.world_from_camera[index], self.rig
+
+def _opened(bag: Bag, topics: RosTopics) -> StoredRecording:
+    rgb_topic, depth_topic = _image_topics(bag, topics)
+    of_points = depth_topic in bag.topics_of(CLOUD_TYPES)
+    transforms, tf_topic = read_tf(bag, rgb_topic, topics.pose if is_tf(bag, topics.pose) else "")
+    rig, camera_frame = _read_rig(bag, rgb_topic, depth_topic, transforms.mounts())
+    (rgb_s, rgb_ns), (depth_s, depth_ns) = _stamps(bag, rgb_topic), _stamps(bag, depth_topic)
+    what = "point clouds" if of_points else "depth images"
+    rgb_order, depth_order = in_order(rgb_s, "colour images"), in_order(depth_s, what)
+    rgb, depth = rgb_order.index, depth_order.index
+    tolerance_s = CLOUD_TOLERANCE_S if of_points else PAIRING_TOLERANCE_S
+    a, b = associate(depth_s[depth], rgb_s[rgb], tolerance_s)
+    posed = min(len(rgb) / len(rgb_s), len(depth) / len(depth_s))
+    if not topics.depth:
+        _note_other_cameras(bag, rgb_topic, depth_topic)
+    note(*bag.notices, *rgb_order.notices, *depth_order.notices)
+    if len(a) < len(depth):
+        lost, within = len(depth) - len(a), f"{1000 * tolerance_s:.0f} ms"
+        note(f"{lost} of {len(depth)} {what} have no colour image within {within}.")
+    rgb, depth = rgb[b], depth[a]
+    stamps_s = rgb_s[rgb] if of_points else depth_s[depth]
+    motion = find_motion(bag, topics.pose, camera_frame, transforms, tf_topic, topics.directions)
+    tree = motion.tree
+    if cycle := tree.cycle(camera_frame):
+        raise RecordingError(
+            f"The transforms of {bag.path} go round in a circle ({cycle}), so that the camera {camera_frame!r} is "
+            "nowhere; record /tf with one parent for each frame, or name odometry (pose=/odom)."
         )
+    poses, known = tree.root_from(camera_frame, stamps_s)
+    if not known.any():
+        raise RecordingError(no_pose(bag.path, camera_frame, stamps_s, tree))
+    camera_from_cloud = None
+    if of_points:
+        camera_from_cloud, seen = _clouds_in_cameras(bag, depth_topic, camera_frame, tree, depth_s[depth], poses)
+        known &= seen
+    if not known.all():
+        note(f"{int((~known).sum())} of {len(known)} frames lie outside of the known poses and are left out.")
+    rows = np.flatnonzero(known)
+    rgb, depth, stamps_s = rgb[rows], depth[rows], stamps_s[rows]
+    begins_s = float(stamps_s[0])
+    pictures = _Pictures(
+        bag,
+        (rgb_topic, rgb_ns[rgb], rgb_s[rgb]),
+        (depth_topic, depth_ns[depth], depth_s[depth]),
+        None if camera_from_cloud is None else camera_from_cloud[rows],
+    )
+    names = [f"{number:06d}" for number in range(len(rows))]
+    shots = Shots(names, names, names, stamps_s - begins_s, poses[rows])
+    used = {"rgb": rgb_topic, "depth": depth_topic, "pose": motion.topic}
+    note(*motion.notices, *tree.notices)
+    audio = _sound(bag, topics, PictureClock.of(depth_ns[depth], stamps_s, begins_s), pictures, used)
+    return StoredRecording.settled(
+        bag.path, "rosbag", rig, shots, None,
+        pictures=pictures, stored_depth_unit_m=_unit_m(bag.first(depth_topic), of_points), topics=used, audio=audio,
+        files=[file for given in bag.files for file in (sorted(given.rglob("*")) if given.is_dir() else [given])
+               if file.is_file()],
+        up_in_world=np.array([0.0, 0.0, 1.0]) if motion.z_is_up else None, begins_s=begins_s,
+        base_height=base_height(tree, camera_frame, begins_s), posed=posed * float(known.mean()),
+    )  # fmt: skip
 
-    @cached_property
-    def fingerprint(self) -> str:
-        """See ``Recording.fingerprint``."""
-        digest = hashlib.sha256()
-        for file in self._files():
-            add_files(digest, file.parent, [file.name])
-        digest.update(self.stamps_s.tobytes() + self.world_from_camera.tobytes() + repr(self.rig).encode())
-        return digest.hexdigest()
 
-    @property
-    def stored_depth_unit_m(self) -> float:
-        """Metres of one unit of the depth messages: 1 for floats, which are metres (REP 118), else a millimetre."""
-        if self._of_points:
-            return 1.0
-        received_ns, stamp_s = self._depth_at[0]
-        message = self._bag.message_at(self._depth_topic, received_ns, stamp_s)
-        encoding = getattr(message, "encoding", None) or getattr(message, "format", "")
-        return 1.0 if encoding.startswith("32F") else 1.0 / self.depth_units_per_m
+def _unit_m(message: Any, of_points: bool) -> float:
+    """Return the metres of one unit of depth: 1 for floats, which are metres (REP 118), else a millimetre."""
+    encoding = getattr(message, "encoding", None) or getattr(message, "format", "")
+    return 1.0 if of_points or encoding.startswith("32F") else 1e-3
 
-    def change_stamp(self) -> str:
-        """See ``Recording.change_stamp``."""
-        return stamp_of(self.path.parent, (), self._files())
 
-    def _files(self) -> list[Path]:
-        inside = (sorted(file.rglob("*")) if file.is_dir() else [file] for file in self._bag.files)
-        return [file for files in inside for file in files if file.is_file()]
-
-    def _read_audio(self, topics: RosTopics, clock: PictureClock) -> tuple[AudioTrack | None, tuple[str, ...]]:
-        pcm = Pcm.parse_rate(topics.audio_pcm) if topics.audio_pcm else None
-        known = self._bag.topics_of(_AUDIO_TYPES)
-        found = [topics.audio] if topics.audio else known
-        if not found or topics.audio == "none":
-            return None, ()
-        if found[0] not in known:
-            has = ", ".join(known) or "none"
-            raise RecordingError(f"{self.path} has no sound topic {found[0]!r} (it has: {has}); name one of them.")
-        self.topics = {**self.topics, "audio": found[0]}
-        # The bag's sound goes to a file of its own for as long as this recording is open: a track is read by pieces.
+def _sound(bag: Bag, topics: RosTopics, clock: PictureClock, owner: object, used: dict[str, str]) -> AudioTrack | None:
+    """Return the sound with the directions on a topic; ``used`` gets their topics."""
+    pcm = Pcm.parse_rate(topics.audio_pcm) if topics.audio_pcm else None
+    known = bag.topics_of(_AUDIO_TYPES)
+    name = topics.audio or next(iter(known), "none")
+    audio: AudioTrack | None = None
+    if name != "none":
+        _require_topic(bag, name, known, "sound topic", "")
+        used["audio"] = name
+        # The sound goes to a file of its own for as long as the recording is open: a track is read by pieces.
         folder = Path(tempfile.mkdtemp(prefix="avlmaps-rosbag-"))
-        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-        infos = self._bag.topics_of(_AUDIO_INFO_TYPES)
-        info = next((message for topic in infos for _, message in self._bag.messages(topic)), None)
-        sound = SoundTopic(found[0], lambda: self._bag.messages(found[0]), clock)
-        return extract_audio(sound, info, folder, pcm)
+        weakref.finalize(owner, shutil.rmtree, folder, ignore_errors=True)
+        infos = bag.topics_of(_AUDIO_INFO_TYPES)
+        info = next((message for topic in infos for _, message in bag.messages(topic)), None)
+        audio = extract_audio(SoundTopic(name, lambda: bag.messages(name), clock), info, folder, pcm)
+    if not (topic := topics.directions):
+        return audio
+    _require_topic(
+        bag, topic, bag.topics_of(DIRECTION_TYPES), "topic", " of directions (std_msgs numbers or PoseStamped)"
+    )
+    if audio is None:
+        raise RecordingError(
+            f"{bag.path} has no sound, so that the directions on {topic} are of nothing; leave them out."
+        )
+    found = directions_of(topic, lambda: bag.messages(topic), clock)
+    found.require_beside(audio.start_s, audio.end_s, f"{bag.path}, {topic}")
+    used["directions"] = topic
+    return replace(audio, directions=found)
 
-    def _with_directions(self, topic: str, clock: PictureClock) -> tuple[AudioTrack, tuple[str, ...]]:
-        """Return the track with the directions on a topic."""
-        known = self._bag.topics_of(DIRECTION_TYPES)
-        if topic not in known:
-            has = ", ".join(known) or "none"
-            raise RecordingError(
-                f"{self.path} has no topic {topic!r} of directions (std_msgs numbers or geometry_msgs/PoseStamped: "
-                f"{has}); name one of them."
-            )
-        if self.audio is None:
-            raise RecordingError(
-                f"{self.path} has no sound, so that the directions on {topic} are of nothing; leave them out."
-            )
-        found, notices = directions_of(topic, lambda: self._bag.messages(topic), clock)
-        found.require_beside(self.audio.start_s, self.audio.end_s, f"{self.path}, {topic}")
-        self.topics = {**self.topics, "directions": topic}
-        return replace(self.audio, directions=found), notices
+
+def _require_topic(bag: Bag, topic: str, known: Sequence[str], what: str, of: str) -> None:
+    if topic not in known:
+        has = ", ".join(known) or "none"
+        raise RecordingError(f"{bag.path} has no {what} {topic!r}{of} (it has: {has}); name one of them.")
 
 
 def _image_topics(bag: Bag, topics: RosTopics) -> tuple[str, str]:
@@ -265,29 +248,27 @@ def _other_topics(bag: Bag) -> str:
     return f" It holds messages of: {', '.join(types[:8])}{' ...' if len(types) > 8 else ''}."
 
 
-def _other_cameras(bag: Bag, rgb_topic: str, depth_topic: str) -> tuple[str, ...]:
+def _note_other_cameras(bag: Bag, rgb_topic: str, depth_topic: str) -> None:
     images = [topic for topic in bag.topics_of(_IMAGE_TYPES) if "depth" in topic.lower()]
     own = shared_namespace(rgb_topic, depth_topic)
     others = [topic for topic in images if shared_namespace(topic, depth_topic) < max(own, 1)]
-    if not others:
-        return ()
-    return (
-        f"Of several cameras that of {rgb_topic} and {depth_topic} is used; for another name both topics "
-        f"({option('topics', f'rgb=... depth={others[0]}')}).",
-    )
+    if others:
+        note(
+            f"Of several cameras that of {rgb_topic} and {depth_topic} is used; for another name both topics "
+            f"({option('topics', f'rgb=... depth={others[0]}')})."
+        )
 
 
-def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree) -> tuple[Rig, list[str], str]:
-    """Return the cameras, the notices about them, and the depth camera's frame; ``mounts`` links the two."""
+def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree) -> tuple[Rig, str]:
+    """Return the cameras, and the depth camera's frame; ``mounts`` links the two."""
     cameras: dict[str, Any] = {}
-    notices: list[str] = []
     frames: dict[str, str] = {}
     of_points = depth_topic in bag.topics_of(CLOUD_TYPES)
     for topic in (rgb_topic,) if of_points else (rgb_topic, depth_topic):
         info_topic = _info_topic(bag, topic)
         if not info_topic and topic == depth_topic:  # drivers that register depth often publish one calibration
             info_topic = _info_topic(bag, rgb_topic)
-            notices.append(f"{depth_topic} has no CameraInfo; that of {rgb_topic} is used, as for registered depth.")
+            note(f"{depth_topic} has no CameraInfo; that of {rgb_topic} is used, as for registered depth.")
         if not info_topic:
             has = ", ".join(bag.topics_of(_INFO_TYPES)) or "none"
             raise RecordingError(f"{bag.path} has no CameraInfo beside {topic} (it has: {has}); record it too.")
@@ -297,23 +278,21 @@ def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree)
         cameras[topic], distorted = camera_of(first, info_topic, is_rectified(topic))
         if distorted:
             remedy = "its P is empty" if is_rectified(topic) else "rectified images make a better map"
-            notices.append(f"{topic} has lens distortion, which a pinhole leaves out; {remedy}.")
+            note(f"{topic} has lens distortion, which a pinhole leaves out; {remedy}.")
         image = bag.first(topic)
         require_encoding(None if of_points and topic == depth_topic else image, topic, colour=topic == rgb_topic)
         if topic == rgb_topic and is_grey(image, topic):
-            notices.append(f"The pictures of {topic} have no colour (infrared, or grey); colours tell nothing apart.")
+            note(f"The pictures of {topic} have no colour (infrared, or grey); colours tell nothing apart.")
         frames[topic] = (image or first).header.frame_id
     if of_points:
         rgb = cameras[rgb_topic]
-        notices.append(f"Depth is that of the points of {depth_topic}, as the camera of {rgb_topic} sees them.")
-        return Rig(rgb, cloud_camera(rgb)), notices, frames[rgb_topic]
+        note(f"Depth is that of the points of {depth_topic}, as the camera of {rgb_topic} sees them.")
+        return Rig(rgb, cloud_camera(rgb)), frames[rgb_topic]
     rgb_from_depth = mounts.fixed(frames[rgb_topic], frames[depth_topic])
     if rgb_from_depth is None:
         rgb_from_depth = np.eye(4)
-        notices.append(
-            f"No static transform links {frames[rgb_topic]} and {frames[depth_topic]}; they are taken for one place."
-        )
-    return Rig(cameras[rgb_topic], cameras[depth_topic], rgb_from_depth), notices, frames[depth_topic]
+        note(f"No static transform links {frames[rgb_topic]} and {frames[depth_topic]}; they are taken for one place.")
+    return Rig(cameras[rgb_topic], cameras[depth_topic], rgb_from_depth), frames[depth_topic]
 
 
 def _info_topic(bag: Bag, image_topic: str) -> str:

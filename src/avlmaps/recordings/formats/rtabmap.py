@@ -14,7 +14,7 @@ import threading
 import zlib
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +25,9 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import SAMPLED_BYTES, checked_size
 from avlmaps.recordings import images
-from avlmaps.recordings.faults import Report, readable, stop_at_first
-from avlmaps.recordings.formats.file_recording import Shots, StoredRecording, left_out, settle
-from avlmaps.recordings.formats.tables import DISTORTED, fitted_rig, pinhole, resized_notice
+from avlmaps.recordings.faults import note, readable
+from avlmaps.recordings.formats.file_recording import Shots, StoredRecording, left_out, opener, settle
+from avlmaps.recordings.formats.tables import DISTORTED, fitted_rig, note_resized, pinhole
 
 _SQLITE = b"SQLite format 3\0"
 _RVL = b"DEPTHRVL"
@@ -127,7 +127,8 @@ class _Calibration:
     distorted: bool
 
 
-def open_rtabmap(path: Path, report: Report = stop_at_first) -> StoredRecording:
+@opener
+def open_rtabmap(path: Path) -> StoredRecording:
     """Open a database in place."""
     database = _Database(path)
     version = _version(database)
@@ -142,13 +143,13 @@ def open_rtabmap(path: Path, report: Report = stop_at_first) -> StoredRecording:
             f"{path} has {len(rows)} node(s), and none with colour, depth and calibration; record with "
             "Mem/BinDataKept true (and Mem/ImageKept), or export it again."
         )
-    notices = [_about_poses(optimised, len(whole))]
+    note(_about_poses(optimised, len(whole)))
     used = [row for row in whole if row[0] in optimised] if optimised else whole
     if not used:
         raise RecordingError(f"{path} has optimised poses for none of its {len(whole)} nodes with pictures.")
     if len(used) < len(rows):
         sentence = f"{len(rows) - len(used)} node(s) lack colour, depth, calibration or pose and are left out."
-        notices += left_out(path, report, sentence)
+        left_out(path, sentence)
     with database.told():
         seen = [_calibration(path, row[0], row[3], version) for row in used]
         base = np.stack([optimised[row[0]] if optimised else _transform(row[2] or b"") for row in used])
@@ -160,22 +161,15 @@ def open_rtabmap(path: Path, report: Report = stop_at_first) -> StoredRecording:
         world_from_camera=base @ np.stack([own.base_from_camera for own in seen]),
     )
     if seen[0].distorted:
-        notices.append(DISTORTED)
-    rig, unit_m, more = _rig(path, database, shots, seen[0].camera)
-    shots, settled = settle(path, shots, report, lambda _: path)
+        note(DISTORTED)
+    rig, unit_m = _rig(path, database, shots, seen[0].camera)
+    shots = settle(path, shots, lambda _: path)
     start_s = float(shots.stamps_s[0]) if len(shots.names) else 0.0
-    shots = Shots(shots.names, shots.colour, shots.depth, shots.stamps_s - start_s, shots.world_from_camera)
+    shots = replace(shots, stamps_s=shots.stamps_s - start_s)
     return StoredRecording(
-        path=path,
-        format="rtabmap",
-        rig=rig,
-        shots=shots,
-        pictures=_Pictures(database),
-        up_in_world=np.array([0.0, 0.0, 1.0]),
-        notices=(*notices, *more, *settled),
-        depth_unit_m=unit_m,
-        begins_s=start_s,
-    )
+        path=path, format="rtabmap", rig=rig, shots=shots, pictures=_Pictures(database),
+        up_in_world=np.array([0.0, 0.0, 1.0]), stored_depth_unit_m=unit_m, begins_s=start_s,
+    )  # fmt: skip
 
 
 def _about_poses(optimised: dict[int, np.ndarray], count: int) -> str:
@@ -270,11 +264,12 @@ def _pinhole(path: Path, node: int, numbers: Sequence[float], size: tuple[int, i
     return pinhole(path / f"node {node}, calibration", fx, fy, cx + 0.5, cy + 0.5, *size)
 
 
-def _rig(path: Path, database: _Database, shots: Shots, camera: Pinhole) -> tuple[Rig, float, tuple[str, ...]]:
+def _rig(path: Path, database: _Database, shots: Shots, camera: Pinhole) -> tuple[Rig, float]:
     first = shots.names[0]
     rgb_size = images.picture_size(path / f"node {first}, colour", database.blob("image", first))
     blob = database.blob("depth", first)
     height, width = _unpacked_depth(path / f"node {first}, depth", blob).shape
     rig = fitted_rig(camera, rgb_size, (width, height), path)
     floats = not blob.startswith(_RVL) and blob[25:26] == b"\x06"  # a PNG's colour type: four channels
-    return rig, 1.0 if floats else 1e-3, resized_notice(camera, rgb_size)
+    note_resized(camera, rgb_size)
+    return rig, 1.0 if floats else 1e-3

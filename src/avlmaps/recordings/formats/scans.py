@@ -37,6 +37,7 @@ import tempfile
 import weakref
 import zipfile
 import zlib
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, MANIFEST_BYTES, PICTURE_BYTES, SOUND_BYTES
 from avlmaps.recordings import images
 from avlmaps.recordings.corrections import UP_IN_WORLD, from_opengl
-from avlmaps.recordings.faults import Report, stop_at_first
+from avlmaps.recordings.faults import note
 from avlmaps.recordings.formats.file_recording import (
     FileRecording,
     Shots,
@@ -60,6 +61,7 @@ from avlmaps.recordings.formats.file_recording import (
     list_names,
     number_of,
     open_audio,
+    opener,
     sizes,
 )
 from avlmaps.recordings.formats.tables import (
@@ -67,14 +69,14 @@ from avlmaps.recordings.formats.tables import (
     fitted,
     fitted_rig,
     median_camera,
+    note_resized,
+    note_unread,
     parse_json,
     read_json,
     read_matrix,
     read_table,
-    resized_notice,
     rigid,
     text_lines,
-    unread_notice,
 )
 from avlmaps.recordings.images import COLOUR_SUFFIXES, VideoFrames, first_picture_size
 from avlmaps.recordings.plausible import pace_fault
@@ -82,6 +84,7 @@ from avlmaps.recordings.plausible import pace_fault
 DESCRIPTION = "transforms.json"
 # Pictures of a scan are chosen, not filmed; a second apart they satisfy every rule about speed.
 INTERVAL_S = 1.0
+_NO_CLOCK = "The scan has no clock; its frames are taken to be one second apart."
 _MILLIMETRE = 1e-3
 _PINHOLES = ("", "OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL")
 _DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
@@ -125,12 +128,14 @@ class _Transforms(_Camera, frozen=True, kw_only=True):
     applied_scale: float = 1.0
 
 
-def open_nerfstudio(path: Path, report: Report = stop_at_first) -> FileRecording:
+@opener
+def open_nerfstudio(path: Path) -> FileRecording:
     """Open a scan in place."""
     file = path / DESCRIPTION
     given, plain = read_json(file, _Transforms)
     known = {name for kind in (_Transforms, _Camera) for name in kind.__struct_fields__}
-    notices = [*unread_notice(file, plain, (*known, *_IDLE)), *_unread_of_frames(file, plain), *_without_clock(given)]
+    note_unread(file, plain, (*known, *_IDLE))
+    _note_frames(file, given, plain)
     frames = [frame for frame in given.frames if frame.depth_file_path]
     if not frames:
         raise RecordingError(
@@ -138,7 +143,7 @@ def open_nerfstudio(path: Path, report: Report = stop_at_first) -> FileRecording
             "convert the scan again with its depth (ns-process-data polycam --use-depth, or record3d)."
         )
     if lost := len(given.frames) - len(frames):
-        notices += left_out(file, report, f"{lost} frame(s) have no depth_file_path and are left out.")
+        left_out(file, f"{lost} frame(s) have no depth_file_path and are left out.")
     units = _units_per_m(file, given)
     colour = [_found(path, frame.file_path) for frame in frames]
     shots = Shots(
@@ -148,22 +153,16 @@ def open_nerfstudio(path: Path, report: Report = stop_at_first) -> FileRecording
         stamps_s=np.arange(len(frames)) * INTERVAL_S,
         world_from_camera=_matrices(file, frames, given.applied_scale),
     )
-    rig, more = _rig(file, given, frames, shots)
-    return FileRecording.settled(
-        path, "nerfstudio", rig, shots, (*notices, *more), report, lambda _: file, depth_units=units
-    )
+    rig = _rig(file, given, frames, shots)
+    return FileRecording.settled(path, "nerfstudio", rig, shots, lambda _: file, depth_units=units)
 
 
-def _unread_of_frames(file: Path, plain: dict[str, Any]) -> tuple[str, ...]:
+def _note_frames(file: Path, given: _Transforms, plain: dict[str, Any]) -> None:
     present = {key: None for frame in plain["frames"] for key in frame if not key.endswith("_path")}
-    return unread_notice(file, present, (*_Frame.__struct_fields__, *_IDLE_OF_FRAME))
-
-
-def _without_clock(given: _Transforms) -> list[str]:
-    notices = ["The scan has no clock; its frames are taken to be one second apart."]
+    note_unread(file, present, (*_Frame.__struct_fields__, *_IDLE_OF_FRAME))
+    note(_NO_CLOCK)
     if given.applied_scale != 1.0:
-        notices.append(f"The positions were scaled by {given.applied_scale:g}; they are scaled back to metres.")
-    return notices
+        note(f"The positions were scaled by {given.applied_scale:g}; they are scaled back to metres.")
 
 
 def _units_per_m(file: Path, given: _Transforms) -> float:
@@ -202,7 +201,7 @@ def _matrices(file: Path, frames: list[_Frame], scale: float) -> Float[np.ndarra
     return from_opengl(pose)
 
 
-def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> tuple[Rig, tuple[str, ...]]:
+def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> Rig:
     models = {frame.camera_model or given.camera_model for frame in frames}
     if any(camera_.is_fisheye for camera_ in (given, *frames)):
         models = {"fisheye"}
@@ -218,11 +217,11 @@ def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> 
         raise RecordingError(f"{file} has frames of {shown}; the frames of a recording must have one size.")
     size = said.pop()
     numbers = np.array([_numbers(file, frame, given, size) for frame in frames])
-    camera, notices = median_camera(file, numbers, *size)
+    camera = median_camera(file, numbers, *size)
+    note_resized(camera, rgb_size)
     if any(abs(getattr(camera_, name)) > 1e-9 for camera_ in (given, *frames) for name in _DISTORTION):
-        notices = (*notices, DISTORTED)
-    rig = fitted_rig(camera, *sizes(file.parent, shots), file)
-    return rig, (*notices, *resized_notice(camera, rgb_size))
+        note(DISTORTED)
+    return fitted_rig(camera, *sizes(file.parent, shots), file)
 
 
 def _numbers(file: Path, frame: _Frame, given: _Transforms, size: tuple[int, int]) -> list[float]:
@@ -281,7 +280,8 @@ def is_polycam(path: Path) -> bool:
     return (frames / "cameras").is_dir() and (frames / "images").is_dir()
 
 
-def open_polycam(path: Path, report: Report = stop_at_first) -> FileRecording:
+@opener
+def open_polycam(path: Path) -> FileRecording:
     """Open a raw export in place."""
     frames = keyframes_of(path)
     below = "keyframes/" if frames != path else ""
@@ -293,31 +293,29 @@ def open_polycam(path: Path, report: Report = stop_at_first) -> FileRecording:
     if not names:
         raise RecordingError(f"{frames} holds no frame with all of {images}/N.jpg, depth/N.png and {cameras}/N.json.")
     partial = len((colour.keys() | depth.keys() | described.keys()) - set(names))
-    lost = f"{partial} frame(s) lack one of colour, depth and camera and are left out."
-    notices = left_out(path, report, lost) if partial else []
+    if partial:
+        left_out(path, f"{partial} frame(s) lack one of colour, depth and camera and are left out.")
     files = [frames / cameras / described[stem] for stem in names]
     read = [read_json(file, _PolycamCamera, DESCRIPTION_BYTES) for file in files]
     found = [camera for camera, _ in read]
     present = {key: None for _, plain in read for key in plain}
-    notices += unread_notice(files[0], present, (*_PolycamCamera.__struct_fields__, *_POLYCAM_IDLE), strict=False)
+    note_unread(files[0], present, (*_PolycamCamera.__struct_fields__, *_POLYCAM_IDLE), strict=False)
     sure = _by_stem(frames / "confidence", (".png",)) if (frames / "confidence").is_dir() else {}
     shots = Shots(
         names=names,
         colour=[f"{below}{images}/{colour[stem]}" for stem in names],
         depth=[f"{below}depth/{depth[stem]}" for stem in names],
-        stamps_s=_keyframe_stamps(found, names, notices),
+        stamps_s=_keyframe_stamps(found, names),
         world_from_camera=from_opengl(np.stack([_matrix(camera) for camera in found])),
         confidence=[f"{below}confidence/{sure[s]}" for s in names] if all(s in sure for s in names) else (),
     )
     numbers = np.array([(c.fx, c.fy, c.cx, c.cy) for c in found])
     rgb_size, depth_size = sizes(path, shots)
     # corrected cameras have no size: it is that of the corrected pictures
-    camera, more = median_camera(files[0], numbers, found[0].width or rgb_size[0], found[0].height or rgb_size[1])
+    camera = median_camera(files[0], numbers, found[0].width or rgb_size[0], found[0].height or rgb_size[1])
+    note_resized(camera, rgb_size)
     rig = fitted_rig(camera, rgb_size, depth_size, files[0])
-    return FileRecording.settled(
-        path, "polycam", rig, shots, (*notices, *more, *resized_notice(camera, rgb_size)), report, files.__getitem__,
-        up_in_world=UP_IN_WORLD.copy(),
-    )  # fmt: skip
+    return FileRecording.settled(path, "polycam", rig, shots, files.__getitem__, up_in_world=UP_IN_WORLD.copy())
 
 
 def _by_stem(folder: Path, suffixes: tuple[str, ...]) -> dict[str, str]:
@@ -329,7 +327,7 @@ def _matrix(camera: _PolycamCamera) -> Float[np.ndarray, "4 4"]:
     return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
 
 
-def _keyframe_stamps(cameras: list[_PolycamCamera], names: list[str], notices: list[str]) -> Float[np.ndarray, " n"]:
+def _keyframe_stamps(cameras: list[_PolycamCamera], names: list[str]) -> Float[np.ndarray, " n"]:
     for stamps in ([c.timestamp for c in cameras], [float(n) if n.isascii() and n.isdigit() else None for n in names]):
         known = np.array([stamp for stamp in stamps if stamp is not None], np.float64)
         interval = float(np.median(np.diff(known))) if len(known) == len(cameras) > 1 else 0.0
@@ -338,7 +336,7 @@ def _keyframe_stamps(cameras: list[_PolycamCamera], names: list[str], notices: l
             unit_s < 1.0 or np.any(known % 1.0 != 0.0)
         ):  # whole numbers that only count are none
             return (known - known[0]) * unit_s
-    notices.append("The scan has no clock; its frames are taken to be one second apart.")
+    note(_NO_CLOCK)
     return np.arange(len(cameras)) * INTERVAL_S
 
 
@@ -346,9 +344,10 @@ _HEADER = ["timestamp", "frame", "x", "y", "z", "qx", "qy", "qz", "qw"]
 _MORE = ["fx", "fy", "cx", "cy"]
 
 
-def open_stray_scanner(path: Path, report: Report = stop_at_first) -> FileRecording:
+@opener
+def open_stray_scanner(path: Path) -> FileRecording:
     """Open a recording in place."""
-    rows = _odometry(path / "odometry.csv", report)
+    rows = _odometry(path / "odometry.csv")
     video = VideoFrames(path / "rgb.mp4")
     depth = {number_of(name): name for name in list_names(path / "depth", (".png",))}
     inside = path / "confidence"
@@ -357,8 +356,9 @@ def open_stray_scanner(path: Path, report: Report = stop_at_first) -> FileRecord
     whole = np.array([n in depth and 0 <= n < len(video) for n in numbers], bool)
     if not whole.any():
         raise RecordingError(f"{path} has no frame with all of a picture in rgb.mp4, depth/ and a row in odometry.csv.")
-    lost = f"{int((~whole).sum())} row(s) of odometry.csv have no depth or no video frame and are left out."
-    notices = [] if whole.all() else left_out(path, report, lost, path / "odometry.csv")
+    if not whole.all():
+        lost = f"{int((~whole).sum())} row(s) of odometry.csv have no depth or no video frame and are left out."
+        left_out(path, lost, path / "odometry.csv")
     rows, numbers = rows[whole], numbers[whole]
     shots = Shots(
         names=[f"{n:06d}" for n in numbers],
@@ -371,40 +371,40 @@ def open_stray_scanner(path: Path, report: Report = stop_at_first) -> FileRecord
     )
     if fault := pace_fault(shots.stamps_s, "rows of odometry.csv"):
         raise RecordingError(f"{path}: {fault}")
-    rig, more = _stray_rig(path, rows, video, shots)
+    rig = _stray_rig(path, rows, video, shots)
     return FileRecording.settled(
-        path, "stray-scanner", rig, shots, (*notices, *more), report, lambda _: path / "odometry.csv",
+        path, "stray-scanner", rig, shots, lambda _: path / "odometry.csv",
         up_in_world=UP_IN_WORLD.copy(), video=video,
     )  # fmt: skip
 
 
-def _odometry(file: Path, report: Report) -> np.ndarray:
-    header = next(text_lines(file, report), (0, ""))[1].replace(" ", "").split(",")
+def _odometry(file: Path) -> np.ndarray:
+    header = next(text_lines(file), (0, ""))[1].replace(" ", "").split(",")
     if header not in (_HEADER, _HEADER + _MORE):
         raise RecordingError(
             f"{file} begins with {','.join(header)[:60]!r} where the header {','.join(_HEADER)} belongs; is it another "
             "app's, or another version's?"
         )
-    table = read_table(file, (len(header),), report, header=True)
+    table = read_table(file, (len(header),), header=True)
     finite = table.values[np.isfinite(table.values[:, :2]).all(axis=1)]
     if len(finite) == 0:
         raise RecordingError(f"{file} holds no pose, so there is nothing to map.")
     return finite
 
 
-def _stray_rig(path: Path, rows: np.ndarray, video: VideoFrames, shots: Shots) -> tuple[Rig, tuple[str, ...]]:
+def _stray_rig(path: Path, rows: np.ndarray, video: VideoFrames, shots: Shots) -> Rig:
     file, size = path / "camera_matrix.csv", (video.width, video.height)
     k = read_matrix(file, 3, 3)
     per_frame = rows[:, 9:13] if rows.shape[1] > len(_HEADER) else np.zeros((0, 4))
     known = per_frame[np.isfinite(per_frame).all(axis=1) & (per_frame > 0.0).all(axis=1)]
     numbers = known if len(known) else np.array([[k[0, 0], k[1, 1], k[0, 2], k[1, 2]]])
-    camera, notices = median_camera(file, numbers, *size)
+    camera = median_camera(file, numbers, *size)
     if not (0.0 < camera.cx < camera.width and 0.0 < camera.cy < camera.height):
         raise RecordingError(
             f"{file} has its centre at {camera.cx:.1f}, {camera.cy:.1f}, outside of the video's {size[0]}x{size[1]}; "
             "was the video resized? Give the matrix of its present size."
         )
-    return Rig(camera, fitted(camera, first_picture_size(path, shots.depth), file, "depth")), notices
+    return Rig(camera, fitted(camera, first_picture_size(path, shots.depth), file, "depth"))
 
 
 _FPS = 60.0
@@ -460,11 +460,9 @@ class _Files:
             return images.read_bytes(self.path / name)
         try:
             if self._archive.getinfo(name).file_size > limit:
-                raise RecordingError(f"{self.path} says that {name} has more than {limit:,} bytes; share it again.")
+                raise ValueError(f"it has more than {limit:,} bytes")
             return self._archive.read(name)
-        except KeyError:
-            raise RecordingError(f"{self.path} has no {name}; share it from Record3D again.") from None
-        except (zipfile.BadZipFile, OSError, EOFError, zlib.error, NotImplementedError, RuntimeError) as error:
+        except (KeyError, ValueError, zipfile.BadZipFile, OSError, EOFError, zlib.error, RuntimeError) as error:
             raise RecordingError(f"{name} in {self.path} cannot be read ({error}); share it again.") from None
 
     def unpack_sound(self, folder: Path) -> None:
@@ -498,9 +496,7 @@ def _unfolded(files: _Files, name: str, size: int) -> UInt8[np.ndarray, " n"]:
     content = files.read(name)
     raw = content if len(content) == size else _decompressed(files, name, content, size)
     if len(raw) != size:
-        raise RecordingError(
-            f"{name} in {files.path} has {len(raw):,} bytes where {size:,} belong; share or copy it again."
-        )
+        raise RecordingError(f"{name} in {files.path} has {len(raw):,} bytes where {size:,} belong; share it again.")
     return np.frombuffer(raw, np.uint8)
 
 
@@ -550,7 +546,8 @@ def _exr(files: _Files, name: str) -> Float32[np.ndarray, "h w"]:
         ) from None
 
 
-def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording:
+@opener
+def open_record3d(path: Path) -> StoredRecording:
     """Open a recording in place."""
     inside = path / "EXR_RGBD" if (path / "EXR_RGBD").is_dir() else path
     layout = ("metadata", "rgbd", "rgbd") if path.is_file() else _record3d_layout(inside)
@@ -560,6 +557,7 @@ def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording
     described, colour_in, depth_in = layout
     file = inside / described
     given, plain = _metadata(files, file, described)
+    _require_whole(file, given)
     colour = {number_of(name): name for name in files.names(colour_in, images.COLOUR_SUFFIXES)}
     depth = {number_of(name): name for name in files.names(depth_in, (".depth", ".exr"))}
     numbers = [n for n in range(len(given.poses)) if n in colour and n in depth]
@@ -568,28 +566,31 @@ def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording
             f"{inside} has {len(given.poses)} poses, {len(colour)} colour and {len(depth)} depth pictures, and no "
             "frame with all three; was it recorded with LiDAR?"
         )
-    notices = [*unread_notice(file, plain, (*_Metadata.__struct_fields__, *_RECORD3D_IDLE), strict=False)]
+    note_unread(file, plain, (*_Metadata.__struct_fields__, *_RECORD3D_IDLE), strict=False)
     if len(numbers) < max(len(given.poses), len(colour)):
         lost = max(len(given.poses), len(colour)) - len(numbers)
         sentence = f"{lost} frame(s) lack one of colour, depth and pose and are left out."
-        notices += left_out(inside, report, sentence, file)
-    given_s = _record3d_stamps(file, given, notices)
+        left_out(inside, sentence, file)
+    given_s = _record3d_stamps(given)
     shots = Shots(
         names=[str(n) for n in numbers],
         colour=[f"{colour_in}/{colour[n]}" for n in numbers],
         depth=[f"{depth_in}/{depth[n]}" for n in numbers],
         stamps_s=given_s[numbers],
-        world_from_camera=_record3d_poses(file, given)[numbers],
+        world_from_camera=_record3d_poses(given)[numbers],
     )
     if fault := pace_fault(shots.stamps_s, "frames", 1.0 / _fps(given)):
         raise RecordingError(f"{file}: {fault}")
-    rig, more = _record3d_rig(files, file, given, shots)
+    rig = _record3d_rig(files, file, given, shots)
     folder = Path(tempfile.mkdtemp(prefix="avlmaps-r3d-")) if path.is_file() else None
     if folder is not None:
         files.unpack_sound(folder)
-    audio, sound = open_audio(folder or path, float(given_s[0]))
+    audio = open_audio(folder or path, float(given_s[0]))
+    audio = (
+        replace(audio, label=f"{path.name}/{audio.path.name}") if audio is not None and folder is not None else audio
+    )
     recording = StoredRecording.settled(
-        path, "record3d", rig, shots, (*notices, *more, *sound), report, lambda _: file, pictures=_Pictures(files),
+        path, "record3d", rig, shots, lambda _: file, pictures=_Pictures(files),
         up_in_world=UP_IN_WORLD.copy(), audio=audio,
     )  # fmt: skip
     if folder is not None:  # a track is read by pieces, for as long as the recording is open
@@ -607,38 +608,38 @@ def _fps(given: _Metadata) -> float:
     return given.fps if given.fps is not None and given.fps > 0.0 else _FPS
 
 
-def _record3d_stamps(file: Path, given: _Metadata, notices: list[str]) -> Float[np.ndarray, " n"]:
-    stamps = given.frameTimestamps
-    if len(stamps) == len(given.poses):
-        return np.array(stamps, np.float64)
-    if stamps:
-        raise RecordingError(
-            f"{file} has {len(stamps)} frameTimestamps for {len(given.poses)} poses, so that it is not known which "
-            "belong together; share it again, or remove the stamps and give fps."
-        )
-    notices.append(f"The recording has no stamps; {_fps(given):g} frames/s are assumed.")
+def _record3d_stamps(given: _Metadata) -> Float[np.ndarray, " n"]:
+    if given.frameTimestamps:
+        return np.array(given.frameTimestamps, np.float64)
+    note(f"The recording has no stamps; {_fps(given):g} frames/s are assumed.")
     return np.arange(len(given.poses)) / _fps(given)
 
 
-def _record3d_poses(file: Path, given: _Metadata) -> Float[np.ndarray, "n 4 4"]:
-    if any(len(row) != 7 for row in given.poses):
-        raise RecordingError(f"{file} has a pose of other than seven numbers (qx qy qz qw tx ty tz); share it again.")
+def _require_whole(file: Path, given: _Metadata) -> None:
+    rows, k, stamps = given.perFrameIntrinsicCoeffs, given.K, given.frameTimestamps
+    wrong = [
+        what
+        for what, right in (
+            ("a pose of other than seven numbers (qx qy qz qw tx ty tz)", all(len(row) == 7 for row in given.poses)),
+            (f"{len(stamps)} frameTimestamps for {len(given.poses)} poses", len(stamps) in (0, len(given.poses))),
+            ("a row of perFrameIntrinsicCoeffs of other than four numbers", all(len(row) == 4 for row in rows)),
+            (f"K of {len(k)} numbers, where nine belong", rows or len(k) == 9),
+        )
+        if not right
+    ]
+    if wrong:
+        raise RecordingError(f"{file} has {' and '.join(wrong)}; share it from Record3D again.")
+
+
+def _record3d_poses(given: _Metadata) -> Float[np.ndarray, "n 4 4"]:
     rows = np.array(given.poses, np.float64).reshape(-1, 7)
     return from_opengl(rigid(rows[:, 4:], rows[:, :4]))
 
 
-def _record3d_rig(files: _Files, file: Path, given: _Metadata, shots: Shots) -> tuple[Rig, tuple[str, ...]]:
-    per_frame = given.perFrameIntrinsicCoeffs
-    if odd := next((row for row in per_frame if len(row) != 4), None):
-        raise RecordingError(
-            f"{file} has {len(odd)} numbers in a row of perFrameIntrinsicCoeffs, not the four fx fy cx cy; share it "
-            "again."
-        )
+def _record3d_rig(files: _Files, file: Path, given: _Metadata, shots: Shots) -> Rig:
     k = given.K
-    if not per_frame and len(k) != 9:
-        raise RecordingError(f"{file} has no intrinsics (K has {len(k)} numbers, not 9); share it again.")
-    numbers = np.array(per_frame or [[k[0], k[4], k[6] or k[2], k[7] or k[5]]], np.float64)
-    camera, notices = median_camera(file, numbers, given.w, given.h)
+    numbers = np.array(given.perFrameIntrinsicCoeffs or [[k[0], k[4], k[6] or k[2], k[7] or k[5]]], np.float64)
+    camera = median_camera(file, numbers, given.w, given.h)
     rgb_size = images.picture_size(files.path / shots.colour[0], files.read(shots.colour[0]))
     depth_size = (given.dw, given.dh)
     if shots.depth[0].endswith(".exr"):
@@ -646,8 +647,8 @@ def _record3d_rig(files: _Files, file: Path, given: _Metadata, shots: Shots) -> 
         depth_size = (width, height)
     elif not (given.dw > 0 and given.dh > 0):
         depth_size = _size_like(files, shots.depth[0], camera)
-    rig = fitted_rig(camera, rgb_size, depth_size, file)
-    return rig, (*notices, *resized_notice(camera, rgb_size))
+    note_resized(camera, rgb_size)
+    return fitted_rig(camera, rgb_size, depth_size, file)
 
 
 def _size_like(files: _Files, name: str, camera: Pinhole) -> tuple[int, int]:

@@ -16,16 +16,9 @@ from jaxtyping import Float, Int
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import (
-    DESCRIPTION_BYTES,
-    MANIFEST_BYTES,
-    TABLE_BYTES,
-    decode_json,
-    open_regular,
-    read_regular,
-)
+from avlmaps.core.files import DESCRIPTION_BYTES, MANIFEST_BYTES, TABLE_BYTES, decode_json, open_regular, read_regular
 from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion
-from avlmaps.recordings.faults import Fault, Report, readable, stop_at_first
+from avlmaps.recordings.faults import note, readable, report
 from avlmaps.recordings.types import Recording
 
 POSE = ("stamp_s", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
@@ -133,40 +126,38 @@ class Table:
     lines: Int[np.ndarray, " n"]
 
 
-def text_lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
+def text_lines(path: Path) -> Iterator[tuple[int, str]]:
     """Yield (number, text) of each line that is neither empty nor a comment (``#``).
 
     Lines that are not UTF-8 are reported and passed over.
     """
-    return ((number, text) for number, text in _lines(path, report) if not text.startswith("#"))
+    return ((number, text) for number, text in _lines(path) if not text.startswith("#"))
 
 
-def _lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
+def _lines(path: Path) -> Iterator[tuple[int, str]]:
     try:
         stream = open_regular(path, TABLE_BYTES)
     except FileNotFoundError:
-        report(Fault(f"{path} is missing; the recording needs it.", path))
+        report(f"{path} is missing; the recording needs it.", path)
         return
     except OSError as error:
-        report(Fault(f"{path} cannot be read ({error.strerror or error}); check the file.", path))
+        report(f"{path} cannot be read ({error.strerror or error}); check the file.", path)
         return
     with stream:
         for number, raw in enumerate(iter(lambda: stream.readline(_LINE_BYTES), b""), start=1):
             if len(raw) >= _LINE_BYTES:
-                report(Fault(f"{path}, line {number}: it has {_LINE_BYTES} bytes or more; fix it.", path, number))
+                report(f"{path}, line {number}: it has {_LINE_BYTES} bytes or more; fix it.", path, number)
                 return
             try:
                 text = raw.decode("utf-8-sig" if number == 1 else "utf-8").strip()
             except UnicodeDecodeError:
-                report(Fault(f"{path}, line {number}: this is not UTF-8 text; save the file as UTF-8.", path, number))
+                report(f"{path}, line {number}: this is not UTF-8 text; save the file as UTF-8.", path, number)
                 continue
             if text:
                 yield number, text
 
 
-def read_table(
-    path: Path, columns: tuple[int, ...], report: Report, header: bool = False, names: Sequence[str] = ()
-) -> Table:
+def read_table(path: Path, columns: tuple[int, ...], header: bool = False, names: Sequence[str] = ()) -> Table:
     """Read lines of numbers, split at commas, semicolons (with decimal commas, too) or white space.
 
     Args:
@@ -180,7 +171,7 @@ def read_table(
     values, lines, width = array("d"), array("q"), 0
     heading: tuple[int, str] | None = None
     first = True
-    for number, text in _lines(path, report):
+    for number, text in _lines(path):
         if text.startswith("#"):
             if names and first and is_header_in_comment(split_header(text), names):
                 heading = number, text
@@ -193,7 +184,7 @@ def read_table(
                 heading, first = (number, text) if names else None, False
                 continue
             first = False
-            report(Fault(f"{path}, line {number}: {text[:40]!r} is not all numbers; fix the line.", path, number))
+            report(f"{path}, line {number}: {text[:40]!r} is not all numbers; fix the line.", path, number)
             continue
         first = False
         if len(row) not in columns or (width and len(row) != width):
@@ -203,18 +194,18 @@ def read_table(
                 f"{path}, line {number}: there are {len(row)} numbers where {wanted} belong"
                 f"{kitti if len(row) == 12 else '; fix the line'}."
             )
-            report(Fault(sentence, path, number))
+            report(sentence, path, number)
             continue
         width = len(row)
         values.extend(row)
         lines.append(number)
     table = np.frombuffer(values, np.float64) if len(values) else np.zeros(0)
     table = table.reshape(-1, width or columns[0])
-    return Table(_in_order(path, heading, table, names, report), np.array(lines, np.int64))
+    return Table(_in_order(path, heading, table, names), np.array(lines, np.int64))
 
 
 def _in_order(
-    path: Path, heading: tuple[int, str] | None, table: Float[np.ndarray, "n c"], names: Sequence[str], report: Report
+    path: Path, heading: tuple[int, str] | None, table: Float[np.ndarray, "n c"], names: Sequence[str]
 ) -> Float[np.ndarray, "n c"]:
     if heading is None or (len(table) and table.shape[1] != len(names)):
         return table
@@ -223,7 +214,7 @@ def _in_order(
         return named_order(split_header(text), names).applied(table)
     except ValueError as error:
         sentence = f"{path}, line {number}: {error}; write the header as {','.join(names)}, or leave it out."
-        report(Fault(sentence, path, number))
+        report(sentence, path, number)
         return table
 
 
@@ -306,10 +297,8 @@ def parse_json(file: Path, content: bytes, kind: type[T]) -> tuple[T, dict[str, 
         raise RecordingError(f"{file} is not as it should be ({error}); fix the file.") from None
 
 
-def unread_notice(
-    file: Path, present: Mapping[str, Any], known: Collection[str], strict: bool = True
-) -> tuple[str, ...]:
-    """Return a notice that names the keys of a file that nothing reads, or nothing.
+def note_unread(file: Path, present: Mapping[str, Any], known: Collection[str], strict: bool = True) -> None:
+    """Note the keys of a file that nothing reads.
 
     Args:
         file: the file, for the sentence.
@@ -325,9 +314,9 @@ def unread_notice(
             f"{file} has the key {telling[0]!r}, which is not read here and may change the map; known are "
             f"{', '.join(sorted(known))}. Write it as one of them, or remove it."
         )
-    if telling:
-        return (f"{file.name} has keys that are not read and may change the map: {', '.join(telling[:8])}.",)
-    return (f"{file.name} has keys that are not read: {', '.join(unread[:8])}.",) if unread else ()
+    if unread:
+        what = "are not read and may change the map" if telling else "are not read"
+        note(f"{file.name} has keys that {what}: {', '.join((telling or unread)[:8])}.")
 
 
 # A focal length that wanders by more than this share is worth a notice.
@@ -353,16 +342,14 @@ def pinhole(file: Path, fx: float, fy: float, cx: float, cy: float, width: int, 
         raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None
 
 
-def median_camera(
-    file: Path, fx_fy_cx_cy: Float[np.ndarray, "n 4"], width: int, height: int
-) -> tuple[Pinhole, tuple[str, ...]]:
-    """Return the camera that stands for all frames', and a notice where they differ much."""
+def median_camera(file: Path, fx_fy_cx_cy: Float[np.ndarray, "n 4"], width: int, height: int) -> Pinhole:
+    """Return the camera that stands for all frames', and note where they differ much."""
     fx, fy, cx, cy = (float(value) for value in np.median(fx_fy_cx_cy, axis=0))
     camera = pinhole(file, fx, fy, cx, cy, width, height)
     low, high = float(fx_fy_cx_cy[:, 0].min()), float(fx_fy_cx_cy[:, 0].max())
     if high > low * (1.0 + _WANDERS):
-        return camera, (f"The focal length wanders between {low:.1f} and {high:.1f} pixels; {fx:.1f} is used for all.",)
-    return camera, ()
+        note(f"The focal length wanders between {low:.1f} and {high:.1f} pixels; {fx:.1f} is used for all.")
+    return camera
 
 
 def fitted(camera: Pinhole, size: tuple[int, int], file: Path, what: str) -> Pinhole:
@@ -388,18 +375,16 @@ def fitted_rig(camera: Pinhole, rgb_size: tuple[int, int], depth_size: tuple[int
     return Rig(fitted(camera, rgb_size, file, "colour"), fitted(camera, depth_size, file, "depth"))
 
 
-def resized_notice(camera: Pinhole, size: tuple[int, int]) -> tuple[str, ...]:
-    """Return a notice where pictures have another size than their intrinsics, or nothing."""
-    if size == (camera.width, camera.height):
-        return ()
-    return (
-        f"The pictures are {size[0]}x{size[1]}; the intrinsics of {camera.width}x{camera.height} are scaled to them.",
-    )
+def note_resized(camera: Pinhole, size: tuple[int, int]) -> None:
+    """Note where pictures have another size than their intrinsics."""
+    width, height = camera.width, camera.height
+    if size != (width, height):
+        note(f"The pictures are {size[0]}x{size[1]}; the intrinsics of {width}x{height} are scaled to them.")
 
 
 def read_pose_file(path: Path) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 4 4"]]:
     """Return the stamps and the poses (4x4, metres) of a table: stamp tx ty tz qx qy qz qw, or as its header says."""
-    table = read_table(path, (8,), stop_at_first, names=POSE)
+    table = read_table(path, (8,), names=POSE)
     if not len(table.values):
         raise RecordingError(f"{path} holds no pose; it needs a line of stamp tx ty tz qx qy qz qw for each.")
     pose = rigid(table.values[:, 1:4], table.values[:, 4:])

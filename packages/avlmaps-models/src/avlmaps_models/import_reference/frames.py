@@ -13,6 +13,7 @@ from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.progress import progress
 from avlmaps.core.wording import option
 from avlmaps.maps.types import Keyframes
+from avlmaps.recordings.faults import noted
 from avlmaps.recordings.formats.avlmaps_layout import CameraFile, camera_poses, read_camera_file, read_habitat_poses
 from avlmaps.recordings.formats.file_recording import list_names
 from avlmaps.recordings.images import first_picture_size
@@ -109,7 +110,8 @@ def read_walk(scene: SceneFiles, needs_first_pose: bool) -> Walk:
             f"poses.txt, and neither that nor {AREAS} is in {scene.folder}; give it with "
             f"{option('poses', 'FILE', argument='poses')}."
         )
-    world_from_camera, notice = camera_poses(body, given)
+    with noted() as notices:
+        world_from_camera = camera_poses(body, given)
     view = areas.view if areas is not None else np.zeros((len(body), 0), np.float32)
     return Walk(
         first_habitat_from_base=first[0] if len(first) else np.eye(4),
@@ -117,14 +119,14 @@ def read_walk(scene: SceneFiles, needs_first_pose: bool) -> Walk:
         view=view,
         stamp_s=np.arange(len(body)) / given.rate_hz,
         rig=Rig(camera, camera),
-        notice=notice if len(body) else "",
+        notice=notices[0] if len(body) else "",
     )
 
 
 def _listed(scene: SceneFiles) -> tuple[CameraFile, Float64[np.ndarray, "n 4 4"], Pinhole]:
     """Return the content of ``camera.json``, the poses of ``poses.txt``, and the camera."""
     try:
-        given, _ = read_camera_file(scene.camera)
+        given = read_camera_file(scene.camera)
         listed = np.zeros((0, 4, 4))
         if scene.poses is not None:
             listed = read_habitat_poses(scene.poses)
