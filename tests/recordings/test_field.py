@@ -8,6 +8,7 @@ from tempfile import gettempdir
 import numpy as np
 import pytest
 
+import avlmaps
 from avlmaps.core.errors import RecordingError
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.recordings.consistency.suspicions import examine_recording
@@ -68,3 +69,15 @@ def test_corrected_cameras_without_a_size_have_that_of_their_pictures(tmp_path: 
     assert (recording.rig.rgb.width, recording.rig.rgb.height) == (128, 96)
     assert recording.rig.rgb.fx == 92.0
     assert examine_recording(recording).grade is Grade.FINE
+
+
+@pytest.mark.nightly
+def test_a_photo_of_one_of_two_rooms_that_look_alike_says_that_the_other_fits_as_well(tmp_path: Path) -> None:
+    with tarfile.open(ROUND4 / "two_identical_rooms.tgz") as packed:
+        packed.extractall(tmp_path, filter="data")
+    avlmap = avlmaps.build_map(tmp_path / "two", tmp_path / "two.avlmap")
+    for number in range(4):
+        found = avlmap.locate(tmp_path / f"two{number}.png")
+        assert found.elsewhere is not None
+        apart_m = found.elsewhere[:3, 3] - found.world_from_camera[:3, 3]
+        assert np.abs(apart_m) == pytest.approx([8.0, 0.0, 0.0], abs=0.3)
