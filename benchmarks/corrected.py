@@ -23,7 +23,7 @@ from avlmaps.core.columns import concat
 from avlmaps.core.poses import inverse
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.free_space import FreeViewCollector, FreeViews, clean, count_where_it_matters
+from avlmaps.maps.fusion.free_space import FreeViews, clean, count_where_it_matters, free_views
 from avlmaps.maps.fusion.sensor import PERFECT
 from avlmaps.maps.fusion.submaps import MovedSubmaps, submap_of
 from avlmaps.maps.grid import GridSpec
@@ -60,13 +60,13 @@ def fused(frames: list[Frame], poses: np.ndarray, features: np.ndarray, step: in
     for first in range(0, len(frames), step):
         some, at = frames[first : first + step], poses[first : first + step]
         total = VoxelAccumulator(GRID, DIM, None, PERFECT, with_spread=True)
-        free = FreeViewCollector(some[0].rig.depth, PERFECT)
+        free = []
         for frame, pose in zip(some, at, strict=True):
             placed = replace(frame, world_from_camera=pose)
             total.add(placed, features)
-            free.add(placed)
+            free.append(placed)
         stamps = np.array([frame.stamp_s for frame in some])
-        parts.append(submap_of(total.sums(), stamps, at, free.views().clear_mm))
+        parts.append(submap_of(total.sums(), stamps, at, free_views(free, PERFECT).clear_mm))
     return concat(parts)
 
 

@@ -20,9 +20,10 @@ use_one_thread()
 import numpy as np  # noqa: E402
 from scipy.spatial import KDTree  # noqa: E402
 
+from avlmaps.core.columns import concat  # noqa: E402
 from avlmaps.maps.estimate import estimate_sensor  # noqa: E402
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator  # noqa: E402
-from avlmaps.maps.fusion.free_space import FreeViewCollector, clean  # noqa: E402
+from avlmaps.maps.fusion.free_space import FreeViews, clean, free_views  # noqa: E402
 from avlmaps.maps.fusion.sensor import NONE, SensorModel  # noqa: E402
 from avlmaps.maps.grid import GridSpec  # noqa: E402
 from avlmaps.maps.settings import BuildSettings  # noqa: E402
@@ -81,11 +82,13 @@ class Made:
 
 def made(recording: Recording, sensor: SensorModel) -> Made:
     """Fuse a recording without features."""
-    total, free, spent = VoxelAccumulator(GRID, 0, sensor=sensor), FreeViewCollector(recording.rig.depth, sensor), 0.0
+    total, free, spent = VoxelAccumulator(GRID, 0, sensor=sensor), list[FreeViews](), 0.0
     for frame in recording.frames():
-        spent += seconds(total.add, frame)[0] + seconds(free.add, frame)[0]
+        took, views = seconds(free_views, [frame], sensor)
+        spent += seconds(total.add, frame)[0] + took
+        free.append(views)
     evidence = total.evidence()
-    took, (kept, _) = seconds(clean, evidence, [free.views()], recording.rig.depth, GRID, sensor)
+    took, (kept, _) = seconds(clean, evidence, [concat(free)], recording.rig.depth, GRID, sensor)
     return Made(evidence.index[kept], spent + took)
 
 

@@ -19,14 +19,14 @@ from avlmaps.maps.build import build_map
 from avlmaps.maps.corrected import Corrected, correct_map
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import (
-    FreeViewCollector,
     count_through,
     count_where_it_matters,
+    free_views,
     seen_through,
 )
 from avlmaps.maps.fusion.sensor import PERFECT
 from avlmaps.maps.fusion.submaps import MovedSubmaps, in_steps, submap_of
-from avlmaps.maps.fusion.voxel_sums import VoxelSums
+from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.pose_correction import PoseCorrection
@@ -223,7 +223,7 @@ def test_nothing_is_lost_on_the_way(angles: tuple, shift: tuple, seed: int) -> N
     whole[:, :3, :3] = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
     whole[:, :3, 3] = shift
     sums, submap = one_submap(walk)
-    moved = MovedSubmaps(submap, whole @ walk.world_from_camera, GridSpec(0.05)).table().sums()
+    moved = table_of(MovedSubmaps(submap, whole @ walk.world_from_camera, GridSpec(0.05))).sums()
     for name in ("weight", "rgb_sum", "rgb_weight"):
         np.testing.assert_allclose(getattr(moved, name).sum(axis=0), getattr(sums, name).sum(axis=0), rtol=2e-3)
     step = sums.weight.sum() / 127.0  # of the features, at most
@@ -232,12 +232,18 @@ def test_nothing_is_lost_on_the_way(angles: tuple, shift: tuple, seed: int) -> N
     assert (moved.hits >= moved.views).all()
 
 
+def table_of(moved: MovedSubmaps) -> VoxelTable:
+    total = VoxelTable(moved.voxels().feature.shape[1])
+    moved.add_to(total)
+    return total
+
+
 def test_features_that_are_summed_at_the_end_are_those_of_a_table_that_goes_on() -> None:
     walk = Walk(8)
     _, submap = one_submap(walk)
     poses = motion(27.0, (0.4, 0.1, 0.0)) @ walk.world_from_camera
     moved = MovedSubmaps(concat([submap, submap]), np.concatenate([poses, poses]), GridSpec(0.05))
-    table, evidence = moved.table(), moved.evidence()
+    table, evidence = table_of(moved), moved.evidence()
     kept = np.arange(len(evidence)) % 3 > 0
     one, other = moved.voxels(kept), table.voxels(kept=kept)
     for name in ("index", "feature", "weight", "rgb", "last_seen_s", "hits"):
@@ -286,7 +292,7 @@ def test_looks_that_weigh_next_to_nothing_are_not_missed() -> None:
     for weighs in (1.0, 1e-2, 1e-3, 1e-9):
         faint = replace(submap, feature=other, weight=submap.weight * np.float32(weighs))
         both = concat([submap, faint])
-        found = MovedSubmaps(both, np.concatenate([walk.world_from_camera] * 2), GridSpec(0.05)).table().sums()
+        found = table_of(MovedSubmaps(both, np.concatenate([walk.world_from_camera] * 2), GridSpec(0.05))).sums()
         one, two = (part.feature * (part.feature_scale * part.weight)[:, None] for part in (submap, faint))
         np.testing.assert_array_equal(found.index, submap.index)
         np.testing.assert_allclose(found.weight, submap.weight * (1.0 + weighs), rtol=1e-5)
@@ -298,12 +304,12 @@ def test_looks_that_weigh_next_to_nothing_are_not_missed() -> None:
 @pytest.mark.parametrize("turn_deg", [0.0, 2.0])
 def test_a_quick_count_finds_the_same_surface(turn_deg: float) -> None:
     walk = Walk(48)
-    free, total = FreeViewCollector(walk.rig.depth, PERFECT), VoxelAccumulator(GridSpec(0.05), 0)
+    free, total = [], VoxelAccumulator(GridSpec(0.05), 0)
     poses = walk.world_from_camera @ np.stack([motion(turn_deg * (n % 2)) for n in range(len(walk))])
     for frame, pose in zip(walk.frames(), poses, strict=True):
-        free.add(replace(frame, world_from_camera=pose))
+        free.append(replace(frame, world_from_camera=pose))
         total.add(frame)
-    evidence, views, grid = total.evidence(), free.views(), GridSpec(0.05)
+    evidence, views, grid = total.evidence(), free_views(free, PERFECT), GridSpec(0.05)
     quick = count_where_it_matters(evidence, grid, walk.rig.depth, views)
     every = count_through(evidence.index, grid, walk.rig.depth, [views])
     assert (quick[evidence.views <= 8] == every[evidence.views <= 8]).all()

@@ -196,7 +196,7 @@ def test_an_address_where_nothing_answers_is_one_sentence() -> None:
 def test_an_address_where_something_else_answers_is_one_sentence() -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         said = connect(f"127.0.0.1:{other.getsockname()[1]}")
-    assert said.count("\n") == 1 and "is no Ray cluster that lets this machine in within 6 s" in said
+    assert said.count("\n") == 1 and "what answers is no Ray cluster" in said
 
 
 @pytest.mark.parametrize(

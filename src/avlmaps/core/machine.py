@@ -1,7 +1,10 @@
 """This machine: its cores, its names, a thread that makes things ahead of their use, and types of compiled loops."""
 
+import contextlib
+import ctypes
 import os
 import queue
+import sys
 import threading
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass
@@ -89,3 +92,10 @@ class Options(TypedDict):
     nogil: bool
     error_model: Literal["python", "numpy"]
     fastmath: set[str]
+
+
+def release_memory() -> None:
+    """Give back to the system what was freed; glibc keeps what networks and compilers needed while they were made."""
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError, AttributeError):  # another C library
+            ctypes.CDLL(None).malloc_trim(0)

@@ -118,15 +118,16 @@ def merge_maps(
         Occupied.of(laid, grid),
     )
     life = stored.data.life or lives.begun([_seen(one, stored, np.eye(4), 0.0) for one in listed(unedited(stored))])
-    things = list(listed(unedited(other)))
+    things, index = list(listed(unedited(other))), np.asarray(stored.data.voxels.index)
+    surface, through = now.has_surface(grid.centre_of(index)), now.views.through(index, grid) >= THROUGH_VIEWS
     if things_of is None:  # a list of names misses small things, whose surface changes nevertheless
-        life = _with_vanished(life, stored, known, now, visits)
+        life = _with_vanished(life, stored, known, surface, through, visits)
         things += _unnamed_new(other, things, before, known, moved)
     new = [_seen(one, other, moved, visit.shift_s) for one in things]
     at_s = [one.end_s for one in visits]
     looks = _looks(life, stored, known)
     life = lives.lived_on(life, new, now, before, known, number, at_s, grid, same_thing, looks)
-    kept = _still_there(stored, known, life, now, number)
+    kept = _still_there(known, life, surface, through, number)
     voxels = joined_voxels(stored, kept, other, moved, visit.shift_s, life)
     keyframes = joined_keyframes(stored, other, moved, visit.shift_s)
     sounds = joined_sounds(stored, other, moved, visit.shift_s)
@@ -247,11 +248,15 @@ def same_thing(one: str, other: str) -> bool:
     return one == other or words.is_a(one, other, EntryKind.THING) or words.is_a(other, one, EntryKind.THING)
 
 
-def _with_vanished(life: Life, stored: AVLMap, known: Occupied, now: Day, visits: Sequence[Visit]) -> Life:
-    index, grid = np.asarray(stored.data.voxels.index), stored.data.grid
-    surface = now.has_surface(grid.centre_of(index))
-    loose, through = ~surface, now.views.through(index, grid) >= THROUGH_VIEWS
-    things = changed_things(stored, loose, through, [*_rows_there(life, known).values()])
+def _with_vanished(
+    life: Life,
+    stored: AVLMap,
+    known: Occupied,
+    surface: Bool[np.ndarray, " n"],
+    through: Bool[np.ndarray, " n"],
+    visits: Sequence[Visit],
+) -> Life:
+    things = changed_things(stored, ~surface, through, [*_rows_there(life, known).values()])
     stamps = np.array([float(np.max(np.asarray(stored.data.voxels.last_seen_s)[one.rows])) for one in things])
     seen_on = visit_of_stamps(visits[:-1], stamps).tolist()
     begun = [lives.begun([_seen(one, stored, np.eye(4), 0.0)], on) for one, on in zip(things, seen_on, strict=True)]
@@ -273,15 +278,14 @@ def _unnamed_new(
     return changed_things(other, ~known.near(points), through, [thing.rows for thing in things])
 
 
-def _still_there(stored: AVLMap, known: Occupied, life: Life, now: Day, visit: int) -> Bool[np.ndarray, " n"]:
+def _still_there(
+    known: Occupied, life: Life, surface: Bool[np.ndarray, " n"], through: Bool[np.ndarray, " n"], visit: int
+) -> Bool[np.ndarray, " n"]:
     """Return which voxels of the map are surface still.
 
     One goes where two views of the new day see through it and nothing is beside it; of what is gone every voxel goes
     where the new day has no surface; of what is there none goes; people's go.
     """
-    index, grid = np.asarray(stored.data.voxels.index), stored.data.grid
-    surface = now.has_surface(grid.centre_of(index))
-    through = now.views.through(index, grid) >= THROUGH_VIEWS
     goes = through & ~surface
     for number, stay in enumerate(life.stays):
         rows = _rows_of(number, life, known)
@@ -338,9 +342,9 @@ def joined_voxels(
 ) -> Voxels:
     """Return what is left of the map's voxels, and the other's laid on its grid; where both are, their means."""
     table = VoxelTable(stored.data.voxels.feature.shape[1])
-    table.add(_sums(stored.data.voxels, np.flatnonzero(kept)))
+    table.merge(_sums(stored.data.voxels, np.flatnonzero(kept)))
     index, cell, source, part = resampled(np.asarray(other.data.voxels.index), other.data.grid, moved)
-    table.add(_spread(other.data.voxels, index, cell, source, part, shift_s))
+    table.merge(_spread(other.data.voxels, index, cell, source, part, shift_s))
     people = [life.voxels(number) for number, stay in enumerate(life.stays) if stay.name in PEOPLE]
     if not people:
         return table.voxels()

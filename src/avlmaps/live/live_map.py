@@ -22,6 +22,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, RecordingError
 from avlmaps.core.files import lasting_path
+from avlmaps.core.machine import release_memory
 from avlmaps.core.numbers import as_number
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.live.pose_check import PoseCheck
@@ -626,6 +627,8 @@ class LiveMap:
             self._snapshot, self._generation = (made, came_s), 1
         with contextlib.suppress(AvlmapsError):  # a profile without names, or a map too small for rooms
             made.ask("the chair in the kitchen")
-        if not is_first:
+        if is_first:
+            release_memory()
+        else:
             self._snapshot = made, came_s
             self._generation += 1

@@ -1,6 +1,6 @@
 """From a recording to a map: a ``Mapper`` takes its frames, and what each stretch of them brings is stored."""
 
-from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
+from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from itertools import islice
 from pathlib import Path
@@ -201,58 +201,44 @@ def encode_frames(
         encoder: None yields frames alone.
         chosen: numbers of the frames to encode, the others coming alone; None encodes all.
     """
-    every = [index for stretch in stretches for index in stretch]
     size = 1 if encoder is None else batch_of(encoder)
-    with closing(run_ahead(decode_frames(recording, every), max(2, size))) as frames:
-        if encoder is None:
-            yield from ((frame, None) for frame in frames)
-            return
-        lengths = [len(stretch) for stretch in stretches]
-        with closing(run_ahead(encode_batches(frames, lengths, encoder, size, chosen))) as seen:
-            yield from seen
+
+    def read() -> Generator[list[Frame | BadFrame]]:
+        for stretch in stretches:
+            for group in _groups(stretch, size, chosen):
+                yield [_frame(recording, index) for index in group]
+
+    def encoded() -> Generator[EncodedFrame]:
+        with closing(run_ahead(read())) as groups:
+            for group in groups:
+                frames = [one for one in group if isinstance(one, Frame) and (chosen is None or one.index in chosen)]
+                found = [] if encoder is None else encode_pixels(encoder, frames)
+                features = dict(zip((frame.index for frame in frames), found, strict=False))
+                for one in group:
+                    yield one, features.pop(one.index, None)
+
+    with closing(run_ahead(encoded())) as frames:
+        yield from frames
 
 
-def decode_frames(recording: Recording, indices: Iterable[int]) -> Generator[Frame | BadFrame]:
-    """Read frames; for one that cannot be read, yield the sentence that says why."""
-    for index in indices:
-        try:
-            yield recording.frame(index)
-        except RecordingError as fault:
-            yield BadFrame(index=index, why=strip_folder(str(fault), recording))
+def _frame(recording: Recording, index: int) -> Frame | BadFrame:
+    try:
+        return recording.frame(index)
+    except RecordingError as fault:
+        return BadFrame(index=index, why=strip_folder(str(fault), recording))
 
 
-def encode_batches(
-    frames: Iterator[Frame | BadFrame],
-    lengths: Sequence[int],
-    encoder: PixelEncoder,
-    size: int,
-    chosen: Collection[int] | None = None,
-) -> Generator[EncodedFrame]:
-    """Add features to frames, or to the chosen ones, at most ``size`` of them at once, stretch by stretch."""
-
-    def counts(frame: Frame | BadFrame) -> bool:
-        return isinstance(frame, Frame) and (chosen is None or frame.index in chosen)
-
-    for length in lengths:
-        stretch = islice(frames, length)
-        while group := _next_group(stretch, size, counts):
-            wanted = [frame for frame in group if isinstance(frame, Frame) and counts(frame)]
-            features = iter(encode_pixels(encoder, wanted))
-            for frame in group:
-                yield frame, (next(features) if counts(frame) else None)
-
-
-def _next_group(
-    frames: Iterator[Frame | BadFrame], size: int, counts: Callable[[Frame | BadFrame], bool]
-) -> list[Frame | BadFrame]:
-    group: list[Frame | BadFrame] = []
-    good = 0
-    for frame in frames:
-        group.append(frame)
-        good += counts(frame)
-        if good == size or not good or len(group) >= _MOST_HELD * size:
-            break
-    return group
+def _groups(stretch: Sequence[int], size: int, chosen: Collection[int] | None) -> Iterator[list[int]]:
+    group: list[int] = []
+    wanted = 0
+    for index in stretch:
+        group.append(index)
+        wanted += chosen is None or index in chosen
+        if wanted == size or len(group) >= _MOST_HELD * size:
+            yield group
+            group, wanted = [], 0
+    if group:
+        yield group
 
 
 def batch_of(encoder: PixelEncoder) -> int:

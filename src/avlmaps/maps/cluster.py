@@ -143,23 +143,17 @@ class RayPool:
             ) from None
 
     def _join(self, host: str, port: int) -> None:
-        try:
-            socket.create_connection((host, port), self._wait_s).close()
-        except OSError as fault:
-            raise MapError(
-                f"No Ray cluster answers at {self._address} within {self._wait_s:g} s ({fault.strerror or fault}); "
-                "start one there, or check the address."
-            ) from None
         check = [sys.executable, "-m", "ray.scripts.scripts", "health-check", flag("address"), f"{host}:{port}"]
         try:
-            healthy = subprocess.run(check, capture_output=True, timeout=_HEALTH * self._wait_s, check=False).returncode
-        except subprocess.TimeoutExpired:
-            healthy = 1
-        if healthy != 0:
+            socket.create_connection((host, port), self._wait_s).close()
+            healthy = subprocess.run(check, capture_output=True, timeout=_HEALTH * self._wait_s, check=False)
+            fault = "" if healthy.returncode == 0 else "what answers is no Ray cluster that lets this machine in"
+        except (OSError, subprocess.TimeoutExpired) as stopped:
+            fault = str(stopped) if isinstance(stopped, OSError) else "what answers is no Ray cluster"
+        if fault:
             raise MapError(
-                f"What answers at {self._address} is no Ray cluster that lets this machine in within "
-                f"{_HEALTH * self._wait_s:g} s; check the address, and where the cluster asks for a token, set "
-                "RAY_AUTH_MODE=token here."
+                f"No Ray cluster answers at {self._address} within {self._wait_s:g} s ({fault}); start one there, or "
+                "check the address. Where the cluster asks for a token, set RAY_AUTH_MODE=token here."
             )
         remedy = "This machine must be part of the cluster, with the same Ray and Python as the others."
         self._init(f"the Ray cluster at {self._address}", remedy, address=self._address)

@@ -14,7 +14,7 @@ from avlmaps.core.wording import option
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.fusion.sensor import FRAMES, MODELS, SensorModel, measure_noise, nearest_model
 from avlmaps.maps.gravity.floor import Expected, FloorEvidence, FoundFloor, find_ground
-from avlmaps.maps.gravity.up import some_frames, tilted_parts, up_doubts
+from avlmaps.maps.gravity.up import some_frames, up_doubts
 from avlmaps.maps.plan import strip_folder
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.sources.wiring import check_wiring
@@ -63,13 +63,11 @@ def judge(recording: Recording, useless: Sequence[str] | None = None, *, closely
     verdict = examine_recording(recording) if closely else check_recording(recording)
     if verdict.refused(()) is not None:  # with such poses nothing is level
         return verdict
-    rng = np.random.default_rng(0)
-    tilted = up_doubts(recording, some_frames(recording), rng)
-    tilted = tilted or (tilted_parts(recording, rng) if closely else ())
+    tilted = up_doubts(recording, some_frames(recording), np.random.default_rng(0))
     array = _array_of(recording)
-    wired, unsure = ([], []) if array is None else _of_microphones(array, recording.walk, useless)
+    wired = [] if array is None else _of_microphones(array, recording.walk, useless)
     findings = (*verdict.findings, *tilted, *wired)
-    return replace(verdict, findings=findings, unchecked=(*verdict.unchecked, *unsure) if not findings else ())
+    return replace(verdict, findings=findings, unchecked=verdict.unchecked if not findings else ())
 
 
 def doubts_of_walk(walk: Trajectory, held: Recording) -> tuple[str, ...]:
@@ -83,7 +81,7 @@ def doubts_of_walk(walk: Trajectory, held: Recording) -> tuple[str, ...]:
 def doubts_of_channels(track: AudioTrack, walk: Trajectory, name: str) -> tuple[str, ...]:
     """Return what is doubtful about the channels of an array: their wiring, and those of no use."""
     useless = useless_channels(track, name)
-    return (*map(str, _of_microphones(track, walk, useless)[0]), *useless)
+    return (*map(str, _of_microphones(track, walk, useless)), *useless)
 
 
 def _array_of(recording: Recording) -> AudioTrack | None:
@@ -96,21 +94,17 @@ def _useless(recording: Recording) -> list[str]:
     return useless_channels(array) if array is not None else []
 
 
-def _of_microphones(
-    track: AudioTrack, walk: Trajectory, useless: Sequence[str] | None
-) -> tuple[list[Finding], list[str]]:
-    """Return what is wrong with the order of the channels, and what about it does not show."""
+def _of_microphones(track: AudioTrack, walk: Trajectory, useless: Sequence[str] | None) -> list[Finding]:
+    """Return what is wrong with the order and the signs of the channels."""
     try:
         if useless_channels(track) if useless is None else useless:
-            return [], []
+            return []
         spans_s = [(heard.onset_s, heard.offset_s) for heard in segment(track)]
         found = check_wiring(track, walk, spans_s)
     except AudioError:  # the track is validated and read elsewhere, with a sentence for that
-        return [], []
-    if found is None:
-        return [], [
-            "The order of the channels cannot be checked here: the track has fewer than three sounds during the drive."
-        ]
+        return []
+    if found is None or found.is_right:
+        return []
     fits = (
         f"over {found.sounds} sounds along the drive they reach {found.fit:.2f} of the greatest correlation as "
         f"described, and {found.best_fit:.2f}"
@@ -122,24 +116,16 @@ def _of_microphones(
             f"{of_them[0]} {named} of the microphones {of_them[1]} wired the other way round: {fits} with {of_them[2]} "
             "turned, as sources are found."
         )
-        return [_doubtful(sentence, f"Exchange the two wires of each ({named}), or turn its sign.")], []
-    if not found.is_right:
-        moved = [str(channel + 1) for channel, microphone in enumerate(found.order) if channel != microphone]
-        order = ", ".join(str(microphone + 1) for microphone in found.order)
-        sentence = (
-            f"Channels {' and '.join([', '.join(moved[:-1]), moved[-1]])} of the microphones look exchanged: their "
-            f"delays do not fit the places; {fits} with the places in the order {order}."
-        )
-        turned = " (or that order turned or mirrored, which fits as well)" if found.unsure else ""
-        remedy = f"Put the wires right, or write positions_m of {DESCRIPTION} in that order{turned}, and build again."
-        return [_doubtful(sentence, remedy)], []
-    if not found.unsure:
-        return [], []
-    others = " or ".join(" ".join(str(microphone + 1) for microphone in order) for order in found.unsure[:2])
-    return [], [
-        f"Channels in the order {others} would not show here, because the robot hardly turned or moved while it heard "
-        "sounds; check the places of the microphones by hand, or drive in curves past something that sounds."
-    ]
+        return [_doubtful(sentence, f"Exchange the two wires of each ({named}), or turn its sign.")]
+    moved = [str(channel + 1) for channel, microphone in enumerate(found.order) if channel != microphone]
+    order = ", ".join(str(microphone + 1) for microphone in found.order)
+    sentence = (
+        f"Channels {' and '.join([', '.join(moved[:-1]), moved[-1]])} of the microphones look exchanged: their "
+        f"delays do not fit the places; {fits} with the places in the order {order}."
+    )
+    turned = " (or that order turned or mirrored, which fits as well)" if found.unsure else ""
+    remedy = f"Put the wires right, or write positions_m of {DESCRIPTION} in that order{turned}, and build again."
+    return [_doubtful(sentence, remedy)]
 
 
 def _doubtful(sentence: str, remedy: str) -> Finding:

@@ -2,9 +2,7 @@
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
-from itertools import chain
 
 import numpy as np
 
@@ -30,8 +28,7 @@ _GUESS = 0.1
 MOST_SEEN_THROUGH = 0.15
 # With fewer voxels, or fewer keyframes or sounds, features may be the same by chance.
 _FEWEST_VOXELS, _FEWEST_LOOKS = 100, 4
-_SOME = 100  # that decide for most maps
-_AT_ONCE = 10_000
+_SOME = 1000  # rows that are compared, evenly spread
 _ROUNDING = 1e-3  # of float16
 _STOOD = 0.05  # metres, and entries of a rotation
 
@@ -68,15 +65,6 @@ def surfaces(
             f"scale, or use every depth as it is ({option('sensor', 'none')})."
         )
     return total.voxels(kept=kept), manifest.Removed(**removed)
-
-
-def with_clear_views(keyframes: Keyframes, views: Sequence[FreeViews]) -> Keyframes:
-    """Return keyframes with what each of them saw freely, where frames were looked at for that."""
-    rows = {pose.tobytes(): (part, row) for part in views for row, pose in enumerate(np.asarray(part.clear_pose))}
-    found = [rows.get(pose.tobytes()) for pose in np.asarray(keyframes.world_from_camera, np.float64)]
-    if not found or None in found:
-        return keyframes
-    return replace(keyframes, clear_mm=np.stack([part.clear_mm[row] for part, row in filter(None, found)]))
 
 
 def recording_info(recording: Recording) -> manifest.RecordingInfo:
@@ -161,7 +149,5 @@ def feature_doubts(
 
 
 def _are_one(features: Float[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> bool:
-    first = np.asarray(features[rows[0]], np.float32)
     some = rows[:: max(1, len(rows) // _SOME)]
-    parts = chain([some], (rows[at : at + _AT_ONCE] for at in range(0, len(rows), _AT_ONCE)))
-    return all(float(np.abs(features[part] - first).max(initial=0.0)) <= _ROUNDING for part in parts)
+    return float(np.ptp(np.asarray(features[some], np.float32), axis=0).max(initial=0.0)) <= _ROUNDING

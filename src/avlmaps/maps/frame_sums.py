@@ -15,7 +15,7 @@ from avlmaps.core.files import decode_json
 from avlmaps.core.registry import Kind
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.free_space import FreeViewCollector, FreeViews
+from avlmaps.maps.fusion.free_space import FreeViews, free_views
 from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.fusion.submaps import submap_of
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, features_alone
@@ -152,7 +152,7 @@ class Part:
 
     number: int
     sums: VoxelAccumulator
-    views: FreeViewCollector
+    views: list[FreeViews] = field(default_factory=list[FreeViews])
     stamps_s: list[float] = field(default_factory=list[float])
     poses: list[np.ndarray] = field(default_factory=list[np.ndarray])
 
@@ -174,7 +174,7 @@ class SubmapBook:
         """Add frames to the submap of a number, which begins in ``empty`` if it is another one than before."""
         if self._open is None or self._open.number != part.number:
             self.close()
-            self._open = Part(part.number, empty, part.views)
+            self._open = Part(part.number, empty)
         self._open.sums.merge(part.sums.sums())
         self._open.stamps_s += part.stamps_s
         self._open.poses += part.poses
@@ -218,7 +218,7 @@ class FrameSums:
         self.dim = features.shape[2] if features is not None else self._known_dim()
         part = self._part_for(frame, sensor)
         part.sums.add(frame, features)
-        part.views.add(frame)
+        part.views.append(free_views([frame], sensor))
         part.stamps_s.append(frame.stamp_s)
         part.poses.append(np.array(frame.world_from_camera, np.float64))
         self._submap = part.number, part.sums.frames
@@ -259,5 +259,5 @@ class FrameSums:
         if not self._parts or self._parts[-1].number != number:
             sums = self.empty(sensor)
             sums.frames = self._submap[1] if self._submap[0] == number else 0
-            self._parts.append(Part(number, sums, FreeViewCollector(frame.rig.depth, sensor)))
+            self._parts.append(Part(number, sums))
         return self._parts[-1]

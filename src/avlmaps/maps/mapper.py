@@ -29,11 +29,10 @@ from avlmaps.maps.finish import (
     recording_info,
     surfaces,
     walked_info,
-    with_clear_views,
 )
 from avlmaps.maps.frame_sums import FrameSums, HeldFrames, MapState, SubmapBook, Walked
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.free_space import FreeViewCollector, FreeViews, ThroughCounts
+from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts
 from avlmaps.maps.fusion.submaps import MovedSubmaps, submap_of
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.hearing import Hearing
@@ -308,14 +307,15 @@ class Mapper:
     def _describe(self) -> None:
         with self._finishing:
             for _ in range(len(self._undescribed)):
-                self._album.add(self._undescribed.pop(0))
+                assert self.start is not None
+                self._album.add(self._undescribed.pop(0), self.start.sensor.model)
 
     def _absorb(self) -> None:
         with self._adding:
             for part in self._sums.take():
                 assert self.start is not None
                 self._surfaces = None
-                self._views.append(part.views.views())
+                self._views += part.views
                 self._stamps_s += part.stamps_s
                 self._poses += part.poses
                 self._fused += len(part.stamps_s)
@@ -328,9 +328,7 @@ class Mapper:
         self._describe()
 
     def _all_views(self) -> FreeViews:
-        assert self._rig is not None and self.start is not None
-        none = FreeViewCollector(self._rig.depth, self.start.sensor.model).views()
-        self._views = [concat([none, *self._views])]
+        self._views = [concat(self._views)]
         return self._views[0]
 
     # Submaps
@@ -381,7 +379,8 @@ class Mapper:
             submaps = self._book.submaps()
             assert submaps is not None
             placed, grid = self._pose_of(submaps.stamp_s), GridSpec(self.settings.voxel_size_m)
-            self._whole = VoxelAccumulator.of_table(MovedSubmaps(submaps, placed, grid).table(), grid)
+            self._whole = VoxelAccumulator(grid, submaps.feature.shape[1])
+            MovedSubmaps(submaps, placed, grid).add_to(self._whole)
             views = self._all_views()
             self._views = [FreeViews(views.clear_mm, placed[: len(views)])]
             self._through = self._surfaces = None
@@ -479,7 +478,6 @@ class Mapper:
         ends["merging"] = perf_counter()
         rng = np.random.default_rng([self.settings.seed, _PLACES])
         keyframes, state = self._album.keyframes(rng, final=final)
-        keyframes = with_clear_views(keyframes, self._views)
         ends["keyframes"] = perf_counter()
         sounds = self.hearing.sounds(walked, final=final)
         ends["sounds"] = perf_counter()

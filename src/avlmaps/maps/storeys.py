@@ -183,22 +183,14 @@ class _Columns:
         return np.c_[xy, self.heights_m(keys)]
 
     def under(self, surface: Int[np.ndarray, " m"], cameras: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, " k"]:
-        cell = np.floor(cameras / np.array([self.cell_m[0], self.cell_m[0], self.cell_m[1]])) - self.low
-        reach = int(np.ceil(_ROUND_M / self.cell_m[0]))
-        inside = ((cell[:, :2] >= reach) & (cell[:, :2] < np.array(self.span[:2]) - reach)).all(axis=1)
-        out = np.full((len(cameras), (2 * reach + 1) ** 2), np.nan)
-        i, j, k = np.moveaxis(cell[inside].astype(np.int64), -1, 0)
-        k = np.clip(k, 0, self.span[2] - 1)
-        for number, (di, dj) in enumerate(product(range(-reach, reach + 1), repeat=2)):
-            top: Int[np.ndarray, " c"] = ((i + di) * self.span[1] + j + dj) * self.span[2] + k
-            at = np.maximum(np.searchsorted(surface, top, side="right") - 1, 0)
-            down_m = (top - surface[at]) * float(self.cell_m[1])
-            there = (surface[at] <= top) & (down_m >= _CARRIED_M[0]) & (down_m <= _CARRIED_M[1])
-            there &= surface[at] // self.span[2] == top // self.span[2]
-            out[inside, number] = np.where(there, self.heights_m(surface[at]), np.nan)
-        seen = np.isfinite(out).any(axis=1)
-        under = np.full(len(cameras), np.nan)
-        under[seen] = np.nanmedian(out[seen], axis=1)
+        from scipy.spatial import KDTree
+
+        place, under = self.middles(surface), np.full(len(cameras), np.nan)
+        close = KDTree(place[:, :2]).query_ball_point(cameras[:, :2], _ROUND_M)
+        for number, rows in enumerate(close):
+            down_m = cameras[number, 2] - place[rows, 2]
+            there = place[rows, 2][(down_m >= _CARRIED_M[0]) & (down_m <= _CARRIED_M[1])]
+            under[number] = np.median(there) if len(there) else np.nan
         return under
 
     def clear(self, keys: Int[np.ndarray, " m"]) -> Bool[np.ndarray, " m"]:

@@ -9,15 +9,14 @@ parts of a recording add up to the map of the whole.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float16, Float32, Float64, Int32
+from jaxtyping import Float, Float32, Float64, Int32
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
 from avlmaps.maps.fusion import kernels
 from avlmaps.maps.fusion.sensor import NONE, FusionSettings, SensorModel
-from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable, VoxelViews
+from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.types import Voxels
 from avlmaps.recordings.types import Frame
 
 FARTHEST_VOXEL = (1 << 31) - 2 * kernels.REACH_VOXELS  # indices are int32
@@ -122,7 +121,7 @@ class _Scratch:
         self.voxels = np.empty(slots, np.int64), np.empty(slots, np.int32), *self.voxels[2:]
 
 
-class VoxelAccumulator:
+class VoxelAccumulator(VoxelTable):
     """Adds up frames, or the sums of parts, into sparse voxels without bounds.
 
     Weights are float64 and never fall below 1e-30 (which exp(−d² / 1.2) reaches at 9.1 m), so that what was only
@@ -151,19 +150,14 @@ class VoxelAccumulator:
         """
         if dim < 0:
             raise ValueError(f"dim is {dim}; a feature cannot have fewer than 0 numbers")
+        super().__init__(dim, with_spread=with_spread)
         self.grid = grid
-        self.dim = dim
         self.settings = settings or FusionSettings()
         self.sensor = sensor
         self.frames = 0
         self._with_spread = with_spread
-        self._table = VoxelTable(dim, with_spread=with_spread)
         self._lookup: tuple[Rig, int, int, PixelLookup] | None = None
         self._scratch = _Scratch(1, 1, with_spread=with_spread)
-
-    def __len__(self) -> int:
-        """Return how many voxels there are."""
-        return self._table.count
 
     def add(self, frame: Frame, features: Float[np.ndarray, "hf wf d"] | None = None) -> int:
         """Add a frame: every pixel with a depth within the limits counts, once.
@@ -194,57 +188,18 @@ class VoxelAccumulator:
             if pairs >= 0:
                 break
             held.enlarge()
-        table, rows = self._table, np.empty(voxels, np.int32)
-        table.reserve(voxels)
+        rows = np.empty(voxels, np.int32)
+        self.reserve(voxels)
         of_frame = voxels, self.frames, float(frame.stamp_s)
-        table.count = int(kernels.commit(of_frame, pose[2], held.voxels, table.arrays, table.count, rows))
+        self.count = int(kernels.commit(of_frame, pose[2], held.voxels, self.arrays, self.count, rows))
         self.frames += 1
-        faults = kernels.add_features(rows, held.pairs, cells, table.feature_sum, table.weight) if pairs else 0
+        faults = kernels.add_features(rows, held.pairs, cells, self.feature_sum, self.weight) if pairs else 0
         if faults:
             raise BackendError(
                 f"The pixel encoder gave NaN or infinite features for frame {frame.name} (in {faults} voxels); "
                 "leave the frame out or choose another profile."
             )
         return points
-
-    def merge(self, part: VoxelSums) -> None:
-        """Add the sums of another part of the same recording, in any order; a memory-mapped part is streamed."""
-        self._table.add(part)
-
-    def views_at(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
-        """Return how many frames have a pixel in each of some voxels."""
-        row = self._table.find(index)
-        return np.where(row >= 0, self._table.views[row], 0)
-
-    @classmethod
-    def of_table(cls, table: VoxelTable, grid: GridSpec) -> "VoxelAccumulator":
-        """Return the accumulator of a table."""
-        total = cls(grid, table.dim)
-        total._table = table
-        return total
-
-    def sums(self, feature_out: Float32[np.ndarray, "n d"] | None = None) -> VoxelSums:
-        """Return a copy of the sums, sorted by index.
-
-        Args:
-            feature_out: where to write the sums of features, such as a memory-mapped file; by default a new array.
-        """
-        return self._table.sums(feature_out)
-
-    def evidence(self) -> VoxelViews:
-        """Return the evidence of each voxel's surface, sorted by index, for `free_space.clean`."""
-        return self._table.evidence()
-
-    def voxels(
-        self, feature_out: Float16[np.ndarray, "k d"] | None = None, kept: Bool[np.ndarray, " n"] | None = None
-    ) -> Voxels:
-        """Return the means, sorted by index: features of unit length, colours.
-
-        Args:
-            kept: which voxels of `evidence` to return; all by default.
-            feature_out: where to write the features, such as a memory-mapped file; by default a new array.
-        """
-        return self._table.voxels(feature_out, kept)
 
     def _limits(self) -> kernels.Limits:
         settings, sensor, half = self.settings, self.sensor, 0.5 * self.grid.voxel_size_m

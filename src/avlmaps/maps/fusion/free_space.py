@@ -49,25 +49,13 @@ def block_size(camera: Pinhole) -> int:
     return max(1, -(-camera.width // BLOCKS_WIDE))
 
 
-class FreeViewCollector:
-    """Collects the free views of frames."""
-
-    def __init__(self, camera: Pinhole, sensor: SensorModel) -> None:
-        self._size, self._sensor = block_size(camera), sensor
-        self._shape = -(-camera.height // self._size), -(-camera.width // self._size)
-        self._clear: list[np.ndarray] = []
-        self._pose: list[np.ndarray] = []
-
-    def add(self, frame: Frame) -> None:
-        """Add a frame."""
-        if not self._sensor.carve:
-            return
-        self._clear.append(clear_blocks(frame.depth_m, self._size, self._sensor))
-        self._pose.append(np.array(frame.world_from_camera, np.float64))
-
-    def views(self) -> FreeViews:
-        """Return the collected evidence."""
-        return stack_views(self._clear, self._pose, self._shape)
+def free_views(frames: Sequence[Frame], sensor: SensorModel) -> FreeViews:
+    """Return how far frames of one camera, at least one, see freely; nothing where depths are used as they are."""
+    used, size = frames if sensor.carve else (), block_size(frames[0].rig.depth)
+    rows, columns = (-(-side // size) for side in frames[0].depth_m.shape)
+    clear = [clear_blocks(frame.depth_m, size, sensor) for frame in used]
+    pose = [np.asarray(frame.world_from_camera, np.float64) for frame in used]
+    return FreeViews(np.reshape(clear, (-1, rows, columns)).astype(np.uint16), np.reshape(pose, (-1, 4, 4)))
 
 
 def clear_blocks(depth_m: Float32[np.ndarray, "h w"], size: int, sensor: SensorModel) -> UInt16[np.ndarray, "r c"]:
@@ -107,12 +95,6 @@ class ThroughCounts:
             counts[~known] = count_through(index[~known], self._grid, self._camera, [views])
         self._index, self._counts, self._frames = index, counts, len(views)
         return counts.copy()
-
-
-def stack_views(clear: Sequence[np.ndarray], pose: Sequence[np.ndarray], shape: tuple[int, int]) -> FreeViews:
-    """Return the views of frames, one each; ``shape`` is the rows and columns of blocks."""
-    stacked = np.stack(clear) if len(clear) else np.zeros((0, *shape), np.uint16)
-    return FreeViews(stacked, np.stack(pose) if len(pose) else np.zeros((0, 4, 4)))
 
 
 def count_through(

@@ -461,13 +461,13 @@ def fall_into_cells(
         share: of it.
     """
     even, within = 12.0**0.5, 0.4999  # an even spread over a length has a standard deviation of the length over this
-    count, pairs = np.zeros(64, np.int64), np.int64(0)
+    count, steps, pairs = np.zeros(64, np.int64), np.zeros(3, np.int64), np.int64(0)
     for n in range(lies.shape[0]):
         xx, yx, yy, zx, zy, zz = lies[n, 3], lies[n, 4], lies[n, 5], lies[n, 6], lies[n, 7], lies[n, 8]
         sigmas = np.sqrt(xx * xx + yx * yx + zx * zx), np.sqrt(yy * yy + zy * zy), zz
-        first = np.int64(min(max(np.ceil(sigmas[0] * even * 4 - 0.2), 1.0), 4.0))
-        second = np.int64(min(max(np.ceil(sigmas[1] * even * 4 - 0.2), 1.0), 4.0))
-        third = np.int64(min(max(np.ceil(sigmas[2] * even * 4 - 0.2), 1.0), 4.0))
+        for axis in range(3):
+            steps[axis] = np.int64(min(max(np.ceil(sigmas[axis] * even * 4 - 0.2), 1.0), 4.0))
+        first, second, third = steps[0], steps[1], steps[2]
         base = np.floor(middle[n, 0]), np.floor(middle[n, 1]), np.floor(middle[n, 2])
         u, v, w = middle[n, 0] - base[0], middle[n, 1] - base[1], middle[n, 2] - base[2]
         samples = first * second * third

@@ -7,12 +7,13 @@ voxel where it falls. Samples stay within their voxel, so that a shift by whole 
 changes nothing. What is merged are sums, so that a map follows any number of corrections, and no error adds up.
 """
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool, Float, Float32, Float64, Int, Int8, Int32, UInt16
+from avlmaps.core.arrays import Bool, Float, Float32, Float64, Int, Int8, UInt16
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse
 from avlmaps.maps.fusion.kernels import fall_into_cells
@@ -99,13 +100,14 @@ class MovedSubmaps:
         moved = (pose @ inverse(np.asarray(submaps.fused_pose)))[:, :3]
         moved[:, :, 3] /= grid.voxel_size_m
         pairs = [self._move(number, moved) for number in range(len(submaps))]
-        self._pairs = to, row, share = tuple(np.concatenate(column) for column in zip(*pairs, strict=True))
+        to, row, share, hits = (np.concatenate(column) for column in zip(*pairs, strict=True))
+        self._pairs = to, row, share
         table, count = self._table, self._table.count
 
         def summed(values: np.ndarray) -> np.ndarray:
             return np.bincount(to, values, minlength=count)
 
-        table.hits[:count] = summed(_hits(submaps, row, share))
+        table.hits[:count] = summed(hits)
         table.sharp[:count] = summed(np.floor(share * np.asarray(submaps.sharp)[row] + 0.5))
         table.weight[:count] = summed(share * np.asarray(submaps.weight)[row])
         table.rgb_weight[:count] = summed(share * np.asarray(submaps.rgb_weight)[row])
@@ -130,15 +132,12 @@ class MovedSubmaps:
             feature[block] = unit_rows(self._features(rows[block]))
         return Voxels(plain.index, feature, plain.weight, plain.rgb, plain.last_seen_s, plain.hits)
 
-    def table(self) -> VoxelTable:
-        """Return the sums as a table, to which frames can be added."""
-        sums = self._table.sums()
-        made = VoxelTable(self._submaps.feature.shape[1])
-        made.add(VoxelSums(**{**_fields(sums), "feature_sum": self._features(self._order)}))
-        return made
+    def add_to(self, total: VoxelTable) -> None:
+        """Add the sums to a table, to which frames can be added."""
+        total.merge(replace(self._table.sums(), feature_sum=self._features(self._order)))
 
-    def _move(self, number: int, moved: Float64[np.ndarray, "f 3 4"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Note how many frames of a submap saw each voxel, and return its pairs."""
+    def _move(self, number: int, moved: Float64[np.ndarray, "f 3 4"]) -> tuple[np.ndarray, ...]:
+        """Note how many frames of a submap saw each voxel, and return its pairs with their hits."""
         submaps, table = self._submaps, self._table
         frames = slice(*(int(at) for at in submaps.frame_offsets[number : number + 2]))
         rows = slice(*(int(at) for at in submaps.row_offsets[number : number + 2]))
@@ -157,11 +156,12 @@ class MovedSubmaps:
         turn = np.ascontiguousarray(motion[:, :, :3])
         count = int(fall_into_cells(lies, turn, middle, hits, cell, source, share))
         to, row, share = table.rows_of(cell[:count]), source[:count] + np.int32(rows.start), share[:count].copy()
-        seen = np.minimum(np.asarray(submaps.views)[row], _hits(submaps, row, share))  # no more frames than hits
+        own = np.maximum((share * np.asarray(submaps.hits)[row] + 0.5).astype(np.int64), 1)
+        seen = np.minimum(np.asarray(submaps.views)[row], own)  # no more frames than hits
         views = np.zeros(table.count, np.int32)
         np.maximum.at(views, to, seen.astype(np.int32))  # the frames of a submap count once in a voxel
         table.views[: table.count] += views
-        return to, row, share
+        return to, row, share, own
 
     @cached_property
     def _shares(self) -> Any:
@@ -177,11 +177,3 @@ class MovedSubmaps:
         used, some.indices = np.unique(some.indices, return_inverse=True)
         some = type(some)((some.data, some.indices, some.indptr), (len(rows), len(used)))
         return some @ np.asarray(self._submaps.feature)[used].astype(np.float32)
-
-
-def _hits(submaps: Submaps, row: Int32[np.ndarray, " p"], share: Float32[np.ndarray, " p"]) -> Int[np.ndarray, " p"]:
-    return np.maximum((share * np.asarray(submaps.hits)[row] + 0.5).astype(np.int64), 1)
-
-
-def _fields(sums: VoxelSums) -> dict[str, np.ndarray]:
-    return {name: getattr(sums, name) for name in VoxelSums.__dataclass_fields__}

@@ -97,11 +97,15 @@ class VoxelTable:
         self.last_seen_s = np.zeros(SMALLEST_ROOM)
         self.spread = np.zeros((SMALLEST_ROOM, SPREAD_COLUMNS if with_spread else 0))
 
-    def find(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
-        """Return the row of each voxel, -1 where it is not there."""
-        found = np.empty(len(index), np.int32)
-        find_rows(np.ascontiguousarray(index, np.int32), self.slots, self.index, self.count, False, found)
-        return found
+    def __len__(self) -> int:
+        """Return how many voxels there are."""
+        return self.count
+
+    def views_at(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
+        """Return how many frames have a pixel in each of some voxels."""
+        row = np.empty(len(index), np.int32)
+        find_rows(np.ascontiguousarray(index, np.int32), self.slots, self.index, self.count, False, row)
+        return np.where(row >= 0, self.views[row], 0)
 
     def rows_of(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
         """Return the row of each voxel; those that are new become the last, and were never seen."""
@@ -137,8 +141,8 @@ class VoxelTable:
         if 2 * needed > len(self.slots):
             self.slots = hash_of(self.index[: self.count], 1 << (4 * needed - 1).bit_length())
 
-    def add(self, part: VoxelSums) -> None:
-        """Add the sums of a part, block by block, so that a memory-mapped part is never whole in memory."""
+    def merge(self, part: VoxelSums) -> None:
+        """Add the sums of another part of the same recording, in any order; a memory-mapped part is streamed."""
         if part.feature_sum.shape[1] != self.dim:
             raise MapError(
                 f"The part's features have {part.feature_sum.shape[1]} numbers and this map's {self.dim}; "
@@ -157,7 +161,11 @@ class VoxelTable:
         return sorted_rows(self.index[: self.count])
 
     def sums(self, feature_out: np.ndarray | None = None) -> VoxelSums:
-        """Return the sums, sorted; see `VoxelAccumulator.sums`."""
+        """Return a copy of the sums, sorted by index.
+
+        Args:
+            feature_out: where to write the sums of features, such as a memory-mapped file; by default a new array.
+        """
         rows = self.sort_rows()
         feature_sum = feature_array(feature_out, (self.count, self.dim), np.float32)
         for block in blocks(self.count, self.dim):
@@ -166,12 +174,17 @@ class VoxelTable:
         return VoxelSums(feature_sum=feature_sum, **{name: getattr(self, name)[rows] for name in others})
 
     def evidence(self) -> VoxelViews:
-        """Return the evidence of each voxel's surface, sorted."""
+        """Return the evidence of each voxel's surface, sorted by index, for `free_space.clean`."""
         rows = self.sort_rows()
         return VoxelViews(self.index[rows], self.hits[rows], self.views[rows], self.sharp[rows])
 
     def voxels(self, feature_out: np.ndarray | None = None, kept: Bool[np.ndarray, " n"] | None = None) -> Voxels:
-        """Return the means, sorted; see `VoxelAccumulator.voxels`."""
+        """Return the means, sorted by index: features of unit length, colours.
+
+        Args:
+            feature_out: where to write the features, such as a memory-mapped file; by default a new array.
+            kept: which voxels of `evidence` to return; all by default.
+        """
         rows = self.sort_rows()
         rows = rows if kept is None else rows[kept]
         feature = feature_array(feature_out, (len(rows), self.dim), np.float16)

@@ -13,7 +13,6 @@ from jaxtyping import Bool, Float
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.wording import option
-from avlmaps.recordings.consistency.sample import seams
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason
 from avlmaps.recordings.memory import is_of_program
 from avlmaps.recordings.types import Frame, Recording
@@ -117,8 +116,6 @@ _FRAMES = 16
 _APART_DEG = 20.0
 # Planes count where so large a share of the surface agrees and the camera was held within this angle of them.
 _LEAST_SUPPORT, _HELD_DEG = 0.1, 40.0
-# Of two parts of a recording, whose cameras and walks say as well what is up.
-_SOME_SUPPORT = 0.05
 # A walk is level: along what is up it spreads less than half as far as along what is not.
 _FLATTER, _STILL_M = 0.5, 0.15
 
@@ -153,43 +150,9 @@ def up_doubts(recording: Recording, frames: Iterator[Frame], rng: np.random.Gene
     return (Finding(Reason.UP, Grade.SUSPICIOUS, sentence, f"Give {up}, or fix the poses."),)
 
 
-def tilted_parts(recording: Recording, rng: np.random.Generator) -> tuple[Finding, ...]:
-    """Return a finding where up is another direction before a gap or a jump than after it, or nothing.
-
-    The camera says where to look, surfaces and the walk whether it is so: a phone that is turned after a
-    gap walks on the same floor as before.
-    """
-    up, places = -recording.world_from_camera[:, :3, 1], recording.world_from_camera[:, :3, 3]
-    for at in seams(recording):
-        parts = (slice(0, at + 1), slice(at + 1, len(recording)))
-        held = [up[part].mean(axis=0) for part in parts]
-        if _angle_deg(held[0], held[1]) < _APART_DEG:
-            continue
-        try:
-            found = [find_up(some_frames(recording, part.start, part.stop), rng) for part in parts]
-        except RecordingError:  # too little smooth surface
-            continue
-        apart = _angle_deg(found[0].direction, found[1].direction)
-        known = all(
-            one.support >= _SOME_SUPPORT
-            and _angle_deg(one.direction, so) <= _HELD_DEG
-            and np.std(places[part] @ one.direction) < _FLATTER * np.std(places[part] @ other.direction)
-            for one, other, so, part in zip(found, found[::-1], held, parts, strict=True)
-        )
-        if known and apart >= _APART_DEG:
-            sentence = (
-                f"Up is {_words(found[0].direction)} in the frames to {recording.name(at)} and "
-                f"{_words(found[1].direction)} in those after, {apart:.0f} degrees apart."
-            )
-            remedy = "They look like two recordings whose poses have different origins: give both one, or map each."
-            return (Finding(Reason.UP, Grade.SUSPICIOUS, sentence, remedy),)
-    return ()
-
-
-def some_frames(recording: Recording, first: int = 0, stop: int | None = None) -> Iterator[Frame]:
+def some_frames(recording: Recording) -> Iterator[Frame]:
     """Read a few frames, evenly spread; those that cannot be read are left out."""
-    last = (len(recording) if stop is None else stop) - 1
-    for index in np.unique(np.linspace(first, last, _FRAMES).round().astype(int)).tolist():
+    for index in np.unique(np.linspace(0, len(recording) - 1, _FRAMES).round().astype(int)).tolist():
         try:
             yield recording.frame(index)
         except RecordingError:

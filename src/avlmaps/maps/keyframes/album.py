@@ -13,6 +13,8 @@ from avlmaps.core.numbers import unmasked
 from avlmaps.core.poses import apply, inverse
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
+from avlmaps.maps.fusion.free_space import free_views
+from avlmaps.maps.fusion.sensor import NONE, SensorModel
 from avlmaps.maps.keyframes.choose import DEFAULT_KEYFRAMES, KeyframeSettings
 from avlmaps.maps.perceived import as_row, perceiving
 from avlmaps.maps.pose_correction import PoseCorrection
@@ -23,7 +25,9 @@ from avlmaps.recordings.images import depth_in_colour
 from avlmaps.recordings.types import Frame, Recording
 
 
-def describe_keyframe(frame: Frame, encoders: Encoders, settings: KeyframeSettings = DEFAULT_KEYFRAMES) -> Keyframes:
+def describe_keyframe(
+    frame: Frame, encoders: Encoders, settings: KeyframeSettings = DEFAULT_KEYFRAMES, sensor: SensorModel = NONE
+) -> Keyframes:
     """Run encoders on one frame, and return it as the one keyframe of a map; its place is described later."""
     with perceiving("An encoder of keyframes", frame.name):
         local = encoders.local.encode(frame.rgb.copy()) if Kind.LOCAL in encoders else _NOTHING
@@ -47,6 +51,7 @@ def describe_keyframe(frame: Frame, encoders: Encoders, settings: KeyframeSettin
         thumbnail_offsets=np.array([0, len(thumbnail)]),
         thumbnails=thumbnail,
         score=local.score.astype(np.float16),
+        clear_mm=free_views([frame], sensor).clear_mm,
     )
 
 
@@ -180,9 +185,9 @@ class KeyframeAlbum:
         self._learnt_from = 0
         self._stacked: Keyframes | None = None
 
-    def add(self, frame: Frame) -> None:
-        """Describe a frame."""
-        seen, self._size = describe_keyframe(frame, self._encoders, self._settings), frame.rgb.shape[1::-1]
+    def add(self, frame: Frame, sensor: SensorModel = NONE) -> None:
+        """Describe a frame of a depth camera."""
+        seen, self._size = describe_keyframe(frame, self._encoders, self._settings, sensor), frame.rgb.shape[1::-1]
         if self._has_places:
             with perceiving("The place encoder", frame.name):
                 encoder, local = self._encoders.place, local_features(seen, 0, self._size)
