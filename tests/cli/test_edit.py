@@ -64,7 +64,7 @@ def test_edits_are_there_in_another_build_of_the_map(home: Path, walk: Path, run
     ("words", "why"),
     [
         (("--rename", "red", "--pin", "x"), "--rename and --pin do not go together"),
-        (("--rename", "red"), "--rename needs --to"),
+        (("--rename", "red"), "rename needs --to"),
         (("--pin", "x", "--at", "1,2", "--to", "y"), "--to says nothing to --pin"),
         (("--at", "1,2"), "--at says nothing to a list of edits"),
         (("--forbid", "x", "--box", "a,b"), "--box takes x0,y0,x1,y1"),

@@ -20,7 +20,7 @@ from typing import Any
 import cv2
 import pytest
 
-from avlmaps.cli.shell import PipedLines
+from avlmaps.cli.shell import piped_lines
 from avlmaps.core.extras import install_command
 from helpers.raycast import render
 from helpers.room import Room
@@ -149,7 +149,7 @@ def test_a_map_that_is_replaced_is_opened_again(piped, built: Path, tmp_path: Pa
             return next(source, "")
 
     source = lines()
-    monkeypatch.setattr("avlmaps.cli.shell._piped", lambda: PipedLines(Stream()))
+    monkeypatch.setattr("avlmaps.cli.shell._piped", lambda: piped_lines(Stream()))
     status, _, err = piped("", copy, "--json")
     assert status == 0
     assert "was replaced on disk and is opened again" in err

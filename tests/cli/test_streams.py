@@ -101,7 +101,7 @@ def test_a_fault_in_one_line_of_the_shell_ends_only_that_line(
 ) -> None:
     from io import StringIO
 
-    from avlmaps.cli.shell import PipedLines, answer_lines
+    from avlmaps.cli.shell import answer_lines, piped_lines
 
     class Session:
         def answer(self, line: str, confirms: Any) -> Any:
@@ -109,7 +109,7 @@ def test_a_fault_in_one_line_of_the_shell_ends_only_that_line(
                 raise ZeroDivisionError("division by zero")
             raise RecordingError("There is nothing.")
 
-    failed, count = answer_lines(Session(), PipedLines(StringIO("bad\nworse\n")), as_json=True)  # pyright: ignore[reportArgumentType]
+    failed, count = answer_lines(Session(), piped_lines(StringIO("bad\nworse\n")), as_json=True)  # pyright: ignore[reportArgumentType]
     said = capsys.readouterr()
     assert (failed, count) == (2, 2)
     assert "ZeroDivisionError: division by zero; this is a fault of avlmaps" in said.err

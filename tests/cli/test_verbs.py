@@ -166,7 +166,7 @@ def test_a_sound_is_taught_and_forgotten(answer, run, tmp_path: Path, monkeypatc
 WRONG_WORDS = (
     (("query", "MAP"), "takes a sentence, or parts"),
     (("query", "MAP", "the chair", "--object", "red"), "and not both"),
-    (("query", "MAP", "--object", "red", "--top", "0"), "--top is 0; it must be 1 or more"),
+    (("query", "MAP", "--object", "red", "--top", "0"), "--top takes a number from 1 on, not 0"),
     (("query", "MAP", "--object", "red", "--intrinsics", "1,2,3,4"), "Intrinsics belong to a photo"),
     (("teach-sound", "x"), "teach-sound takes clips to learn from, or --forget"),
     (("info", "REC", "--plot", "x.png"), "--plot draws a map"),

@@ -14,8 +14,8 @@ from avlmaps.navigate.brake import Brake, BrakedDriver
 from avlmaps.navigate.costmap import obstacles_for
 from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.serve.drive.app import DriveService, drive_app
-from avlmaps.serve.drive.orders import Dispatcher, MapNow, OrderLog
+from avlmaps.serve.drive.app import DriveService
+from avlmaps.serve.drive.orders import Dispatcher, OrderLog
 from avlmaps.serve.service import Service
 from helpers.kinematic import KinematicDriver
 
@@ -99,11 +99,7 @@ class Driven:
 
     @property
     def mounts(self) -> dict[str, Any]:
-        return {"/drive": drive_app(self.service)}
-
-    @property
-    def lifespans(self) -> tuple[Any, ...]:
-        return (self.service.lifespan,)
+        return {"/drive": self.service.app}
 
     @property
     def entries(self) -> list[dict[str, Any]]:
@@ -119,10 +115,5 @@ class Driven:
 def driven(maps: Service, log: Path, machine: CountingMachine | None = None) -> Driven:
     """Return a driving server beside a server of maps."""
     machine, now_s = machine or CountingMachine(), [0.0]
-
-    def current() -> MapNow:
-        served = maps.shelf.get(None)
-        return MapNow(served.name, served.version, served.avlmap)
-
-    dispatcher = Dispatcher(machine, current, OrderLog(log), clock=lambda: now_s[0])
-    return Driven(machine, dispatcher, DriveService(dispatcher), log, now_s)
+    dispatcher = Dispatcher(machine, maps.shelf.get, OrderLog(log), clock=lambda: now_s[0])
+    return Driven(machine, dispatcher, DriveService(dispatcher, maps), log, now_s)

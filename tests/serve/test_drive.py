@@ -15,7 +15,8 @@ from starlette.testclient import TestClient
 
 from avlmaps.serve.agents import MOST_TOKENS, token_count
 from avlmaps.serve.app import create_app
-from avlmaps.serve.drive.orders import DriveError, OrderPlan, PlanBook, Who
+from avlmaps.serve.drive.orders import OrderPlan, PlanBook, Who
+from avlmaps.serve.lanes import RequestError
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeSettings
 from helpers.driven_server import START, Driven, driven
@@ -30,7 +31,7 @@ def drive(service: Service, tmp_path: Path) -> Driven:
 
 @pytest.fixture
 def client(service: Service, drive: Driven) -> Iterator[TestClient]:
-    with TestClient(create_app(service, drive.mounts, drive.lifespans), base_url=BASE) as opened:
+    with TestClient(create_app(service, drive.mounts), base_url=BASE) as opened:
         yield opened
 
 
@@ -286,7 +287,7 @@ def test_the_token_of_the_server_stands_before_every_address(service: Service, d
     from dataclasses import replace
 
     guarded = replace(service, settings=ServeSettings(token="x" * 20))
-    with TestClient(create_app(guarded, drive.mounts, drive.lifespans), base_url=BASE) as client:
+    with TestClient(create_app(guarded, drive.mounts), base_url=BASE) as client:
         for path in ("plan", "confirm", "stop", "mcp"):
             assert client.post(f"/drive/{path}", json={}).status_code == 401
         assert client.get("/drive/status").status_code == 401
@@ -296,13 +297,13 @@ def test_the_token_of_the_server_stands_before_every_address(service: Service, d
 
 def test_the_end_of_the_server_stops_the_robot(service: Service, drive: Driven) -> None:
     drive.machine.body.let_go.clear()
-    with TestClient(create_app(service, drive.mounts, drive.lifespans), base_url=BASE) as client:
+    with TestClient(create_app(service, drive.mounts), base_url=BASE) as client:
         token = plan(client, "turn left")["token"]
         client.post("/drive/confirm", json={"token": token})
     assert drive.machine.stops >= 1 and drive.machine.closed == 1
     assert drive.machine.motions == 0
     assert drive.entries[-1]["event"] in ("stop", "ended")
-    with pytest.raises(DriveError):
+    with pytest.raises(RequestError):
         drive.dispatcher.plan("turn left", "", Who("here"))
 
 
@@ -313,7 +314,10 @@ def test_without_drive_there_is_no_such_address(service: Service) -> None:
 
 
 def a_plan(order: str) -> OrderPlan:
-    return OrderPlan(order, "", "", "", (), (), 0.0, (), START, "m", "v", "r")
+    return OrderPlan(
+        order=order, words="", reading="", program="", notes=[], path=[], path_m=0.0, subgoals=[], map="m", version="v",
+        robot="r", start=START,
+    )  # fmt: skip
 
 
 @given(st.lists(st.tuples(st.sampled_from(["add", "take", "old", "wrong", "clear"]), st.integers(0, 5)), max_size=30))
@@ -332,7 +336,7 @@ def test_a_token_returns_its_own_plan_once_whatever_comes_before(steps: list[tup
         elif step == "old":
             now += 4.0
         elif step == "wrong":
-            with pytest.raises(DriveError):
+            with pytest.raises(RequestError):
                 book.take(f"wrong{which}", now)
         elif tokens:
             token = tokens[which % len(tokens)]
@@ -340,18 +344,16 @@ def test_a_token_returns_its_own_plan_once_whatever_comes_before(steps: list[tup
             if order is not None and now - made <= 10.0:
                 assert book.take(token, now).order == order
             else:
-                with pytest.raises(DriveError):
+                with pytest.raises(RequestError):
                     book.take(token, now)
 
 
 def test_status_streams_until_the_server_ends(service: Service, drive: Driven) -> None:
     import asyncio
 
-    from avlmaps.serve.drive.app import _events
-
     async def streamed() -> list[dict[str, Any]]:
         seen: list[dict[str, Any]] = []
-        async for event in _events(drive.service):
+        async for event in drive.service.events():
             assert event.startswith(b"event: status\ndata: ")
             seen.append(json.loads(event.partition(b"data: ")[2]))
             if len(seen) == 1:

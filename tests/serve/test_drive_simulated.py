@@ -29,7 +29,7 @@ def test_it_drives_in_its_scene_stays_where_it_stops_and_is_stopped(
     monkeypatch.setattr("avlmaps_sim.scenes.open_scene", lambda spec: scene_of(Room()))
     file = wrote(tmp_path / "r.json", robot="simulated", scene="room", start=[4.4, 3.2, 90.0], action_s=0.0)
     driving = open_driving(file, service, tmp_path / "log")
-    with TestClient(create_app(service, driving.mounts, driving.lifespans), base_url="http://127.0.0.1:8750") as client:
+    with TestClient(create_app(service, {"/drive": driving.app}), base_url="http://127.0.0.1:8750") as client:
 
         def drive(words: str) -> None:
             planned = client.post("/drive/plan", json={"words": words})

@@ -93,9 +93,9 @@ def test_no_other_text_opens(text: str) -> None:
     from avlmaps.serve.lanes import RequestError
 
     with pytest.raises(RequestError) as fault:
-        AccessGuard(behind, ServeSettings(token=TOKEN))._check_token(
-            {"authorization": f"Bearer {text}", "cookie": f"avlmaps_token={text}"}
-        )
+        given = {b"authorization": f"Bearer {text}", b"cookie": f"avlmaps_token={text}"}
+        headers = [(name, value.encode()) for name, value in given.items()]
+        AccessGuard(behind, ServeSettings(token=TOKEN))._check_token(Request({"type": "http", "headers": headers}))
     assert fault.value.status == 401
 
 
@@ -109,7 +109,7 @@ def test_a_browser_brings_the_token_once_and_keeps_it() -> None:
     entered = client.get("//evil.example/view", params={"token": odd, "other": "b"}, follow_redirects=False)
     assert entered.status_code == 303 and entered.headers["location"] == "?other=b", "the token leaves the address"
     cookie = entered.headers["set-cookie"]
-    assert "HttpOnly" in cookie and "SameSite=Strict" in cookie and "Secure" not in cookie
+    assert "HttpOnly" in cookie and "SameSite=strict" in cookie and "Secure" not in cookie
     assert client.get("/", headers={"cookie": cookie.partition(";")[0]}).text == "0"
 
 

@@ -172,7 +172,7 @@ def test_faults_of_starting_are_one_sentence(
         taken.listen()
         port = taken.getsockname()[1]
         cases: list[tuple[tuple[object, ...], int, str]] = [
-            ((room, "--port", port), 1, f"Port {port} of 127.0.0.1 is taken"),
+            ((room, "--port", port), 1, f"port {port} of 127.0.0.1: the port is taken"),
             ((room, room), 1, "Two maps are called 'room'"),
             ((tmp_path / "none.avlmap", "--port", 0), 1, "none.avlmap is not there"),
             ((room, "--host", "0.0.0.0", "--port", 0), 1, "needs a token"),

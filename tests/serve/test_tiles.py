@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from avlmaps.serve.drawn import HEADER, SIDE, Pyramid
+from avlmaps.serve.drawn import HEADER, SIDE, Level, Pyramid
 
 INDICES = hnp.arrays(np.int32, st.tuples(st.integers(1, 60), st.just(3)), elements=st.integers(-200, 200)).map(
     lambda rows: np.unique(rows, axis=0)
@@ -50,7 +50,7 @@ def test_a_coarser_voxel_has_the_mean_colour_and_the_highest_heat_of_its_own(ind
     rgb, heat = rng.integers(0, 256, (len(index), 3), dtype=np.uint8), rng.random(len(index), dtype=np.float32)
     pyramid = Pyramid(index, rgb, 0.05)
     if len(pyramid.levels) < 2:
-        pyramid._levels.append(pyramid._made(1))
+        pyramid.levels.append(Level.of(index, rgb, 1))
     found = whole(pyramid, 1, heat)
     coarse = index >> 1
     for voxel, (r, g, b, hot) in found.items():

@@ -7,11 +7,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from msgspec import Meta
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.info import describe_map, info_lines
-from avlmaps.cli.output import UsageError, emit, table_lines
-from avlmaps.cli.verb import Building, OfRecording, Verb
+from avlmaps.cli.output import Column, UsageError, emit, table
+from avlmaps.cli.verb import COUNT, SHARE, SIZE, Building, OfRecording, Verb
 from avlmaps.core.files import user_path
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
@@ -45,12 +46,12 @@ class Build(Building):
     days, which are found in the first by their pictures (as `merge` does)."""
     rules: Literal["ours", "paper"] = "ours"
     """Rules of mapping: ours, or the paper's with any models (docs/paper-models.md)."""
-    batch: Annotated[int | None, arg(metavar="N")] = None
+    batch: Annotated[int | None, COUNT, arg(metavar="N")] = None
     """Frames that go through a large model at once. Default: AVLMAPS_BATCH, or the model's own size (1 on a CPU)."""
     feature_cache: Annotated[str, arg(metavar="auto|off|DIR")] = "auto"
     """Store features, so that another build of the same frames encodes nothing again: auto (large models, in the user's
     cache folder), off, or a folder (all models)."""
-    feature_cache_gb: Annotated[float, arg(metavar="GB")] = 20.0
+    feature_cache_gb: Annotated[float, SIZE, arg(metavar="GB")] = 20.0
     """Size of the feature cache, GB; the features unused for the longest time go first."""
     submaps: bool = False
     """Store the sums of every 32 frames as well, so that the map can follow corrected poses later; it takes three to
@@ -61,11 +62,11 @@ class Build(Building):
     close_loops: bool = False
     """Find by the map's own pictures where the drive came back, and move it to the poses that this gives; implies
     --submaps. The map stays as it is where that is not clear."""
-    frame_step: Annotated[int, arg(metavar="N")] = 1
+    frame_step: Annotated[int, COUNT, arg(metavar="N")] = 1
     """Fuse every n-th frame."""
-    max_bad_share: Annotated[float, arg(metavar="SHARE")] = 0.05
+    max_bad_share: Annotated[float, SHARE, arg(metavar="SHARE")] = 0.05
     """Stop when more than this share of the frames cannot be read; fewer are left out and reported."""
-    max_depth_m: Annotated[float, arg(metavar="METRES")] = 10.0
+    max_depth_m: Annotated[float, SIZE, arg(metavar="METRES")] = 10.0
     """Ignore depth beyond this, metres."""
     camera_height_m: Annotated[float | None, arg(metavar="METRES")] = None
     """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames; give it
@@ -87,7 +88,7 @@ class Build(Building):
     """Start again; ignore the stages that a stopped build finished."""
     verbose: bool = False
     """Print every detail of the map."""
-    seed: Annotated[int, arg(metavar="N")] = 0
+    seed: Annotated[int, Meta(ge=0), arg(metavar="N")] = 0
     """Seed of all random choices (visual words, RANSAC)."""
 
     def run(self) -> None:
@@ -246,14 +247,17 @@ class Calibrate(OfRecording, Verb):
 
     def run(self) -> None:
         answer = calibrate_array(self)
-        rows = [
-            (str(number + 1), place_text(one["position_m"]), f"{100 * one['moved_m']:.1f} cm",
-             f"{100 * one['sd_m']:.2f} cm", f"{1e6 * one['delay_s']:.0f} µs")
-            for number, one in enumerate(answer["microphones"])
-        ]  # fmt: skip
+        columns: dict[str, Column] = {
+            "channel": "number",
+            "place (robot's frame)": "position_m",
+            "moved": lambda one: f"{100 * one['moved_m']:.1f} cm",
+            "known to": lambda one: f"{100 * one['sd_m']:.2f} cm",
+            "late by": lambda one: f"{1e6 * one['delay_s']:.0f} µs",
+        }
+        rows = [{"number": number, **one} for number, one in enumerate(answer["microphones"], 1)]
         heights = " Heights stay as given: this drive does not show them." if answer["held_heights"] else ""
         lines = [
-            *table_lines(("channel", "place (robot's frame)", "moved", "known to", "late by"), rows),
+            *table(columns, rows),
             f"source at {place_text(answer['source'])} ({answer['frame']} frame), {answer['measured_frames']} frames",
             f"residual: {1e6 * answer['residual_before_s']:.0f} µs before, {1e6 * answer['residual_after_s']:.0f} µs "
             f"after.{heights}",

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import Positional, arg
 
-from avlmaps.cli.output import UsageError, emit, table_lines
+from avlmaps.cli.output import Column, UsageError, emit, table
 from avlmaps.cli.verb import MapVerb, ModelVerb, OptionalText
-from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.edits import Edit as EditMade
@@ -80,15 +79,17 @@ class Edit(MapVerb):
             return [answer["text"], *more]
         if not answer["edits"]:
             return ["nobody has edited this map"]
-        rows = [
-            (
-                one["id"], one["does"], ", ".join(one["of"]), one["name"],
-                place_text(one["position"]) if one["position"] else "", one["by"] or "a person", one["made"][:10],
-                one["state"] + (f": {one['why']}" if "why" in one else ""),
-            )
-            for one in answer["edits"]
-        ]  # fmt: skip
-        return table_lines(("id", "edit", "of", "name", "position", "by", "day", "state"), rows)
+        columns: dict[str, Column] = {
+            "id": "id",
+            "edit": "does",
+            "of": lambda one: ", ".join(one["of"]),
+            "name": "name",
+            "position": lambda one: one["position"] or None,
+            "by": lambda one: one["by"] or "a person",
+            "day": lambda one: one["made"][:10],
+            "state": lambda one: one["state"] + (f": {one['why']}" if "why" in one else ""),
+        }
+        return table(columns, answer["edits"])
 
 
 def _made(verb: Edit, editor: "Editor") -> "EditMade | None":
@@ -99,44 +100,23 @@ def _made(verb: Edit, editor: "Editor") -> "EditMade | None":
         named = " and ".join(f"--{name.replace('_', '-')}" for name in (*asked, *(("list",) if verb.list else ())))
         raise UsageError(f"{named} do not go together; make one edit at a time.")
     does = asked[0] if asked else ""
-    _require(verb, does)
-    by = verb.by or ""
-    match does:
-        case "rename":
-            what = None if verb.rename in ("thing", "it") else verb.rename
-            return editor.rename(what, verb.to or "", at=verb.at, by=by)
-        case "rename_room":
-            return editor.rename_room(verb.rename_room or "", verb.to or "", by=by)
-        case "merge":
-            return editor.merge(*verb.merge, to=verb.to or "", by=by)
-        case "split":
-            what = None if verb.split in ("thing", "it") else verb.split
-            return editor.split(what, at=verb.at, plane=verb.plane, box=_box(verb.box), by=by)
-        case "forbid":
-            return editor.forbid(verb.forbid or "", box=_box(verb.box), room=verb.room, by=by)
-        case "pin":
-            return editor.pin(verb.pin or "", verb.at or "", by=by)
-        case "undo":
-            return editor.undo("" if verb.undo == "last" else verb.undo or "", by=by)
-        case _:
-            return None
+    flag = f"--{does.replace('_', '-')}" if does else "a list of edits"
+    idle = [name for name in ("to", "at", "room", "box", "plane") if getattr(verb, name) and name not in _TAKES[does]]
+    if idle:
+        raise UsageError(f"--{idle[0]} says nothing to {flag}; see `avlmaps edit --help`.")
+    if not does:
+        return None
+    name = "" if does == "merge" or getattr(verb, does) in ("thing", "it", "last") else getattr(verb, does)
+    return editor.make(
+        does.replace("_", "-"), name=name, to=verb.to or "", at=verb.at, places=verb.merge or verb.plane,
+        box=_box(verb.box), room=verb.room, by=verb.by or "",
+    )  # fmt: skip
 
 
 _TAKES = {
     "rename": ("to", "at"), "rename_room": ("to",), "merge": ("to",), "split": ("at", "plane", "box"),
     "forbid": ("box", "room"), "pin": ("at",), "undo": (), "": (),
 }  # fmt: skip
-_NEEDS = {"rename": ("to",), "rename_room": ("to",), "pin": ("at",)}
-
-
-def _require(verb: Edit, does: str) -> None:
-    flag = f"--{does.replace('_', '-')}" if does else "a list of edits"
-    idle = [name for name in ("to", "at", "room", "box", "plane") if getattr(verb, name) and name not in _TAKES[does]]
-    if idle:
-        raise UsageError(f"--{idle[0]} says nothing to {flag}; see `avlmaps edit --help`.")
-    for name in _NEEDS.get(does, ()):
-        if not getattr(verb, name):
-            raise UsageError(f"{flag} needs --{name}; see `avlmaps edit --help`.")
 
 
 def _box(text: str | None) -> tuple[float, ...]:
@@ -179,16 +159,17 @@ def change_lines(answer: Mapping[str, Any]) -> list[str]:
     not_known = [f"{unknown} things are unknown: nobody looked at their place again"] if unknown else []
     if not answer["changes"]:
         return [f"nothing is known to have changed since {said(answer['since'])}", *not_known]
-    rows = [
-        (
-            one["kind"], one["name"], f"{one['confidence']:.2f}", place_text(one["position"]),
-            place_text(one["from"]) if one["from"] else "", one["room"] or "", said(one["noticed"]),
-            said(one["last_seen"]),
-        )
-        for one in answer["changes"]
-    ]  # fmt: skip
-    head = ("change", "thing", "confidence", "position", "from", "room", "noticed on", "last seen on")
-    return [*table_lines(head, rows), *not_known]
+    columns: dict[str, Column] = {
+        "change": "kind",
+        "thing": "name",
+        "confidence": "confidence",
+        "position": "position",
+        "from": "from",
+        "room": "room",
+        "noticed on": lambda one: said(one["noticed"]),
+        "last seen on": lambda one: said(one["last_seen"]),
+    }
+    return [*table(columns, answer["changes"]), *not_known]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from msgspec import Meta
 from tyro.conf import arg
 
 from avlmaps.cli.output import UsageError, size_of
-from avlmaps.cli.verb import MapVerb, shown_in
+from avlmaps.cli.verb import SHARE, SIZE, MapVerb, shown_in
 
 if TYPE_CHECKING:
     from avlmaps.core.poses import FrameName
@@ -42,13 +43,13 @@ class Export(MapVerb):
     """Colour voxels by the thing that they belong to (.ply, .glb)."""
     heat: Annotated[str | None, arg(metavar="SENTENCE")] = None
     """Colour voxels by the heat of a query (.ply, .glb), or add the heat as a layer (.rrd, .mcap)."""
-    least: Annotated[float, arg(metavar="CONFIDENCE")] = 0.5
+    least: Annotated[float, SHARE, arg(metavar="CONFIDENCE")] = 0.5
     """Use things with at least this confidence, 0 to 1 (.csv, .rrd, .mcap, --things)."""
-    radius_m: Annotated[float, arg(metavar="METRES")] = 0.2
+    radius_m: Annotated[float, SIZE, arg(metavar="METRES")] = 0.2
     """Radius of the robot (.pgm)."""
-    height_m: Annotated[float, arg(metavar="METRES")] = 1.5
+    height_m: Annotated[float, SIZE, arg(metavar="METRES")] = 1.5
     """Height of the robot; higher voxels are no obstacles (.pgm)."""
-    storey: Annotated[int | None, arg(metavar="N")] = None
+    storey: Annotated[int | None, Meta(ge=0), arg(metavar="N")] = None
     """Storey of the grid, counted from 0, the lowest (.pgm). Default: each in its own file, such as floor-0.pgm."""
     frame: Annotated[Literal["recording", "level"] | None, arg(metavar="recording|level")] = None
     """Frame of the coordinates. Default: recording for .ply, .csv and .openlex3d, level for .glb (y up, as GLB has it),

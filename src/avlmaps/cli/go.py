@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_named, kind_of, table_lines
-from avlmaps.cli.verb import Asking, MapVerb, idle
-from avlmaps.core.errors import LanguageError
+from avlmaps.cli.output import AnsweredError, Column, UsageError, emit, error_answer, kind_of, table
+from avlmaps.cli.verb import COUNT, Asking, MapVerb, idle
+from avlmaps.core.errors import LanguageError, kind_named
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
 
@@ -77,7 +77,7 @@ class Go(Asking, MapVerb):
     """Start of the simulated robot: metres, degrees counter-clockwise from +x. Default: the start of the recording."""
     guess: bool = False
     """Go to the best guess where nothing is found, and to the nearest of several things that fit equally."""
-    choose: Annotated[tuple[int, ...], arg(metavar="NUMBER"), UseAppendAction] = ()
+    choose: Annotated[tuple[int, ...], COUNT, arg(metavar="NUMBER"), UseAppendAction] = ()
     """Which of several meanings, or of several things that fit equally: its number in the question, one for each."""
     image: Annotated[Path | None, arg(metavar="FILE")] = None
     """File that "this photo" in the sentence means."""
@@ -161,20 +161,16 @@ def numbers_left(verb: "Go", translation: "Translation") -> "Go":
 
 
 def _idle(verb: "Go", program: str) -> list[str]:
-    notes: list[str] = []
-    if "sound=" not in program:
-        notes += idle(verb, ["at"], "no sound is named")
-    if "load_image(" not in program:
-        notes += idle(verb, ["image"], "the sentence speaks of no photo")
-    if "load_sound(" not in program:
-        notes += idle(verb, ["sound_clip"], "the sentence speaks of no recording")
-    if verb.robot == "simulated":
-        notes += idle(verb, ["ros", "ros_frames"], "the robot is simulated")
-    if verb.language != "chat":
-        notes += idle(verb.chat, ["chat_model", "chat_url", "chat_replay"], f"--language is {verb.language}")
-    if verb.language != "local":
-        notes += idle(verb, ["llm"], f"--language is {verb.language}")
-    return [*notes, *(idle(verb, ["plot"], "nothing is driven") if verb.dry_run else ())]
+    rows = (
+        (verb, ("at",), "sound=" in program, "no sound is named"),
+        (verb, ("image",), "load_image(" in program, "the sentence speaks of no photo"),
+        (verb, ("sound_clip",), "load_sound(" in program, "the sentence speaks of no recording"),
+        (verb, ("ros", "ros_frames"), verb.robot != "simulated", "the robot is simulated"),
+        (verb.chat, tuple(verb.chat.__dataclass_fields__), verb.language == "chat", f"--language is {verb.language}"),
+        (verb, ("llm",), verb.language == "local", f"--language is {verb.language}"),
+        (verb, ("plot",), not verb.dry_run, "nothing is driven"),
+    )
+    return [note for options, names, has_effect, why in rows if not has_effect for note in idle(options, names, why)]
 
 
 def _planned(verb: "Go", settings: "QuerySettings") -> dict[str, Any]:
@@ -371,15 +367,16 @@ def failure(answer: dict[str, Any]) -> dict[str, Any] | None:
 def go_lines(answer: dict[str, Any]) -> list[str]:
     """Lay out the answer of `go`: the program, and the places."""
     lines = [*([answer["plan"]] if answer.get("plan") else []), *answer["program"].splitlines()]
-    rows = [
-        (
-            number, goal["name"] or goal["skill"].replace("_", " "), place_text(goal["goal"]), place_text(goal["stop"]),
-            f"{goal['distance_m']:.2f} m" + ("" if goal["reached"] else ", not reached"),
-        )
-        for number, goal in enumerate(answer["subgoals"], 1)
-    ]  # fmt: skip
-    lines += table_lines(("", "went to", "goal", "stopped at", "away"), rows) if rows else []
-    lines += [f"note: {note}" for note in answer["notes"]]
+    columns: dict[str, Column] = {
+        "": "number",
+        "went to": lambda goal: goal["name"] or goal["skill"].replace("_", " "),
+        "goal": "goal",
+        "stopped at": "stop",
+        "away": lambda goal: f"{goal['distance_m']:.2f} m" + ("" if goal["reached"] else ", not reached"),
+    }
+    goals = [{"number": number, **goal} for number, goal in enumerate(answer["subgoals"], 1)]
+    lines += table(columns, goals) if goals else []
+    lines += [f"note: {note}" for note in answer["notes"] if note != answer["error"]]
     if answer["steps"]:
         done = "done" if answer["ok"] else "not done"
         lines.append(f"{done}: {answer['path_m']:.1f} m driven, {len(answer['actions'])} actions")

@@ -47,10 +47,19 @@ class Info(OfRecording, Verb):
     """Draw a top-down view with the path, the sounds, and the names of things and rooms into this picture."""
 
     def run(self) -> None:
+        words = self.opening_words()
+        if words and is_map(self.path):
+            given = " and ".join(word for word in words if word.startswith("--"))
+            say(f"note: {given} has no effect: this is a map.")
         answer = describe_path(self.path, verify=self.verify, plot=self.plot, more=self.more, **self.opening())
-        if words := self.opening_words():
+        if words:
             answer["options"] = words
         emit(answer, info_lines(answer, verbose=self.verbose), self.json)
+
+
+def is_map(path: Path) -> bool:
+    """Return whether a path is, or should be, a map's folder."""
+    return (path / MAP_MANIFEST).exists() or path.suffix == ".avlmap"
 
 
 def describe_path(
@@ -64,7 +73,7 @@ def describe_path(
     **given: Any,
 ) -> dict[str, Any]:
     """Describe a map or a recording; what is given further says how ``open_recording`` reads it."""
-    if (path / MAP_MANIFEST).exists() or path.suffix == ".avlmap":
+    if is_map(path):
         return _describe_map(path, verify, plot)
     if plot is not None:
         raise UsageError(f"--plot draws a map, and {path} is a recording; build one first.")

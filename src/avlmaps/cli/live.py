@@ -10,11 +10,12 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 from urllib.parse import quote
 
+from msgspec import Meta
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import UsageError, emit
-from avlmaps.cli.verb import Building, Reading, idle
+from avlmaps.cli.verb import PORT, SIZE, Building, Reading, idle
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -38,9 +39,9 @@ class Live(Building):
     source: Annotated[Literal["recording", "ros2"], arg(metavar="recording|ros2")] = "recording"
     """Source of frames and sound: REC, or what a running robot publishes in ROS 2 (by rclpy, in the Python that ROS 2
     was built for), until Ctrl-C."""
-    rate: Annotated[float, arg(metavar="FACTOR")] = 1.0
+    rate: Annotated[float, Meta(gt=0.0, le=1e6), arg(metavar="FACTOR")] = 1.0
     """Speed of the replay: 1 as it was recorded, 2 twice as fast."""
-    give_up_s: Annotated[float, arg(metavar="SECONDS")] = 60.0
+    give_up_s: Annotated[float, SIZE, arg(metavar="SECONDS")] = 60.0
     """Of a recording that is being written, and of ROS 2: end when nothing came for this long, seconds."""
     as_fast_as_possible: bool = False
     """Wait for the map instead of the clock; no frame is late."""
@@ -52,7 +53,7 @@ class Live(Building):
     served by `avlmaps serve MAP` beside it, which takes each save."""
     view: bool = False
     """The same, and open the map's page in a browser."""
-    port: Annotated[int, arg(metavar="NUMBER")] = 8750
+    port: Annotated[int, PORT, arg(metavar="NUMBER")] = 8750
     """Port of --serve and --view; 0 takes a free one."""
     into: Annotated[Path | None, arg(metavar="MAP")] = None
     """Map folder that this drive updates when it is over: it finds itself there by its pictures, as `avlmaps merge`
@@ -77,12 +78,8 @@ def _live(verb: Live) -> dict[str, Any]:
     from avlmaps.maps.settings import BuildSettings
 
     begin_s = perf_counter()
-    if not 0.0 < verb.rate < float("inf"):
-        raise UsageError(f"--rate is {verb.rate:g}; choose a positive number, or --as-fast-as-possible.")
     if verb.as_fast_as_possible and verb.rate != 1.0:
         raise UsageError("--rate and --as-fast-as-possible do not go together; choose one of them.")
-    if not verb.give_up_s > 0.0:
-        raise UsageError(f"--give-up-s is {verb.give_up_s:g}; choose a positive number of seconds.")
     for note in [] if verb.serve or verb.view else idle(verb, ["port"], "neither --serve nor --view is given"):
         say(f"note: {note}")
     first = _days_before(verb)
@@ -262,11 +259,10 @@ def serve_while(live: "LiveMap", drive: Callable[[Callable[[], bool]], None], po
     Raises:
         ServeError: the port is taken.
     """
-    from avlmaps.cli.view import open_browser, require_port, run_page
+    from avlmaps.cli.view import open_browser, run_page
     from avlmaps.serve.service import Service, listening_socket, url_of
     from avlmaps.serve.settings import ServeSettings
 
-    require_port(port)
     settings = ServeSettings(host="127.0.0.1", port=port)
     with listening_socket(settings) as opened:
         running = LiveFeed(live, drive)

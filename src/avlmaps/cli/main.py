@@ -5,13 +5,13 @@ import os
 import select
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stderr
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from avlmaps.cli import output
-from avlmaps.core.errors import AvlmapsError, BackendError
+from avlmaps.core.errors import AskError, AvlmapsError, BackendError
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars
 from avlmaps.core.wording import Spelling, options_as
@@ -68,15 +68,17 @@ def _main(words: list[str]) -> None:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # avlmaps reports a truncated picture in its own words
-    try:
-        with _usage(words):
-            from avlmaps.cli.verbs import read_command
+    from avlmaps.cli.verbs import read_command
 
-            verb = read_command(words)
-    except BackendError as error:  # the verb is of a package that is not installed
+    try:
+        verb = read_command(words)
+    except (BackendError, output.UsageError) as error:  # BackendError: the verb is of a package that is not installed
         if _wants_json(words):
             _emit_error(output.kind_of(error), str(error))
-        sys.exit(_complain(error, 1))
+        _complain(error, 1)
+        if isinstance(error, output.UsageError):
+            sys.stderr.write(f"For all of it: {' '.join(['avlmaps', *error.verb, '--help'])}\n")
+        sys.exit(2 if isinstance(error, output.UsageError) else 1)
     sys.exit(_run(verb))
 
 
@@ -85,34 +87,14 @@ def _wants_json(words: Sequence[str]) -> bool:
     return "--json" in (words[: words.index("--")] if "--" in words else words)
 
 
-@contextmanager
-def _usage(words: Sequence[str]) -> Iterator[None]:
-    """Say in a sentence what was probably meant by a command line that cannot be read; with --json in JSON, too."""
-    complaints = io.StringIO()
-    try:
-        with redirect_stderr(complaints):
-            yield
-    except SystemExit as stop:
-        if stop.code in (0, None):
-            sys.stderr.write(complaints.getvalue())
-            raise
-        from avlmaps.cli.verbs import VERBS, meant
-
-        sentence = meant(words, complaints.getvalue(), VERBS)
-        verb = f"{words[0]} " if words and words[0] in VERBS else ""
-        sys.stderr.write(f"avlmaps: {printable(sentence)}\nFor all of it: avlmaps {verb}--help\n")
-        if _wants_json(words):
-            _emit_error("usage", sentence)
-        raise
-
-
 def _run(verb: "Verb") -> int:
     try:
         with _models_in_force(verb), _compiling(verb):
+            verb.require_bounds()
             verb.run()
     except output.AnsweredError as error:
         return _complain(error, error.status)
-    except output.UsageError as error:
+    except (output.UsageError, AskError) as error:
         return _fail(verb, error, str(error), 2)
     except AvlmapsError as error:
         return _fail(verb, error, _swapped(verb) or str(error), 1)

@@ -40,7 +40,7 @@ class Profiles(ModelVerb):
             self._bring(self.fetch)
             return
         if self.source is not None:
-            raise BackendError("--from says where --fetch finds the files; add --fetch light.")
+            raise UsageError("--from says where --fetch finds the files; add --fetch light.")
         if self.check is not None:
             self._check(self.check)
             return

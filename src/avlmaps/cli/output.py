@@ -4,22 +4,20 @@ import errno
 import json
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.errors import AskError, AvlmapsError, kind_named
 from avlmaps.core.printable import printable, printable_json, shortened
 from avlmaps.core.wording import place_text
 
 
 class UsageError(Exception):
-    """The words of a command do not fit together; exit status 2."""
+    """The words of a command do not fit together; exit status 2. ``verb`` is the verb whose help says what fits."""
 
-
-def require_share(least: float, what: str) -> None:
-    """Refuse a ``--least`` that is no probability or confidence."""
-    if not 0.0 <= least <= 1.0:
-        raise UsageError(f"--least takes a {what} from 0 to 1, not {least:g}.")
+    def __init__(self, message: str, *verb: str) -> None:
+        super().__init__(message)
+        self.verb = verb
 
 
 class AddressSpaceError(MemoryError):
@@ -100,12 +98,9 @@ def kind_of(error: BaseException) -> str:
     """Return the name of a kind of error for scripts: ``recording``, ``goal-not-found``, ``usage`` and so on."""
     if is_short_of_memory(error):
         return "memory"
+    if isinstance(error, AskError):
+        return "usage"
     return "system" if isinstance(error, OSError) else kind_named(type(error).__name__)
-
-
-def kind_named(error_type: str) -> str:
-    """Return the kind of an error of the class of that name."""
-    return "-".join(re.findall("[A-Z][a-z]*", error_type.removesuffix("Error"))).lower()
 
 
 def emit(answer: Mapping[str, Any], lines: Iterable[str], as_json: bool) -> None:
@@ -135,6 +130,34 @@ def table_lines(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> lis
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells]
 
 
+Column = str | Callable[[Mapping[str, Any]], object]
+"""What a column shows of a row: the value of a key, or what a function makes of it."""
+
+
+def table(columns: Mapping[str, Column], rows: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Lay out the entries of an answer under columns."""
+    read = [(lambda row, key=one: row.get(key)) if isinstance(one, str) else one for one in columns.values()]
+    return table_lines(tuple(columns), [[_cell(column(row)) for column in read] for row in rows])
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.2f}"
+    if isinstance(value, list | tuple):
+        return place_text(value)
+    return "" if value is None else str(value)
+
+
+def likely(entries: Iterable[Mapping[str, Any]], name: str = "name") -> str:
+    """Lay out names with their probabilities."""
+    return ", ".join(f"{one[name]} {one['probability']:.2f}" for one in entries)
+
+
+def size_text(sides: Sequence[float]) -> str:
+    """Lay out a size in metres; "" where there is none."""
+    return " x ".join(f"{side:.2f}" for side in sides) if any(sides) else ""
+
+
 def size_of(count: int) -> str:
     """Write a number of bytes as people read it."""
     size = float(count)
@@ -162,28 +185,21 @@ def ground_lines(ground: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _size(sides: Sequence[float]) -> str:
-    return " x ".join(f"{side:.2f}" for side in sides) if any(sides) else ""
-
-
 def query_lines(answer: Mapping[str, Any]) -> list[str]:
     """Lay out the answer of `query`."""
     parts = ", ".join(f"{part['modality']} {part['query']!r} ({part['role']})" for part in answer["parts"])
     lines = [f"query: {parts}"] if parts else []
     lines += [f"note: {part['note']}" for part in answer["parts"] if part.get("note")]
-    rows = [
-        (i, place_text(goal["position"]), f"{goal['probability']:.2f}", _size(goal["size"]))
-        for i, goal in enumerate(answer["goals"], start=1)
-    ]
     lines += [f"note: {note}" for note in answer.get("notes", [])]
     lines += [f"count: {answer['count']}"] if "count" in answer else []
     lines.append(f"{'found' if answer['found'] else 'not found here'}: {answer['text']}")
     others = answer.get("alternatives", []) if answer["found"] else []
     others = [f"{one['query']} ({one['probability']:.2f})" for one in others if one["found"]]
     lines += [f"or: {', '.join(others)}"] if others else []
-    lines += (
-        table_lines(("", f"place ({answer['frame']} frame)", "probability", "size in m (level axes)"), rows)
-        if rows
-        else []
-    )
+    if answer["goals"]:
+        columns: dict[str, Column] = {
+            "": "number", f"place ({answer['frame']} frame)": "position", "probability": "probability",
+            "size in m (level axes)": lambda goal: size_text(goal["size"]),
+        }  # fmt: skip
+        lines += table(columns, [{"number": number, **goal} for number, goal in enumerate(answer["goals"], start=1)])
     return [*lines, f"wrote {answer['plot']}"] if "plot" in answer else lines

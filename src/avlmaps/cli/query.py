@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, query_lines
-from avlmaps.cli.verb import Asking, InFrame, MapVerb, OptionalPath, OptionalText, idle, shown_in
+from avlmaps.cli.verb import COUNT, Asking, InFrame, MapVerb, OptionalPath, OptionalText, idle, shown_in
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Query(Asking, InFrame, MapVerb):
     """Part that is the goal; the others say where it is. Default: the first of object, image, sound, area."""
     rules: Literal["ours", "paper"] = "ours"
     """Rules of scores and heat: ours, or the paper's with any models (docs/paper-models.md)."""
-    top: Annotated[int, arg(metavar="N")] = 3
+    top: Annotated[int, COUNT, arg(metavar="N")] = 3
     """Number of goals to print."""
     plot: Annotated[OptionalPath, arg(metavar="FILE")] = None
     """Draw the heat of each part and of the product, with numbered goals, into this picture."""
@@ -75,36 +75,33 @@ class Query(Asking, InFrame, MapVerb):
         return settings if self.at is None else replace(settings, sounds=replace(settings.sounds, at=self.at))
 
     def _asked(self) -> "Asked":
+        from avlmaps.core.camera import intrinsics_of
         from avlmaps.core.question import Modality
-        from avlmaps.query.asking import Asked, AskError
+        from avlmaps.query.asking import Asked
+        from avlmaps.query.places import place_of
 
-        if self.top < 1:
-            raise UsageError(f"--top is {self.top}; it must be 1 or more.")
+        if self.near is not None:
+            place_of(self.near)
         photo, clip = (None if file is None else str(file) for file in (self.image, self.sound_clip))
-        try:
-            return Asked(
-                sentence=self.sentence, object=self.object, sound=self.sound, area=self.area, image=photo, clip=clip,
-                primary=None if self.primary is None else Modality(self.primary), top=self.top, near=self.near,
-            )  # fmt: skip
-        except AskError as error:
-            raise UsageError(str(error)) from None
+        return Asked(
+            sentence=self.sentence, object=self.object, sound=self.sound, area=self.area, image=photo, clip=clip,
+            primary=None if self.primary is None else Modality(self.primary), top=self.top, near=self.near,
+            camera=None if self.intrinsics is None else intrinsics_of(self.intrinsics),
+        )  # fmt: skip
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
         from avlmaps.core.progress import announce_compiling
         from avlmaps.core.question import Modality
-        from avlmaps.query.asking import AskError, ask
+        from avlmaps.query.asking import ask
 
-        asked = replace(self._asked(), camera=None if self.intrinsics is None else numbers_of(self.intrinsics))
+        asked = self._asked()
         if avlmap.settings != (settings := self._settings()):
             avlmap = type(avlmap)(avlmap.data, avlmap.encoders, path=avlmap.path, settings=settings)
-        try:
-            with announce_compiling(now=False):
-                found = ask(avlmap, asked)
-                drawn = {}
-                if self.plot is not None and found.heat is not None:
-                    drawn = {"plot": str(found.heat.plot(self.plot, top=self.top))}
-        except AskError as error:
-            raise UsageError(str(error)) from None
+        with announce_compiling(now=False):
+            found = ask(avlmap, asked)
+            drawn = {}
+            if self.plot is not None and found.heat is not None:
+                drawn = {"plot": str(found.heat.plot(self.plot, top=self.top))}
         told: dict[str, Any] = {**found.to_dict(), **drawn}
         if self.frame != "recording":
             told = shown_in(told, self.frame, avlmap)
@@ -132,20 +129,15 @@ class Locate(InFrame, MapVerb):
     """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: by its EXIF, else the map's own colour camera,
     with another focal length where that fits clearly better."""
 
-    def run(self) -> None:
-        if self.intrinsics is not None:
-            numbers_of(self.intrinsics)
-        super().run()
-
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
-        from avlmaps.core.camera import Pinhole
+        from avlmaps.core.camera import Pinhole, intrinsics_of
         from avlmaps.query.locate import focal_35mm_of
         from avlmaps.query.modalities.image import read_picture
         from avlmaps.query.schema import locate_answer
 
         rgb = read_picture(self.image)
         size = {"width": rgb.shape[1], "height": rgb.shape[0]}
-        given = None if self.intrinsics is None else Pinhole(*numbers_of(self.intrinsics), **size)
+        given = None if self.intrinsics is None else Pinhole(*intrinsics_of(self.intrinsics), **size)
         found = avlmap.locate(rgb, given, None if given is not None else focal_35mm_of(self.image))
         if found.world_from_camera is not None and given is not None and found.camera != given:
             say(f"note: the focal length {given.fx:g} does not fit the photo; {found.camera.fx:.1f} was used.")
@@ -162,17 +154,3 @@ class Locate(InFrame, MapVerb):
             f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):",
             *rows,
         ]
-
-
-def numbers_of(intrinsics: str) -> tuple[float, float, float, float]:
-    """Read ``fx,fy,cx,cy`` in pixels."""
-    from avlmaps.core.camera import Pinhole
-
-    try:
-        fx, fy, cx, cy = (float(word) for word in intrinsics.split(","))
-        Pinhole(fx, fy, cx, cy, width=1, height=1)  # no camera has a focal length of 0, or NaN
-    except ValueError:
-        raise UsageError(
-            f"--intrinsics takes fx,fy,cx,cy in pixels, such as 525,525,320,240; not {intrinsics!r}."
-        ) from None
-    return fx, fy, cx, cy

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from tyro.conf import Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import AnsweredError, UsageError, emit
-from avlmaps.cli.verb import Asking, ModelVerb
+from avlmaps.cli.verb import PORT, Asking, ModelVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
-    from avlmaps.serve.drive.app import Driving
+    from avlmaps.serve.drive.app import DriveService
     from avlmaps.serve.service import Service
 
 
@@ -46,7 +46,7 @@ class Serve(Asking, ModelVerb):
     """Serve one agent by standard input and output instead of HTTP."""
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1"
     """Address to listen on. Any other than this machine's loopback needs a token."""
-    port: Annotated[int, arg(metavar="N")] = 8750
+    port: Annotated[int, PORT, arg(metavar="N")] = 8750
     """Port; 0 takes a free one."""
     token_file: Annotated[Path | None, arg(metavar="FILE")] = None
     """File with the token that clients must send. Default: the variable AVLMAPS_TOKEN, or no token."""
@@ -86,14 +86,14 @@ def serve(verb: "Serve") -> None:
         allowed_hosts=verb.allow_host,
         tls_certificate=verb.tls_cert,
         tls_key=verb.tls_key,
-        found_at=verb.found_at,
-        at=verb.at,
+        query=verb.query_settings(),
     )
     maps = named_maps([verb.map, *verb.more])
     if verb.stdio:
         _serve_stdio(Service.open(maps, settings, say))
         return
     from avlmaps.serve.app import create_app
+    from avlmaps.serve.drive.app import PATH
 
     with listening_socket(settings) as opened:
         service = Service.open(maps, settings, say)
@@ -107,8 +107,9 @@ def serve(verb: "Serve") -> None:
                 say("note: the token goes over the network unencrypted; give --tls-cert and --tls-key for https.")
             answer = {"url": url, "mcp": f"{url}/mcp", "maps": names, "token": settings.token is not None}
             if driving is not None:
-                lines.append(f"driving {driving.robot} at {url}/drive (agents: {url}/drive/mcp, log: {driving.log})")
-                answer |= {"drive": f"{url}/drive", "robot": driving.robot, "log": str(driving.log)}
+                robot, log = driving.dispatcher.robot, driving.dispatcher.log_file
+                lines.append(f"driving {robot} at {url}/drive (agents: {url}/drive/mcp, log: {log})")
+                answer |= {"drive": f"{url}/drive", "robot": robot, "log": str(log)}
             emit(answer, lines, verb.json)
             sys.stdout.flush()  # a program that started the server reads its address from a pipe
 
@@ -116,8 +117,7 @@ def serve(verb: "Serve") -> None:
             if driving is None:
                 run_http(create_app(service), service, opened, started)
             else:
-                app = create_app(service, driving.mounts, driving.lifespans)
-                run_http(app, service, opened, started, driving.ending)
+                run_http(create_app(service, {PATH: driving.app}), service, opened, started, driving.end)
         finally:
             if driving is not None:
                 driving.dispatcher.close()
@@ -132,7 +132,7 @@ def serve(verb: "Serve") -> None:
             )
 
 
-def _driving(verb: "Serve", service: "Service") -> "Driving | None":
+def _driving(verb: "Serve", service: "Service") -> "DriveService | None":
     if verb.drive is None:
         return None
     from avlmaps.serve.drive.app import open_driving

@@ -7,11 +7,10 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from io import TextIOWrapper
-from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TextIO
 
-from tyro.conf import Positional, arg
+from tyro.conf import arg
 
 from avlmaps.cli import go as going
 from avlmaps.cli.edit import Changes
@@ -20,7 +19,7 @@ from avlmaps.cli.info import Info, describe_path, info_lines, plot_named
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, fault_sentence, kind_of
 from avlmaps.cli.query import Locate, Query
 from avlmaps.cli.things import Rooms, Sources, Things, sound_lines
-from avlmaps.cli.verb import MapVerb, ModelVerb
+from avlmaps.cli.verb import MapVerb
 from avlmaps.cli.verbs import read_verb
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.extras import install_command
@@ -63,7 +62,7 @@ YES, _NO = frozenset({"y", "yes"}), frozenset({"n", "no", ""})
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shell(ModelVerb):
+class Shell(MapVerb):
     """Query a map line by line, at a prompt or from a pipe, without a new start for each question.
 
     A line is a question or begins with a verb; `help` lists the verbs. On a terminal there are a history and completion
@@ -75,10 +74,6 @@ class Shell(ModelVerb):
     Example: avlmaps shell home.avlmap --json < questions.txt
     """
 
-    compiles: ClassVar[bool] = True
-
-    map: Positional[Path]
-    """Map folder (NAME.avlmap)."""
     scene: str | None = None
     """Scene in which `go` drives the simulated robot after you confirm the plan: house:SEED, office:SEED or a file."""
     start: Annotated[str | None, arg(metavar="X,Y,HEADING")] = None
@@ -133,25 +128,18 @@ class ShellSession:
         self._names: tuple[str, ...] | None = None
         self._unchosen: tuple[str, str, tuple[int, ...]] | None = None
         self._lock = Lock()
-        self._opened, self._seen = self._open()
+        self._seen, self._opened = self._stamp, given.opened()
 
-    def _open(self) -> "tuple[AVLMap, tuple[int, ...]]":
-        from avlmaps.query.avlmap import AVLMap
+    @property
+    def _stamp(self) -> object | None:
+        from avlmaps.maps.store.folder import MANIFEST, stamp
 
-        seen = self._signature()
-        return AVLMap.open(self.given.map), seen
-
-    def _signature(self) -> tuple[int, ...]:
-        try:
-            found = (self.given.map / "map.json").stat()
-        except OSError:
-            return ()
-        return found.st_ino, found.st_mtime_ns, found.st_size
+        return stamp(self.given.map / MANIFEST)
 
     @property
     def opened(self) -> "AVLMap":
-        if self._signature() not in (self._seen, ()):
-            self._opened, self._seen = self._open()
+        if (now := self._stamp) not in (self._seen, None):
+            self._seen, self._opened = now, self.given.opened()
             self._names, self._robot = None, None
             say(f"note: {self.given.map} was replaced on disk and is opened again.")
         return self._opened
@@ -293,59 +281,49 @@ def _names_in(opened: "AVLMap") -> tuple[str, ...]:
     return tuple(dict.fromkeys([*things, *rooms, *sounds]))
 
 
-class Lines(Protocol):
-    """Gives the lines of a shell, one after the other."""
-
-    interactive: bool
-    """Whether a person types them: Ctrl-C then stops one answer and not the shell."""
-
-    def next(self) -> str | None:
-        """Return the next line; None at the end. Raises ``UsageError`` where it is too long."""
-        ...
-
-    def confirms(self, question: str) -> bool:
-        """Return whether the answer to a question is yes."""
-        ...
-
-
-def checked(line: str) -> str:
-    """Return a line without blanks round it; ``UsageError`` where it is too long."""
-    if len(line) >= LONGEST_LINE:
-        raise UsageError(f"A line has {LONGEST_LINE:,} characters or more; give a shorter one.")
-    return line.strip()
-
-
-class PipedLines:
-    """Lines of a file or a pipe.
+class Lines:
+    """The lines of a shell, one after the other.
 
     The answer to a question is the next line where that is a yes or a no. Any other line means no, and is the next
     line of the shell.
     """
 
-    interactive = False
+    def __init__(self, read: Callable[[str], str | None], interactive: bool = False) -> None:
+        """Take what reads a line after it showed a question, "" at the prompt; it returns None at the end.
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+        Ctrl-C stops one answer where a person types the lines, else the shell.
+        """
+        self._read, self.interactive = read, interactive
         self._kept: str | None = None
 
     def next(self) -> str | None:
-        """Return the next line; None at the end; see `Lines`."""
-        if self._kept is not None:
-            line, self._kept = self._kept, None
-            return line
-        line = self._stream.readline(LONGEST_LINE)
-        if len(line) == LONGEST_LINE and not line.endswith("\n"):
-            while (rest := self._stream.readline(LONGEST_LINE)) and not rest.endswith("\n"):
-                pass
-        return checked(line) if line else None
+        """Return the next line; None at the end. ``UsageError``: it is too long."""
+        line, self._kept = self._kept or self._read(""), None
+        if line is not None and len(line) >= LONGEST_LINE:
+            raise UsageError(f"A line has {LONGEST_LINE:,} characters or more; give a shorter one.")
+        return line and line.strip()
 
     def confirms(self, question: str) -> bool:
-        """Return whether the next line says yes."""
-        say(question)
-        line = self.next()
-        if line is not None and line.lower() not in YES | _NO:
+        """Return whether the answer to a question is yes."""
+        line = self._read(question) or ""
+        if line.strip().lower() not in YES | _NO:
             self._kept = line
-        return line is not None and line.lower() in YES
+        return line.strip().lower() in YES
+
+
+def piped_lines(stream: TextIO) -> Lines:
+    """Return the lines of a file or a pipe."""
+
+    def read(question: str) -> str | None:
+        if question:
+            say(question)
+        line = stream.readline(LONGEST_LINE)
+        if len(line) == LONGEST_LINE and not line.endswith("\n"):
+            while (rest := stream.readline(LONGEST_LINE)) and not rest.endswith("\n"):
+                pass
+        return line or None
+
+    return Lines(read)
 
 
 def answer_lines(session: ShellSession, lines: Lines, as_json: bool) -> tuple[int, int]:
@@ -391,15 +369,15 @@ def _report(error: BaseException, sentence: str, as_json: bool) -> None:
 def _piped() -> Lines:
     if isinstance(sys.stdin, TextIOWrapper):
         sys.stdin.reconfigure(errors="replace")  # a line that is not UTF-8 is not understood, and the next one is
-    return PipedLines(sys.stdin)
+    return piped_lines(sys.stdin)
 
 
 def _prompt(session: ShellSession, with_history: bool) -> Lines:
     try:
-        from avlmaps.cli.shell_prompt import NameCompleter, PromptLines
+        from avlmaps.cli.shell_prompt import NameCompleter, prompt_reader
     except ImportError:
         raise BackendError(
             f"A prompt on a terminal needs prompt-toolkit; get it with: {install_command('shell')}, or pipe lines in."
         ) from None
     completer = NameCompleter(VERBS, WITH_FILES, session.names)
-    return PromptLines(completer, checked, lambda line: line.strip().lower() in YES, with_history)
+    return Lines(prompt_reader(completer, with_history), interactive=True)

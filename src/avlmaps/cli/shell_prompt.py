@@ -23,45 +23,24 @@ _MOST_WORDS = 4  # of a name that is being typed
 _MOST_SHOWN = 40
 
 
-class PromptLines:
-    """Lines that a person types, with history and completion."""
+def prompt_reader(completer: Completer, with_history: bool = True) -> Callable[[str], str | None]:
+    """Return what reads a line that a person types: "" after Ctrl-C, None after Ctrl-D."""
+    output = create_output(always_prefer_tty=True)
+    # A shell that starts a command in the background has SIGINT ignored; at a prompt Ctrl-C stops an answer.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    history = _history() if with_history else InMemoryHistory()
+    questions = PromptSession("avlmaps> ", history=history, completer=completer, complete_in_thread=True, output=output)
+    confirmations = PromptSession(output=output)
 
-    interactive = True
-
-    def __init__(
-        self,
-        completer: Completer,
-        checked: Callable[[str], str],
-        is_yes: Callable[[str], bool],
-        with_history: bool = True,
-    ) -> None:
-        self._checked, self._is_yes = checked, is_yes
-        output = create_output(always_prefer_tty=True)
-        # A shell that starts a command in the background has SIGINT ignored; at a prompt Ctrl-C stops an answer.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        history = _history() if with_history else InMemoryHistory()
-        self._questions = PromptSession(
-            "avlmaps> ", history=history, completer=completer, complete_in_thread=True, output=output
-        )
-        self._confirmations = PromptSession(output=output)
-
-    def next(self) -> str | None:
-        """Return the next line; None after Ctrl-D. Ctrl-C begins a new line."""
-        while True:
-            try:
-                line = self._questions.prompt()
-            except KeyboardInterrupt:
-                continue
-            except EOFError:
-                return None
-            return self._checked(line)
-
-    def confirms(self, question: str) -> bool:
-        """Return whether the person says yes; Ctrl-C and Ctrl-D mean no."""
+    def read(question: str) -> str | None:
         try:
-            return self._is_yes(self._confirmations.prompt(f"{question} "))
-        except (KeyboardInterrupt, EOFError):
-            return False
+            return confirmations.prompt(f"{question} ") if question else questions.prompt()
+        except KeyboardInterrupt:
+            return ""
+        except EOFError:
+            return None
+
+    return read
 
 
 def _history() -> FileHistory | InMemoryHistory:

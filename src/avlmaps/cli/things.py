@@ -1,19 +1,17 @@
 """`avlmaps things`, `rooms` and `sources`: list what a map holds."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
-from avlmaps.cli.output import UsageError, require_share, table_lines
-from avlmaps.cli.verb import InFrame, MapVerb, shown_in
+from avlmaps.cli.output import Column, likely, size_text, table
+from avlmaps.cli.verb import COUNT, SHARE, InFrame, MapVerb, shown_in
 from avlmaps.core.progress import say
-from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.schema import ListedThing, RoomAnswer, SoundAnswer
 
@@ -34,7 +32,7 @@ class Things(InFrame, MapVerb):
     Example: avlmaps things home.avlmap --near sofa --top 5
     """
 
-    least: Annotated[float, arg(metavar="CONFIDENCE")] = 0.5
+    least: Annotated[float, SHARE, arg(metavar="CONFIDENCE")] = 0.5
     """List things with at least this confidence, 0 to 1."""
     name: Annotated[tuple[str, ...], arg(metavar="NAME ...")] = ()
     """List these things only, such as: --name chair table."""
@@ -47,27 +45,17 @@ class Things(InFrame, MapVerb):
     at: Annotated[str | None, arg(metavar="DAY")] = None
     """Of a map of several days: list what was there on this day, a date such as 2026-11-24, or the number of a visit,
     from 1. What moved or went since is where it was."""
-    top: Annotated[int | None, arg(metavar="N")] = None
+    top: Annotated[int | None, COUNT, arg(metavar="N")] = None
     """Maximum number of things on a page. Default: all."""
-    page: Annotated[int, arg(metavar="N")] = 1
+    page: Annotated[int, COUNT, arg(metavar="N")] = 1
     """Page, counted from 1."""
     csv: Annotated[Path | None, arg(metavar="FILE")] = None
     """Write things and sounds to a CSV file as well."""
-
-    def run(self) -> None:
-        self.require()
-        super().run()
-
-    def require(self) -> None:
-        require_share(self.least, "confidence")
-        if min(self.page, 1 if self.top is None else self.top) < 1:
-            raise UsageError("--top and --page take a number from 1 on.")
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
         from avlmaps.query.export import write_table
         from avlmaps.query.selection import MapLists, Wanted, page_of_things
 
-        self.require()
         wanted = Wanted(
             least=self.least, name=self.name, structure=self.structure, room=self.room, near=self._near(avlmap),
             top=self.top, page=self.page, at=self.at,
@@ -76,11 +64,7 @@ class Things(InFrame, MapVerb):
             listed = avlmap.contents(self.least, self.name or None, self.structure).to_json(str(self.map))
         else:
             doubts = avlmap.doubts_of_things
-            listed = {
-                "map": str(self.map),
-                "frame": _FRAME,
-                **page_of_things(MapLists(avlmap), wanted),
-            }
+            listed = {"map": str(self.map), "frame": _FRAME, **page_of_things(MapLists(avlmap), wanted)}
             notes = [*listed.get("notes", ()), *doubts]
             listed |= {"notes": notes} if notes else {}
         answer = shown_in(listed, self.frame, avlmap)
@@ -98,7 +82,7 @@ class Things(InFrame, MapVerb):
         in_space = len(place) == 3 and self.frame == "level"
         return (avlmap.space.world(place) if in_space else place).tolist()
 
-    def lines(self, answer: "Mapping[str, Any]") -> list[str]:
+    def lines(self, answer: Mapping[str, Any]) -> list[str]:
         frame = answer["frame"]
         lines = [f"note: {note}" for note in answer.get("notes", [])] + thing_lines(answer["things"], frame)
         if "total" in answer:
@@ -115,7 +99,7 @@ class Rooms(InFrame, MapVerb):
     Example: avlmaps rooms home.avlmap --plot rooms.png
     """
 
-    least: Annotated[float, arg(metavar="PROBABILITY")] = 0.0
+    least: Annotated[float, SHARE, arg(metavar="PROBABILITY")] = 0.0
     """List rooms whose name has at least this probability, 0 to 1."""
     plot: Annotated[Path | None, arg(metavar="FILE")] = None
     """Draw a top-down view with the outline, name and area of each room into this picture."""
@@ -124,21 +108,15 @@ class Rooms(InFrame, MapVerb):
         from avlmaps.query.plots import plot_map
         from avlmaps.query.selection import MapLists
 
-        require_share(self.least, "probability")
         doubts, rooms = avlmap.data.info.doubts, MapLists(avlmap).rooms(self.least)
-        listed = {
-            "map": str(self.map),
-            "frame": _FRAME,
-            "rooms": rooms,
-            **({"notes": list(doubts)} if doubts else {}),
-        }
+        listed = {"map": str(self.map), "frame": _FRAME, "rooms": rooms, **({"notes": list(doubts)} if doubts else {})}
         answer = shown_in(listed, self.frame, avlmap)
         if self.plot is not None:
             held = avlmap.rooms(self.least) if rooms else []
             answer["plot"] = str(plot_map(avlmap, self.plot, rooms=held))
         return answer
 
-    def lines(self, answer: "Mapping[str, Any]") -> list[str]:
+    def lines(self, answer: Mapping[str, Any]) -> list[str]:
         notes = [f"note: {note}" for note in answer.get("notes", [])]
         drawn = [f"wrote {answer['plot']}"] if "plot" in answer else []
         return [*notes, *room_lines(answer["rooms"], answer["frame"]), *drawn]
@@ -158,90 +136,76 @@ class Sources(InFrame, MapVerb):
     """List the sources of these sounds. Default: of every sound, by its likeliest name."""
     prior: Literal["lexicon", "none"] = "lexicon"
     """lexicon: things that usually make such a sound are likelier sources; none: by what the microphones say alone."""
-    least: Annotated[float, arg(metavar="CONFIDENCE")] = 0.0
+    least: Annotated[float, SHARE, arg(metavar="CONFIDENCE")] = 0.0
     """List sounds whose name has at least this confidence, 0 to 1."""
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
-        require_share(self.least, "confidence")
         found = avlmap.sources(self.sound, prior=self.prior == "lexicon", least=self.least)
         listed = {"map": str(self.map), "frame": _FRAME, "sources": [one.to_json() for one in found]}
         return shown_in(listed, self.frame, avlmap)
 
-    def lines(self, answer: "Mapping[str, Any]") -> list[str]:
+    def lines(self, answer: Mapping[str, Any]) -> list[str]:
         if not answer["sources"]:
             return ["no sounds"]
-        rows = [
-            (
-                one["name"] or "unnamed", f"{one['confidence']:.2f}", f"{one['probability']:.2f}",
-                place_text(one["position"]), f"{one['within_50_m']:.2f} m", f"{one['within_90_m']:.2f} m",
-                ", ".join(f"{room['name']} {room['probability']:.2f}" for room in one["rooms"][:2]),
-                ", ".join(f"{thing['name']} {thing['probability']:.2f}" for thing in one["things"]),
-                str(len(one["sounds"])) + (", moving" if one["moving"] else ""),
-            )
-            for one in answer["sources"]
-        ]  # fmt: skip
-        place = f"position ({answer['frame']} frame)"
-        head = (
-            "sound", "confidence", "probability", place, "50 % within", "90 % within", "room", "thing", "sounds",
-        )  # fmt: skip
-        return table_lines(head, rows)
+        columns: dict[str, Column] = {
+            "sound": lambda one: one["name"] or "unnamed",
+            "confidence": "confidence",
+            "probability": "probability",
+            f"position ({answer['frame']} frame)": "position",
+            "50 % within": lambda one: f"{one['within_50_m']:.2f} m",
+            "90 % within": lambda one: f"{one['within_90_m']:.2f} m",
+            "room": lambda one: likely(one["rooms"][:2]),
+            "thing": lambda one: likely(one["things"]),
+            "sounds": lambda one: f"{len(one['sounds'])}" + (", moving" if one["moving"] else ""),
+        }
+        return table(columns, answer["sources"])
 
 
 def thing_lines(things: "Sequence[ListedThing]", frame: str = "recording") -> list[str]:
     """Lay out things as a table; with their rooms and distances where those are known."""
     if not things:
         return ["no things with this confidence; lower --least to list less certain ones"]
-    rows = [
-        (t["name"], f"{t['confidence']:.2f}", place_text(t["position"]), " x ".join(f"{s:.2f}" for s in t["size"]))
-        for t in things
-    ]
-    head = ("thing", "confidence", f"position ({frame} frame)", "size in m (level axes)")
+    columns: dict[str, Column] = {
+        "thing": "name", "confidence": "confidence", f"position ({frame} frame)": "position",
+        "size in m (level axes)": lambda thing: size_text(thing["size"]),
+    }  # fmt: skip
     if "room" in things[0]:
-        head, rows = (*head, "room"), [(*row, t.get("room") or "") for row, t in zip(rows, things, strict=True)]
+        columns["room"] = "room"
     if any("heard" in thing for thing in things):
-        said = [", ".join(f"{h['sound']} {h['probability']:.2f}" for h in t.get("heard", ())) for t in things]
-        head, rows = (*head, "heard from it"), [(*row, one) for row, one in zip(rows, said, strict=True)]
+        columns["heard from it"] = lambda thing: likely(thing.get("heard", ()), "sound")
     if "distance_m" in things[0]:
-        head = (*head, "distance")
-        rows = [(*row, f"{t.get('distance_m', 0.0):.2f} m") for row, t in zip(rows, things, strict=True)]
-    return _with_storeys(head, rows, [t.get("storey") for t in things])
+        columns["distance"] = lambda thing: f"{thing['distance_m']:.2f} m"
+    return table(columns | _storeys(things), things)
 
 
-def sound_lines(sounds: "list[SoundAnswer]", frame: str = "recording") -> list[str]:
+def sound_lines(sounds: "Sequence[SoundAnswer]", frame: str = "recording") -> list[str]:
     """Lay out sounds as a table, in the order of their onset."""
-    if not sounds:
-        return ["no sounds"]
-    rows = [
-        (", ".join(f"{n} {c:.2f}" for n, c in zip(s["names"], s["confidences"], strict=True)) or "unnamed",
-         f"{max(s['onset_s'], 0.0):.1f} - {s['offset_s']:.1f} s", place_text(s["position"]))
-        for s in sounds
-    ]  # fmt: skip
-    head = ("sound", "time", f"position of the robot ({frame} frame)")
-    return _with_storeys(head, rows, [s.get("storey") for s in sounds])
+    columns: dict[str, Column] = {
+        "sound": _names_of,
+        "time": lambda sound: f"{max(sound['onset_s'], 0.0):.1f} - {sound['offset_s']:.1f} s",
+        f"position of the robot ({frame} frame)": "position",
+    }
+    return table(columns | _storeys(sounds), sounds) if sounds else ["no sounds"]
 
 
-def room_lines(rooms: "list[RoomAnswer]", frame: str = "recording") -> list[str]:
+def _names_of(sound: Mapping[str, Any]) -> str:
+    named = zip(sound["names"], sound["confidences"], strict=True)
+    return ", ".join(f"{name} {confidence:.2f}" for name, confidence in named) or "unnamed"
+
+
+def room_lines(rooms: "Sequence[RoomAnswer]", frame: str = "recording") -> list[str]:
     """Lay out rooms as a table, those with most views first."""
-    if not rooms:
-        return ["no rooms"]
-    rows = [
-        (
-            r["room"],
-            f"{r['probability']:.2f}",
-            "" if r["area_m2"] is None else f"{r['area_m2']:.1f} m²",
-            place_text(r["position"]),
-            str(r["views"]),
-            ", ".join(f"{other['name']} {other['probability']:.2f}" for other in r["names"][1:]),
-        )
-        for r in rooms
-    ]
-    head = ("room", "probability", "area", f"position ({frame} frame)", "views", "or")
-    return _with_storeys(head, rows, [r.get("storey") for r in rooms])
+    columns: dict[str, Column] = {
+        "room": "room",
+        "probability": "probability",
+        "area": lambda room: "" if room["area_m2"] is None else f"{room['area_m2']:.1f} m²",
+        f"position ({frame} frame)": "position",
+        "views": "views",
+        "or": lambda room: likely(room["names"][1:]),
+    }
+    return table(columns | _storeys(rooms), rooms) if rooms else ["no rooms"]
 
 
-def _with_storeys(head: "Sequence[str]", rows: "Sequence[Sequence[str]]", storeys: "Sequence[int | None]") -> list[str]:
-    """Lay out a table; in a map of several storeys with that of each row, counted from 0, the lowest."""
-    if None in storeys:
-        return table_lines(head, rows)
-    numbered = [(*row, str(storey)) for row, storey in zip(rows, storeys, strict=True)]
-    return table_lines((*head, "storey"), numbered)
+def _storeys(rows: Sequence[Mapping[str, Any]]) -> dict[str, Column]:
+    """Return the column of the storeys, counted from 0, the lowest; none in a map of one storey."""
+    return {"storey": "storey"} if all(row.get("storey") is not None for row in rows) else {}

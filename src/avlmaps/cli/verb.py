@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Optional
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Optional, get_type_hints
 
+from msgspec import Meta
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import UsageError, emit
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 # it knows these itself.
 OptionalText = Optional[str]  # noqa: UP045
 OptionalPath = Optional[Path]  # noqa: UP045
+SHARE, COUNT, SIZE = Meta(ge=0.0, le=1.0), Meta(ge=1), Meta(gt=0.0)
+PORT = Meta(ge=0, le=65535)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +41,33 @@ class Verb:
     def run(self) -> None:
         """Do it."""
         raise NotImplementedError
+
+    def require_bounds(self) -> None:
+        """Refuse a number outside the bounds that stand beside its option."""
+        for name, bounds in _bounds_of(type(self)):
+            given = getattr(self, name)
+            for value in given if isinstance(given, tuple) else () if given is None else (given,):
+                _require_within(f"--{name.replace('_', '-')}", value, bounds)
+
+
+@cache
+def _bounds_of(verb: type[Verb]) -> tuple[tuple[str, Meta], ...]:
+    hints = get_type_hints(verb, include_extras=True)
+    return tuple(
+        (name, note)
+        for name, kind in hints.items()
+        for note in getattr(kind, "__metadata__", ())
+        if isinstance(note, Meta)
+    )
+
+
+def _require_within(option: str, value: float, bounds: Meta) -> None:
+    low, over, high = bounds.ge, bounds.gt, bounds.le
+    if (low is None or value >= low) and (over is None or value > over) and (high is None or value <= high):
+        return
+    least = f"over {over:g}" if low is None else f"from {low:g}"
+    most = " on" if high is None else f" to {high:g}"
+    raise UsageError(f"{option} takes a number {least}{most if low is not None else ''}, not {value:g}.")
 
 
 def idle(options: "DataclassInstance", names: Sequence[str], why: str) -> list[str]:
@@ -93,7 +124,7 @@ class MapVerb(ModelVerb):
 class Asking:
     """Options of every verb that answers questions."""
 
-    found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
+    found_at: Annotated[float, SHARE, arg(metavar="PROBABILITY")] = 0.5
     """Call a query found, and drive to it, from this probability of its first goal on, 0 to 1."""
     at: Annotated[Literal["robot", "source"] | None, arg(metavar="robot|source")] = None
     """Place of a sound: where the robot was when it heard it, or its source. Default: as the words say, else robot."""
@@ -146,9 +177,9 @@ class Reading:
         """Return the value behind them.
 
         Raises:
-            UsageError: one of them is not of its form.
-            RecordingError: one of them is not possible.
+            UsageError: one of them is not of its form, or not possible.
         """
+        from avlmaps.core.errors import RecordingError
         from avlmaps.recordings.corrections import Corrections, GivenCamera, PoseKind
 
         cameras: list[GivenCamera] = []
@@ -160,14 +191,17 @@ class Reading:
                     "--intrinsics takes fx,fy,cx,cy in pixels, such as 525,525,320,240 or 525,525,320,240@640x480; "
                     f"not {words!r}."
                 ) from None
-        return Corrections(
-            depth_unit_m=self.depth_unit,
-            intrinsics=tuple(cameras),
-            poses=tuple(map(PoseKind, self.poses)),
-            camera_axes=self.camera_axes,
-            pose_delay_s=self.pose_delay,
-            up_in_world=None if self.up is None else _direction(self.up),
-        )
+        try:
+            return Corrections(
+                depth_unit_m=self.depth_unit,
+                intrinsics=tuple(cameras),
+                poses=tuple(map(PoseKind, self.poses)),
+                camera_axes=self.camera_axes,
+                pose_delay_s=self.pose_delay,
+                up_in_world=None if self.up is None else _direction(self.up),
+            )
+        except RecordingError as error:
+            raise UsageError(str(error)) from None
 
 
 def _direction(words: str) -> tuple[float, float, float]:
@@ -240,7 +274,7 @@ class Building(OfRecording, ModelVerb):
     """Set of models (see `avlmaps profiles`)."""
     model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
     """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
-    voxel_size_m: Annotated[float, arg(metavar="METRES")] = 0.05
+    voxel_size_m: Annotated[float, Meta(ge=0.001, le=10.0), arg(metavar="METRES")] = 0.05
     """Edge of a voxel, metres."""
     same_device: Annotated[Path | None, arg(metavar="MAP")] = None
     """Map of an earlier recording with the same device that says directions: its offset is known from there."""

@@ -4,6 +4,7 @@ import dataclasses
 import io
 import re
 import shlex
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stderr
 from functools import cache
@@ -79,7 +80,8 @@ def read_command(words: Sequence[str]) -> Verb:
 
     Raises:
         BackendError: the verb is one of a package that is not installed.
-        SystemExit: they cannot be read, or request help; either is printed.
+        UsageError: they cannot be read.
+        SystemExit: they request help, which is printed; its status is 0.
     """
     name = words[0] if words else ""
     if name not in _OWN:
@@ -87,18 +89,17 @@ def read_command(words: Sequence[str]) -> Verb:
         if name in missing:
             raise BackendError(missing[name])
         if name not in verbs:
-            every = _any_verb(verbs, shortly=not words or name.startswith("-"))
-            return tyro.cli(every, prog="avlmaps", description=_DESCRIPTION, args=words, config=CONFIG)
-    verb = _own(name) if name in _OWN else installed()[0][name]
-    return at_home(tyro.cli(verb, prog=f"avlmaps {name}", args=words[1:], config=CONFIG))
+            if set(words) & {"--help", "-h"}:
+                tyro.cli(_any_verb(verbs), prog="avlmaps", description=_DESCRIPTION, args=words, config=CONFIG)
+            raise UsageError(meant(words, "", verbs))
+    return read_verb(_own(name) if name in _OWN else installed()[0][name], words[1:], f"avlmaps {name}")
 
 
-def _any_verb(verbs: dict[str, type[Verb]], shortly: bool) -> Any:
-    """Return the union of the verbs; the list of them all shows one line of each."""
+def _any_verb(verbs: dict[str, type[Verb]]) -> Any:
+    """Return the union of the verbs, with one line of each."""
 
     def described(name: str, verb: type[Verb]) -> Any:
-        first_line = (verb.__doc__ or "").partition("\n")[0]
-        return Annotated[verb, tyro.conf.subcommand(name, description=first_line if shortly else None)]
+        return Annotated[verb, tyro.conf.subcommand(name, description=(verb.__doc__ or "").partition("\n")[0])]
 
     return Union[tuple(described(name, verb) for name, verb in verbs.items())]  # noqa: UP007 - made at run time
 
@@ -216,8 +217,8 @@ def _at_home(value: Any) -> Any:
     return at_home(value) if dataclasses.is_dataclass(value) else value
 
 
-def read_verb(verb: type[V], words: Sequence[str], name: str) -> V:
-    """Read the words of one verb.
+def read_verb(verb: type[V], words: Sequence[str], prog: str) -> V:
+    """Read the words of one verb; ``prog`` ends in its name.
 
     Raises:
         UsageError: they cannot be read.
@@ -226,8 +227,12 @@ def read_verb(verb: type[V], words: Sequence[str], name: str) -> V:
     printed = io.StringIO()
     try:
         with redirect_stderr(printed):
-            return at_home(tyro.cli(verb, prog=name, args=list(words), config=CONFIG))
+            read = at_home(tyro.cli(verb, prog=prog, args=list(words), config=CONFIG))
     except SystemExit as stop:
         if stop.code in (0, None):
+            sys.stderr.write(printed.getvalue())
             raise
-    raise UsageError(meant([name, *words], printed.getvalue(), {name: verb}))
+        name = prog.split()[-1]
+        raise UsageError(meant([name, *words], printed.getvalue(), {name: verb}), name) from None
+    read.require_bounds()
+    return read

@@ -11,7 +11,7 @@ from urllib.parse import quote, urlencode
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit, size_of
-from avlmaps.cli.verb import Asking, MapVerb
+from avlmaps.cli.verb import PORT, Asking, MapVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class View(Asking, MapVerb):
     """Second map of the same place, to compare: side by side, or before and after."""
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1"
     """Address to listen on. One that other machines reach makes the page need a token."""
-    port: Annotated[int, arg(metavar="NUMBER")] = 8080
+    port: Annotated[int, PORT, arg(metavar="NUMBER")] = 8080
     """Port to listen on; 0 takes a free one."""
     no_browser: bool = False
     """Do not open a browser."""
@@ -73,7 +73,6 @@ def _require_fitting(verb: View) -> None:
     if verb.out is None:
         if verb.questions or verb.overwrite:
             raise UsageError("--questions and --overwrite belong to --out FILE; in the browser, type the questions.")
-        require_port(verb.port)
         return
     if verb.scene is not None:
         raise UsageError("--scene belongs to the live page; a file drives no robot.")
@@ -124,7 +123,7 @@ def _serve(verb: View) -> None:
     token = None if is_loopback(verb.host) else secrets.token_urlsafe(24)
     limits = Limits(answer_s=_ANSWER_S)
     settings = ServeSettings(
-        host=verb.host.strip("[]"), port=verb.port, token=token, found_at=verb.found_at, at=verb.at, limits=limits
+        host=verb.host.strip("[]"), port=verb.port, token=token, query=verb.query_settings(), limits=limits
     )
     named = _named(verb)
     with listening_socket(settings) as opened:
@@ -147,12 +146,6 @@ def _serve(verb: View) -> None:
 
         run_page(service, opened, started)
         say("The viewer is stopped.")
-
-
-def require_port(port: int) -> None:
-    """Raise a usage error unless a port is one, or 0 for any free one."""
-    if not 0 <= port <= 65535:
-        raise UsageError(f"--port is {port}; it must lie between 0 and 65535.")
 
 
 def run_page(service: "Service", opened: "socket", started: "Callable[[], None]") -> None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from avlmaps.core.arrays import Float
+from avlmaps.core.errors import AskError
 from avlmaps.core.numbers import as_number, as_whole
 
 # Focal lengths and principal points beyond this many image sizes are mistakes, and would overflow further on.
@@ -103,3 +104,13 @@ class Rig:
         own, other = self.rgb, self.depth.resized(self.rgb.width, self.rgb.height)
         same_view = np.allclose([own.fx, own.fy, own.cx, own.cy], [other.fx, other.fy, other.cx, other.cy], rtol=1e-9)
         return bool(same_view) and np.array_equal(self.rgb_from_depth, np.eye(4))
+
+
+def intrinsics_of(text: str) -> tuple[float, float, float, float]:
+    """Read ``fx,fy,cx,cy`` in pixels. ``AskError``: no camera has them."""
+    try:
+        fx, fy, cx, cy = (float(word) for word in text.split(","))
+        Pinhole(fx, fy, cx, cy, width=1, height=1)
+    except ValueError:
+        raise AskError(f"Intrinsics are fx,fy,cx,cy in pixels, such as 525,525,320,240; not {text[:80]!r}.") from None
+    return fx, fy, cx, cy

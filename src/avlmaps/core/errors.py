@@ -5,6 +5,8 @@ prints it without a traceback and exits 1. Mistakes of a programmer (wrong shape
 ``ValueError`` and ``TypeError``.
 """
 
+import re
+
 from avlmaps.core.printable import printable
 
 
@@ -43,6 +45,10 @@ class QueryError(AvlmapsError):
     """This map cannot answer the query: an empty phrase, an unreadable picture, a missing modality."""
 
 
+class AskError(QueryError):
+    """What a query is given does not fit together, or is not of its form; no map could answer it."""
+
+
 class SceneError(AvlmapsError):
     """A scene cannot be read from its files: one is missing, truncated, or not what its layout says."""
 
@@ -77,6 +83,11 @@ class SeveralFitError(AvlmapsError):
 
 class NonConformanceError(AssertionError):
     """Something brought by a package breaks a promise; the sentence says which."""
+
+
+def kind_named(error_type: str) -> str:
+    """Return the kind of an error for programs, by the name of its class: ``goal-not-found``."""
+    return "-".join(re.findall("[A-Z][a-z]*", error_type.removesuffix("Error"))).lower()
 
 
 def hold(condition: object, promise: str) -> None:

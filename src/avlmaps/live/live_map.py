@@ -25,6 +25,8 @@ from avlmaps.core.files import lasting_path
 from avlmaps.core.machine import release_memory
 from avlmaps.core.numbers import as_number
 from avlmaps.core.poses import rotation_angle_rad
+from avlmaps.core.progress import say
+from avlmaps.core.wording import option
 from avlmaps.live.pose_check import PoseCheck
 from avlmaps.live.status import LiveSettings, LiveStatus, memory_mb
 from avlmaps.maps.build import require_place
@@ -435,6 +437,11 @@ class LiveMap:
                 ) from fault
             self._closed = True
             self._held.close()
+            if late := self._dropped["late"]:
+                say(
+                    f"note: {late} of {self._counts['came']} frames came while others waited and are not in the map; "
+                    f"of a recording, {option('as-fast-as-possible', argument='wait', python='True')} takes every one."
+                )
         if not len(self._mapper):
             raise MapError(f"No frame came, so that there is no map in {self.path}; add frames before it is closed.")
         made = AVLMap(read(self.path), self._mapper.encoders, path=self.path, settings=self._query)

@@ -227,8 +227,9 @@ class _Run:
             asks = self.last.error_type == SeveralFitError.__name__  # the person answers, and no translator
             if self.last.error is None or asks or len(self.programs) == _MOST_PROGRAMS or self.brake.pulled:
                 return
-            self.tell(f"failed: {self.last.error}")
             translation = self.repaired(translation.program, self.last)
+            if translation is not None:
+                self.tell(f"failed: {self.last.error}")
 
     def ran(self, text: str) -> Trace:
         try:

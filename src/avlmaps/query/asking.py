@@ -16,7 +16,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.errors import QueryError
+from avlmaps.core.errors import AskError
 from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
@@ -58,10 +58,6 @@ _EXAMPLE = "the red cabinet near the sound of a dog barking"
 ENDS = ("between", "and")
 """The relations to the two parts between which goals lie."""
 _OF_A_LIST = "The question has an order of its own, so that no place to count from (near) changes it."
-
-
-class AskError(QueryError):
-    """What a query is given does not fit together: nothing, a sentence beside parts, a file that nobody speaks of."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

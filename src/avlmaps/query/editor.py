@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.core.arrays import Float
-from avlmaps.core.errors import MapError, QueryError
+from avlmaps.core.errors import AskError, MapError, QueryError
 from avlmaps.core.numbers import checked
 from avlmaps.core.poses import plain_point
-from avlmaps.core.wording import place_text
+from avlmaps.core.wording import option, place_text
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, EditedSpot, World, append_edit, in_force, read_edits
 from avlmaps.query.edits import Edited, means, plain_name, said
 from avlmaps.query.places import is_place, place_given
@@ -26,6 +26,7 @@ _NEAR_M = 1.0  # how far from a thing a place may lie that means it
 _BESIDE_M = 5.0  # how far outside of the map a pinned place or a forbidden area may lie
 _APART_M = 3.0  # how far apart things that are one may be
 _MOST_NAMED = 8
+_NEEDS = {"rename": ("to",), "rename-room": ("name", "to"), "forbid": ("name",), "pin": ("name", "at")}
 
 
 class Editor:
@@ -150,6 +151,42 @@ class Editor:
             what = f"edit {which[:20]!r}" if which else "edit"
             raise QueryError(f"There is no {what} in force to undo; `avlmaps edit MAP --list` lists them.")
         return self._append(self._new("undo", of=wanted[0].id, by=by))
+
+    def make(
+        self,
+        does: str,
+        *,
+        name: str = "",
+        to: str = "",
+        at: Place | None = None,
+        places: Sequence[Place] = (),
+        box: Sequence[float] = (),
+        room: str | None = None,
+        by: str = "",
+    ) -> Edit:
+        """Make an edit that a front names by a word; ``name`` is the thing or room, or the edit that is undone.
+
+        ``AskError``: a value that it needs is missing.
+        """
+        given = {"name": name, "to": to, "at": at}
+        for need in _NEEDS.get(does, ()):
+            if not given[need]:
+                raise AskError(f"{does} needs {option(need)}.")
+        match does:
+            case "rename":
+                return self.rename(name or None, to, at=at, by=by)
+            case "rename-room":
+                return self.rename_room(name, to, by=by)
+            case "merge":
+                return self.merge(*places, to=to, by=by)
+            case "split":
+                return self.split(name or None, at=at, plane=places, box=box, by=by)
+            case "forbid":
+                return self.forbid(name, box=box, room=room, by=by)
+            case "pin":
+                return self.pin(name, at or "", by=by)
+            case _:
+                return self.undo(name, by=by)
 
     def history(self) -> "EditsAnswer":
         """Return all edits, the oldest first, and which of them find nothing to apply to."""

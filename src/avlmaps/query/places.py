@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Meta
 
 from avlmaps.core.arrays import Bool, Float, Int
-from avlmaps.core.errors import QueryError
+from avlmaps.core.errors import AskError, QueryError
 from avlmaps.core.poses import FRAME, FrameName, apply
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.core.wording import coordinates
@@ -26,20 +26,20 @@ if TYPE_CHECKING:
 
 
 def place_of(text: str) -> Float[np.ndarray, " n"]:
-    """Return the two or three numbers of a place. ``QueryError``: they are not."""
+    """Return the two or three numbers of a place. ``AskError``: they are not."""
     try:
         numbers = [float(word) for word in text.split(",")]
     except ValueError:
         numbers = []
     if len(numbers) not in (2, 3) or not all(math.isfinite(one) and abs(one) <= 1e6 for one in numbers):
-        raise QueryError(f"A place is x,y or x,y,z in metres, such as 1.5,2.0; not {text[:80]!r}.")
+        raise AskError(f"A place is x,y or x,y,z in metres, such as 1.5,2.0; not {text[:80]!r}.")
     return np.array(numbers)
 
 
 def place_given(place: str | Sequence[float]) -> Float[np.ndarray, " n"]:
     """Return the numbers of a place that comes as a text or as a list.
 
-    ``QueryError``: they are no two or three numbers.
+    ``AskError``: they are no two or three numbers.
     """
     if isinstance(place, str):
         return place_of(place)

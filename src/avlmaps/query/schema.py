@@ -340,6 +340,7 @@ class ErrorDetail(TypedDict):
 
     kind: str
     message: str
+    choices: NotRequired[Annotated[list[str], Meta(description="answers that would do, where a query is unclear")]]
 
 
 class ErrorAnswer(TypedDict):

@@ -8,7 +8,6 @@ a server of answers needs: tools, resources, prompts and progress.
 import asyncio
 import base64
 import itertools
-import json
 import re
 import sys
 import threading
@@ -31,7 +30,7 @@ from avlmaps.serve.drawn import small_picture
 from avlmaps.serve.lanes import JSON_TYPE, Cancellation, Report, RequestError, streamed
 from avlmaps.serve.operations import OPERATIONS, Operation, tool_schema
 from avlmaps.serve.requests import NoQuery, PictureQuery, Uploads, file_of, read
-from avlmaps.serve.service import Service, error_response, log
+from avlmaps.serve.service import Service, log
 from avlmaps.serve.work import WorkInput, describe_map, encoded, list_maps, picture
 
 INSTRUCTIONS = """Maps of buildings, made of what a robot saw and heard. Go from describe_map to list_rooms to
@@ -90,11 +89,10 @@ places in order, each with position, stop and confidence. Do not claim that anyt
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """One tool: what agents read of it, and what calls it; a call raises what its error says."""
+    """One tool: what agents read of it, and what calls it."""
 
     described: dict[str, Any]
     call: Callable[[dict[str, Any], Report], Awaitable[list[dict[str, Any]]]]
-    error: Callable[[Exception], dict[str, Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +103,7 @@ class AgentServer:
         name: of the server.
         instructions: what an agent reads first.
         tools: by their names.
+        error: returns the answer to what a call raised.
         prompts: conversations to begin with.
         resources: what can be read, by address: its description, and what returns its text.
     """
@@ -112,6 +111,7 @@ class AgentServer:
     name: str
     instructions: str
     tools: Mapping[str, Tool]
+    error: Callable[[Exception], Mapping[str, Any]]
     prompts: Sequence[Prompt] = ()
     resources: Mapping[str, tuple[dict[str, Any], Callable[[], Awaitable[str]]]] = field(default_factory=dict)
 
@@ -181,7 +181,7 @@ class AgentServer:
                 raise RequestError("The arguments of a tool are an object.")
             return {"content": await tool.call(given, report)}
         except Exception as error:  # noqa: BLE001 - every fault gets its sentence, and unknown ones go to the log
-            return {"content": [text_of(tool.error(error))], "isError": True}
+            return {"content": [text_of(self.error(error))], "isError": True}
 
     def prompt(self, params: dict[str, Any]) -> dict[str, Any]:
         """Return a prompt, filled."""
@@ -235,7 +235,7 @@ def _reporter(token: Any, tell: Callable[[dict[str, Any]], None] | None) -> Repo
     return report
 
 
-def text_of(answer: dict[str, Any]) -> dict[str, Any]:
+def text_of(answer: Mapping[str, Any]) -> dict[str, Any]:
     """Return an answer as the content of a result: the text of an error, else JSON that is short enough to be read."""
     if answer.keys() == {"error"} and answer["error"].keys() == {"kind", "message"}:
         return {"type": "text", "text": answer["error"]["message"]}
@@ -262,7 +262,7 @@ def agent_server(service: Service, *, reads_files: bool = False) -> AgentServer:
         async def call(arguments: dict[str, Any], report: Report) -> list[dict[str, Any]]:
             return await _content(service, one, arguments, report, reads_files)
 
-        return Tool(described(one, schema), call, lambda error: json.loads(bytes(error_response(service, error).body)))
+        return Tool(described(one, schema), call)
 
     async def text_of_maps() -> str:
         return _resource_text(list_maps(service.shelf))
@@ -280,7 +280,8 @@ def agent_server(service: Service, *, reads_files: bool = False) -> AgentServer:
         for name in names
     }
     tools = {one.tool: tool(one) for one in OPERATIONS if one.tool}
-    return AgentServer("avlmaps", f"{INSTRUCTIONS}\nMaps: {', '.join(names)}.", tools, PROMPTS, resources)
+    about = f"{INSTRUCTIONS}\nMaps: {', '.join(names)}."
+    return AgentServer("avlmaps", about, tools, lambda error: service.described(error)[1], PROMPTS, resources)
 
 
 def _resource(name: str, title: str, about: str) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 import asyncio
 from codecs import BOM_UTF8
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any
 
 import msgspec
@@ -27,10 +27,10 @@ from avlmaps.serve.service import Service, error_response
 from avlmaps.serve.work import File, WorkInput, encoded, list_maps
 
 
-class _Count(Convertor[int]):
+class _Whole(Convertor[int]):
     """Whole numbers in addresses, of a few digits."""
 
-    regex = "[0-9]{1,9}"
+    regex = "-?[0-9]{1,9}"
 
     def convert(self, value: str) -> int:
         return int(value)
@@ -39,35 +39,22 @@ class _Count(Convertor[int]):
         return str(value)
 
 
-class _Index(_Count):
-    """The same, also below 0."""
-
-    regex = "-?[0-9]{1,9}"
-
-
-register_url_convertor("count", _Count())
-register_url_convertor("index", _Index())
-Lifespan = Callable[[], AbstractAsyncContextManager[Any]]
-_EVENTS = "text/event-stream"
+register_url_convertor("whole", _Whole())
+EVENTS = "text/event-stream"
 _POLL_S = 2.0
 
 
-def create_app(
-    service: Service,
-    mounts: Mapping[str, App] | None = None,
-    lifespans: Sequence[Lifespan] = (),
-    agents: bool = True,
-) -> App:
+def create_app(service: Service, mounts: Mapping[str, App] | None = None, agents: bool = True) -> App:
     """Return the ASGI application of a server.
 
     Args:
         service: maps, lanes and settings.
-        mounts: further ASGI applications by path, such as ``{"/drive": drive_app(service)}``; the guard stands before
-            them, too. A Starlette application names in ``state.operations`` what the OpenAPI document says of it.
-        lifespans: async context managers that are open while the server runs.
+        mounts: further ASGI applications by path, such as ``{"/drive": driving.app}``; the guard stands before them,
+            too. A Starlette application names in ``state.operations`` what the OpenAPI document says of it.
         agents: whether agents are served, under ``/mcp``.
     """
     mounts = mounts or {}
+    inner = [app for app in mounts.values() if isinstance(app, Starlette)]
     routes: list[BaseRoute] = [
         Route("/", _page, methods=["GET"]),
         Route("/health", _health, methods=["GET"]),
@@ -86,8 +73,8 @@ def create_app(
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         async with AsyncExitStack() as stack:
-            for one in lifespans:
-                await stack.enter_async_context(one())
+            for one in inner:
+                await stack.enter_async_context(one.router.lifespan_context(one))
             looking = asyncio.create_task(_look_for_replaced_maps(service))
             try:
                 yield
@@ -131,8 +118,9 @@ def http_error(error: Exception, where: str) -> Response:
     return Response(encoded({"error": {"kind": "usage", "message": message}}), status, headers, JSON_TYPE)
 
 
-def _json(answer: Any) -> Response:
-    return Response(encoded(answer), media_type=JSON_TYPE)
+def json_response(answer: Any, status: int = 200) -> Response:
+    """Return an answer as JSON."""
+    return Response(encoded(answer), status, media_type=JSON_TYPE)
 
 
 async def _page(request: Request) -> Response:
@@ -141,7 +129,7 @@ async def _page(request: Request) -> Response:
 
 
 async def _health(_: Request) -> Response:
-    return _json({"status": "ok", "version": __version__})
+    return json_response({"status": "ok", "version": __version__})
 
 
 def _openapi(service: Service, mounts: Mapping[str, App]) -> Callable[[Request], Any]:
@@ -153,16 +141,14 @@ def _openapi(service: Service, mounts: Mapping[str, App]) -> Callable[[Request],
 
     async def endpoint(request: Request) -> Response:
         url = str(request.base_url).rstrip("/")
-        return _json(document(service.shelf.names, url, service.settings.token is not None, more))
+        return json_response(document(service.shelf.names, url, service.settings.token is not None, more))
 
     return endpoint
 
 
 def _maps(service: Service) -> Callable[[Request], Any]:
-    async def endpoint(request: Request) -> Response:
-        if request.query_params:
-            raise RequestError("This address takes no values.")
-        return _json(list_maps(service.shelf))
+    async def endpoint(_: Request) -> Response:
+        return json_response(list_maps(service.shelf))
 
     return endpoint
 
@@ -194,7 +180,7 @@ async def _answered(service: Service, operation: Operation, request: Request) ->
             return Response(status_code=304, headers={"etag": tag})
         file = await lane.run(job)
         return Response(file.content, 200, file.headers, file.media_type)
-    if _EVENTS not in request.headers.get("accept", ""):
+    if EVENTS not in request.headers.get("accept", ""):
         return Response(await lane.run(job), media_type=JSON_TYPE)
     loop = asyncio.get_running_loop()
 
@@ -209,7 +195,7 @@ async def _answered(service: Service, operation: Operation, request: Request) ->
         except Exception as error:  # noqa: BLE001 - as of a plain request
             return _event("error", bytes(error_response(service, error).body))
 
-    return StreamingResponse(streamed(answered), media_type=_EVENTS)
+    return StreamingResponse(streamed(answered), media_type=EVENTS)
 
 
 def _event(name: str, data: bytes) -> bytes:

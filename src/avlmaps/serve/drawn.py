@@ -22,7 +22,7 @@ Bytes of a tile, little-endian:
 import io
 import struct
 import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import cv2
@@ -75,115 +75,82 @@ class TilesAnswer(TypedDict):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Level:
-    """Voxels of a level, those of a tile one after the other."""
+class Level:
+    """Voxels of one level of detail; a coarser voxel has the mean colour of its own."""
 
     index: Int[np.ndarray, "n 3"]
     rgb: UInt8[np.ndarray, "n 3"]
-    starts: Int[np.ndarray, " t1"]  # first row of each tile, and the end
-    corners: Int[np.ndarray, "t 3"]  # of each tile
     of_map: Int[np.ndarray, " m"]  # row of this level for each voxel of the map
-    rows: dict[tuple[int, int, int], int] = field(repr=False)
+
+    @classmethod
+    def of(cls, index: Int[np.ndarray, "m 3"], rgb: UInt8[np.ndarray, "m 3"], number: int) -> "Level":
+        """Return a level of a map's voxels, 0 the finest."""
+        coarse = np.asarray(index, np.int64) >> number
+        low = coarse.min(axis=0, initial=0)
+        x, y, z = (coarse - low).T  # a map is less than 2^21 voxels wide
+        key = (x << (2 * _BITS)) | (y << _BITS) | z
+        _, first, of_map, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
+        sums = [np.bincount(of_map, weights=rgb[:, k], minlength=len(first)) for k in range(3)]
+        mean = np.stack(sums, axis=-1) / count[:, None]
+        return cls(coarse[first], mean.round().astype(np.uint8), of_map)
+
+    @property
+    def tiles(self) -> list[list[int]]:
+        """i, j, k and the number of voxels of each tile."""
+        corners, count = np.unique(self.index // SIDE, axis=0, return_counts=True)
+        return np.c_[corners, count].tolist()
 
 
 class Pyramid:
-    """The tiles of one map; levels are made when they are wanted."""
+    """The tiles of one map."""
 
     def __init__(self, index: Int[np.ndarray, "m 3"], rgb: UInt8[np.ndarray, "m 3"], voxel_size_m: float) -> None:
-        self._index, self._rgb, self._voxel_size_m = np.asarray(index, np.int64), np.asarray(rgb), voxel_size_m
-        self._levels: list[_Level] = []
-        self._lock = threading.Lock()
+        self._index, self._voxel_size_m = index, voxel_size_m
+        self.levels = [Level.of(index, rgb, 0)]
+        while len(self.levels[-1].index) > _COARSE and len(self.levels) < _MOST_LEVELS:
+            self.levels.append(Level.of(index, rgb, len(self.levels)))
 
     @classmethod
     def of(cls, avlmap: "AVLMap") -> "Pyramid":
         """Return the pyramid of a map."""
         return cls(avlmap.space.index, avlmap.colors, avlmap.space.grid.voxel_size_m)
 
-    @property
-    def levels(self) -> list[_Level]:
-        """All levels, finest first."""
-        with self._lock:
-            while not self._levels or (
-                len(self._levels[-1].index) > _COARSE
-                and len(self._levels[-1].corners) > 1
-                and len(self._levels) < _MOST_LEVELS
-            ):
-                self._levels.append(self._made(len(self._levels)))
-            return self._levels
-
-    def _made(self, level: int) -> _Level:
-        coarse = self._index >> level
-        tile = coarse // SIDE
-        keys, tile_keys = _key(coarse), _key(tile)
-        order = np.lexsort((keys, tile_keys))
-        new = np.r_[True, keys[order][1:] != keys[order][:-1]] if len(order) else np.zeros(0, bool)
-        group = np.cumsum(new) - 1
-        of_map = np.empty(len(order), np.int64)
-        of_map[order] = group
-        first = order[new]
-        count = np.bincount(of_map, minlength=len(first))
-        sums = [np.bincount(of_map, weights=self._rgb[:, k], minlength=len(first)) for k in range(3)]
-        rgb = np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
-        in_tiles = tile_keys[first]
-        begins = np.flatnonzero(np.r_[True, in_tiles[1:] != in_tiles[:-1]]) if len(first) else np.zeros(0, np.int64)
-        corners = tile[first][begins]
-        rows = {(int(i), int(j), int(k)): n for n, (i, j, k) in enumerate(corners)}
-        starts = np.append(begins, len(first))
-        return _Level(coarse[first], rgb.round().astype(np.uint8), starts, corners, of_map, rows)
-
     def index(self, version: str) -> TilesAnswer:
         """Return the list of tiles."""
-        levels = self.levels
-        low = self._index.min(axis=0) if len(self._index) else np.zeros(3, np.int64)
-        high = self._index.max(axis=0) + 1 if len(self._index) else np.zeros(3, np.int64)
-        return {
-            "version": version,
-            "frame": FRAME,
-            "side": SIDE,
-            "low": [float(value) for value in low * self._voxel_size_m],
-            "high": [float(value) for value in high * self._voxel_size_m],
-            "levels": [
-                {
-                    "level": number,
-                    "voxel_size_m": self._voxel_size_m * 2**number,
-                    "voxels": len(level.index),
-                    "tiles": np.c_[level.corners, np.diff(level.starts)].tolist(),
-                }
-                for number, level in enumerate(levels)
-            ],
-        }
+        ends = [self._index.min(axis=0), self._index.max(axis=0) + 1] if len(self._index) else [np.zeros(3)] * 2
+        low, high = (np.multiply(end, self._voxel_size_m).tolist() for end in ends)
+        levels: list[LevelAnswer] = [
+            {"level": number, "voxel_size_m": self._voxel_size_m * 2**number, "voxels": len(level.index),
+             "tiles": level.tiles}
+            for number, level in enumerate(self.levels)
+        ]  # fmt: skip
+        return {"version": version, "frame": FRAME, "side": SIDE, "low": low, "high": high, "levels": levels}
 
     def tile(
-        self, level: int, corner: tuple[int, int, int], heat: Float32[np.ndarray, " m"] | None = None
+        self, number: int, corner: tuple[int, int, int], heat: Float32[np.ndarray, " m"] | None = None
     ) -> bytes | None:
         """Return the bytes of a tile; None where there is none.
 
         Args:
-            level: 0 is the finest.
+            number: of its level; 0 is the finest.
             corner: i, j, k.
             heat: of each voxel of the map, in [0, 1]; a coarser voxel has the highest of its own.
         """
-        levels = self.levels
-        if not 0 <= level < len(levels) or corner not in levels[level].rows:
+        if not 0 <= number < len(self.levels):
             return None
-        chosen = levels[level]
-        number = chosen.rows[corner]
-        a, b = int(chosen.starts[number]), int(chosen.starts[number + 1])
-        columns = [(chosen.index[a:b] - SIDE * np.array(corner)).astype(np.uint8), chosen.rgb[a:b]]
+        level = self.levels[number]
+        rows = np.flatnonzero((level.index // SIDE == corner).all(axis=1))
+        if not len(rows):
+            return None
+        columns = [(level.index[rows] - SIDE * np.array(corner)).astype(np.uint8), level.rgb[rows]]
         if heat is not None:
-            highest = np.zeros(len(chosen.index), np.float32)
-            np.maximum.at(highest, chosen.of_map, np.asarray(heat, np.float32))
-            columns.append((255.0 * np.clip(highest[a:b], 0.0, 1.0)).round().astype(np.uint8)[:, None])
+            highest = np.zeros(len(level.index), np.float32)
+            np.maximum.at(highest, level.of_map, np.asarray(heat, np.float32))
+            columns.append((255.0 * np.clip(highest[rows], 0.0, 1.0)).round().astype(np.uint8)[:, None])
         body = np.concatenate(columns, axis=1)
-        edge = self._voxel_size_m * 2**level
+        edge = self._voxel_size_m * 2**number
         origin = [SIDE * edge * one for one in corner]
-        return HEADER.pack(MAGIC, VERSION, level, body.shape[1], edge, *origin, b - a) + body.tobytes()
-
-
-def _key(index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
-    # a map is less than 2^21 voxels wide
-    shifted = index - (index.min(axis=0) if len(index) else 0)
-    return (shifted[:, 0] << (2 * _BITS)) | (shifted[:, 1] << _BITS) | shifted[:, 2]
+        return HEADER.pack(MAGIC, VERSION, number, body.shape[1], edge, *origin, len(rows)) + body.tobytes()
 
 
 SMALL_PIXELS = 480

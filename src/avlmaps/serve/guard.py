@@ -7,13 +7,14 @@ It is plain ASGI and stands before the whole application, sub-applications and M
 import asyncio
 import hashlib
 import hmac
-import json
 import socket
 from collections.abc import Awaitable, Callable, MutableMapping
-from http.cookies import CookieError, SimpleCookie
 from ipaddress import ip_address
 from typing import Any
-from urllib.parse import parse_qsl, quote, unquote, urlencode, urlsplit
+from urllib.parse import quote, unquote, urlencode, urlsplit
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
 
 from avlmaps.core.machine import is_loopback
 from avlmaps.core.wording import Spelling, asked_as, flag
@@ -65,14 +66,6 @@ class AccessGuard:
             await self._answer(scope, receive, send)
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
-        try:
-            entered = self._check(scope)
-        except RequestError as error:
-            await refuse(error, send)
-            return
-        if entered is not None:
-            await _enter(entered, send)
-            return
         body = _LimitedBody(receive, self._settings.limits.body_bytes, self._settings.limits.body_s)
         started = False
 
@@ -87,23 +80,27 @@ class AccessGuard:
             await send(message)
 
         try:
-            await self._app(scope, body, sent)
-        except RequestError as error:  # of the body, which the application reads
+            answer = self._check(Request(scope)) or self._app
+            await answer(scope, body, sent)
+        except RequestError as error:  # also of the body, which the application reads
             if started:
                 raise
-            await refuse(error, send)
+            # The connection is closed, since the body may be unread.
+            headers = {**error.headers, "connection": "close"}
+            said = {"error": {"kind": error.kind, "message": str(error)}}
+            await JSONResponse(said, error.status, headers)(scope, receive, sent)
 
-    def _check(self, scope: Scope) -> list[tuple[bytes, bytes]] | None:
-        """Return the headers of a redirection where a browser brings the token in the address, else None.
+    def _check(self, request: Request) -> Response | None:
+        """Return a redirection where a browser brings the token in the address, else None.
 
         Raises:
             RequestError: the request is refused.
         """
-        headers = _headers(scope)
-        size = 0 if scope["path"] in _UNREAD_PATHS else _length(headers.get("content-length", "0"))
+        path = request.scope["path"]
+        size = 0 if path in _UNREAD_PATHS else _length(_header(request, "content-length") or "0")
         if self._settings.limits.body_bytes < size:
             raise too_large(self._settings.limits.body_bytes)
-        host = headers.get("host", "")
+        host = _header(request, "host")
         if not self._is_ours(host):
             raise RequestError(
                 "The Host header names no host of this server; connect by its own name or address, or start it with "
@@ -111,18 +108,18 @@ class AccessGuard:
                 421,
                 "host",
             )
-        self._check_site(headers, host)
-        if self._token is None or scope["path"] in _OPEN_PATHS:
+        self._check_site(request, host)
+        if self._token is None or path in _OPEN_PATHS:
             return None
-        pairs = parse_qsl(scope.get("query_string", b"").decode("latin-1"), keep_blank_values=True)
-        given = dict(pairs).get(_IN_ADDRESS)
-        if scope["method"] == "GET" and given is not None and self._is_token(given):
+        given = request.query_params.get(_IN_ADDRESS)
+        if request.method == "GET" and given is not None and self._is_token(given):
             # The token leaves the address, so that it is in no history and in no picture of the screen.
-            left = urlencode([pair for pair in pairs if pair[0] != _IN_ADDRESS])
-            secure = "; Secure" if self._settings.scheme == "https" else ""
-            cookie = f"{_COOKIE}={quote(given, safe='')}; HttpOnly; SameSite=Strict; Path=/{secure}"
-            return [(b"location", f"?{left}".encode()), (b"set-cookie", cookie.encode())]
-        self._check_token(headers)
+            left = urlencode([pair for pair in request.query_params.multi_items() if pair[0] != _IN_ADDRESS])
+            entered = Response(status_code=303, headers={"location": f"?{left}"})
+            is_secure = self._settings.scheme == "https"
+            entered.set_cookie(_COOKIE, quote(given, safe=""), httponly=True, samesite="strict", secure=is_secure)
+            return entered
+        self._check_token(request)
         return None
 
     def _is_ours(self, host: str) -> bool:
@@ -137,19 +134,21 @@ class AccessGuard:
         except ValueError:
             return False
 
-    def _check_site(self, headers: dict[str, str], host: str) -> None:
-        origin = headers.get("origin")
-        same = origin is None or urlsplit(origin).netloc.lower() == host.lower()
-        site, mode = headers.get("sec-fetch-site", "none"), headers.get("sec-fetch-mode", "navigate")
-        if not same or (site in ("cross-site", "same-site") and mode != "navigate"):
+    def _check_site(self, request: Request, host: str) -> None:
+        same = urlsplit(_header(request, "origin")).netloc.lower() == host.lower()
+        site, mode = _header(request, "sec-fetch-site"), request.headers.get("sec-fetch-mode", "navigate")
+        if not (same or "origin" not in request.headers) or (
+            site in ("cross-site", "same-site") and mode != "navigate"
+        ):
             raise RequestError("Pages of other sites may not use this server.", 403, "origin")
 
     def _is_token(self, given: str) -> bool:
         return hmac.compare_digest(token_digest(given), self._token or b"")
 
-    def _check_token(self, headers: dict[str, str]) -> None:
-        scheme, _, given = headers.get("authorization", "").partition(" ")
-        if not (scheme.lower() == "bearer" and self._is_token(given.strip())) and not self._is_token(_kept(headers)):
+    def _check_token(self, request: Request) -> None:
+        scheme, _, given = _header(request, "authorization").partition(" ")
+        kept = unquote(request.cookies.get(_COOKIE, ""))
+        if not (scheme.lower() == "bearer" and self._is_token(given.strip())) and not self._is_token(kept):
             raise RequestError(
                 "This server needs a token; send the header 'Authorization: Bearer TOKEN', or add ?token=TOKEN to the "
                 "address in a browser.",
@@ -189,41 +188,9 @@ def too_large(most_bytes: int) -> RequestError:
     return RequestError(f"The body is larger than {most_bytes:,} bytes; send smaller files.", 413, "size")
 
 
-async def refuse(error: RequestError, send: Send) -> None:
-    """Send an error as JSON and close the connection, since its body may be unread."""
-    body = json.dumps({"error": {"kind": error.kind, "message": str(error)}}).encode()
-    headers = [
-        (b"content-type", b"application/json"),
-        (b"content-length", str(len(body)).encode()),
-        (b"connection", b"close"),
-        *HEADERS,
-        _NO_STORE,
-        *((name.lower().encode(), value.encode()) for name, value in error.headers.items()),
-    ]
-    await send({"type": "http.response.start", "status": error.status, "headers": headers})
-    await send({"type": "http.response.body", "body": body})
-
-
-async def _enter(headers: list[tuple[bytes, bytes]], send: Send) -> None:
-    headers = [*headers, (b"content-length", b"0"), *HEADERS, _NO_STORE]
-    await send({"type": "http.response.start", "status": 303, "headers": headers})
-    await send({"type": "http.response.body", "body": b""})
-
-
-def _kept(headers: dict[str, str]) -> str:
-    try:
-        kept = SimpleCookie(headers.get("cookie", "")).get(_COOKIE)
-    except CookieError:
-        return ""
-    return "" if kept is None else unquote(kept.value)
-
-
-def _headers(scope: Scope) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for name, value in scope["headers"]:
-        key = name.decode("latin-1").lower()
-        found[key] = value.decode("latin-1") if key not in found else f"{found[key]}, {value.decode('latin-1')}"
-    return found
+def _header(request: Request, name: str) -> str:
+    """Return a header, "" without it; one that is given twice is neither of both."""
+    return ", ".join(request.headers.getlist(name))
 
 
 def _length(text: str) -> int:

@@ -3,17 +3,24 @@
 import asyncio
 import re
 import threading
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import copy_context
 from pathlib import Path
 from typing import TypeVar
 
-from avlmaps.core.errors import AvlmapsError, LanguageError, NavigationError, NoFloorError, QueryError
+from avlmaps.core.errors import (
+    AskError,
+    AvlmapsError,
+    LanguageError,
+    NavigationError,
+    NoFloorError,
+    QueryError,
+    kind_named,
+)
 from avlmaps.core.files import user_path
 from avlmaps.core.printable import printable
-from avlmaps.query.asking import AskError
 from avlmaps.query.schema import ErrorAnswer
 
 T = TypeVar("T")
@@ -83,13 +90,8 @@ class Lane:
         """
         self._threads = ThreadPoolExecutor(workers, thread_name_prefix=f"avlmaps-{name}")
         self._most, self._waiting, self._answer_s = workers + waiting, waiting, answer_s
-        self._taken = 0
+        self.taken = 0  # pieces of work that run or wait
         self._lock = threading.Lock()
-
-    @property
-    def taken(self) -> int:
-        """Pieces of work that run or wait."""
-        return self._taken
 
     async def run(self, work: Callable[[Cancellation], T], report: Report | None = None) -> T:
         """Run a piece of work in one of the threads.
@@ -98,9 +100,12 @@ class Lane:
             RequestError: the queue is full, or the answer took too long.
         """
         with self._lock:
-            if self._taken >= self._most:
-                raise busy(self._waiting)
-            self._taken += 1
+            if self.taken >= self._most:
+                raise RequestError(
+                    f"The server has {self._waiting} queries waiting; send this one again in a second.",
+                    503, "busy", Retry_After="1",
+                )  # fmt: skip
+            self.taken += 1
         watch = Cancellation(report)
 
         def watched() -> T:
@@ -116,7 +121,8 @@ class Lane:
         except TimeoutError:
             watch.cancel()
             future.cancel()
-            raise too_slow(self._answer_s) from None
+            late = f"The answer took longer than {self._answer_s:g} s; send a simpler query."
+            raise RequestError(late, 504, "timeout") from None
         except asyncio.CancelledError:
             watch.cancel()
             future.cancel()
@@ -128,7 +134,7 @@ class Lane:
 
     def _freed(self, _: object) -> None:
         with self._lock:
-            self._taken -= 1
+            self.taken -= 1
 
 
 _BEAT_S = 10.0
@@ -168,31 +174,21 @@ class RequestError(AvlmapsError):
     Attributes:
         status: HTTP status.
         kind: word for programs.
+        choices: answers that would do, where the request is a question back.
         headers: further headers of the response.
     """
 
-    def __init__(self, message: str, status: int = 400, kind: str = "usage", **headers: str) -> None:
+    def __init__(
+        self, message: str, status: int = 400, kind: str = "usage", choices: Sequence[str] = (), **headers: str
+    ) -> None:
         super().__init__(message)
-        self.status = status
-        self.kind = kind
+        self.status, self.kind, self.choices = status, kind, tuple(choices)
         self.headers = {name.replace("_", "-"): value for name, value in headers.items()}
 
 
 def without_folders(text: str) -> str:
     """Return a text in which each absolute path is the name of its file alone."""
     return _ABSOLUTE.sub(lambda found: re.split(r"[/\\\\]", found.group())[-1], text)
-
-
-def busy(waiting: int) -> RequestError:
-    """Return the error of a full queue."""
-    return RequestError(
-        f"The server has {waiting} queries waiting; send this one again in a second.", 503, "busy", Retry_After="1"
-    )
-
-
-def too_slow(seconds: float) -> RequestError:
-    """Return the error of a query that took too long."""
-    return RequestError(f"The answer took longer than {seconds:g} s; send a simpler query.", 504, "timeout")
 
 
 class Privacy:
@@ -215,13 +211,13 @@ class Privacy:
     def described(self, error: BaseException) -> tuple[int, ErrorAnswer]:
         """Return the HTTP status and the JSON of an error."""
         if isinstance(error, RequestError):
-            return error.status, _answer(error.kind, str(error))
+            return error.status, _answer(error.kind, str(error), error.choices)
         if isinstance(error, AskError):
             return 400, _answer("usage", str(error))
         if isinstance(error, NoFloorError):  # the map is whole, and no retry helps
             return 422, _answer("map", str(error))
         if isinstance(error, AvlmapsError):
-            kind = _kind(error)
+            kind = kind_named(type(error).__name__)
             # These quote nothing but the client's own words, which may look like a path; others may quote a file.
             ours = not isinstance(error, QueryError | LanguageError | NavigationError)
             message = self.cleaned(str(error)) if ours else str(error)
@@ -234,9 +230,8 @@ class Privacy:
         )
 
 
-def _kind(error: AvlmapsError) -> str:
-    return "-".join(re.findall("[A-Z][a-z]*", type(error).__name__.removesuffix("Error"))).lower()
-
-
-def _answer(kind: str, message: str) -> ErrorAnswer:
-    return {"error": {"kind": kind, "message": message}}
+def _answer(kind: str, message: str, choices: Sequence[str] = ()) -> ErrorAnswer:
+    answer: ErrorAnswer = {"error": {"kind": kind, "message": message}}
+    if choices:
+        answer["error"]["choices"] = list(choices)
+    return answer

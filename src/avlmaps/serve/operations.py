@@ -32,8 +32,7 @@ class Operation:
 
     Attributes:
         name: ``operationId`` of the OpenAPI document; of what agents alone can do, their name of it.
-        path: below its mount, with ``{name:count}`` and ``{name:index}`` for whole numbers, the latter also below 0;
-            None for what agents alone can do.
+        path: below its mount, with ``{name:whole}`` for whole numbers; None for what agents alone can do.
         about: one sentence.
         query: the type of the request.
         answer: the type of the answer's JSON, or a media type.
@@ -54,7 +53,7 @@ class Operation:
     about: str
     query: type[msgspec.Struct]
     answer: Any
-    work: Callable[[Any, Any], Any]
+    work: Callable[..., Any]
     slow: bool = False
     methods: tuple[str, ...] = ("GET",)
     files: tuple[str, ...] = ()
@@ -77,7 +76,7 @@ OPERATIONS = (
               ask.ListedThingsQuery, work.ListedThingsAnswer, work.list_things, slow=True),
     Operation("listSounds", "/sounds", "List the sounds of a map.",
               ask.NoQuery, work.SoundsAnswer, work.list_sounds, slow=True),
-    Operation("getSound", "/sounds/{sound:count}/clip", "Return the clip of a sound, counted from 0.",
+    Operation("getSound", "/sounds/{sound:whole}/clip", "Return the clip of a sound, counted from 0.",
               ask.NoQuery, "audio/flac", work.sound_clip, slow=True),
     Operation("listRooms", "/rooms", "List the rooms of a map, as `avlmaps rooms` does.",
               ask.RoomsQuery, RoomsAnswer, work.list_rooms, slow=True),
@@ -117,9 +116,9 @@ OPERATIONS = (
               ask.PictureQuery, "image/png", work.picture, slow=True, methods=_BOTH, files=_FILES),
     Operation("listTiles", "/tiles", "List the tiles of a map's voxels, by level of detail.",
               ask.NoQuery, TilesAnswer, work.tiles, slow=True),
-    Operation("getTile", "/tiles/{level:count}/{i:index}/{j:index}/{k:index}", "Return one tile of voxels.",
+    Operation("getTile", "/tiles/{level:whole}/{i:whole}/{j:whole}/{k:whole}", "Return one tile of voxels.",
               ask.TilesQuery, _BYTES, work.tile, slow=True),
-    Operation("getKeyframe", "/keyframes/{keyframe:count}", "Return the picture of a keyframe, counted from 0.",
+    Operation("getKeyframe", "/keyframes/{keyframe:whole}", "Return the picture of a keyframe, counted from 0.",
               ask.NoQuery, "image/jpeg", work.keyframe),
     Operation("view", "/view", "Show the map in a browser, as `avlmaps view` does.",
               ask.ViewQuery, "text/html", work.viewer),
@@ -131,7 +130,7 @@ OPERATIONS = (
               ask.NoQuery, _BYTES, work.drawn_labels, slow=True),
     Operation("viewContents", "/view/contents", "Return things, sounds and rooms with the colours of the page.",
               ask.NoQuery, dict, work.drawn_contents, slow=True),
-    Operation("viewVoxel", "/view/voxels/{voxel:count}", "Return what a voxel that is drawn is taken for.",
+    Operation("viewVoxel", "/view/voxels/{voxel:whole}", "Return what a voxel that is drawn is taken for.",
               ask.NoQuery, dict, work.drawn_voxel),
     Operation("askInView", "/view/ask", "Query a map, and return the answer with the heat of each voxel that is drawn.",
               ask.AskQuery, _BYTES, work.ask_in_view, methods=_BOTH, files=_FILES),
@@ -177,7 +176,7 @@ def document(
     paths["/maps"]["get"]["responses"] = {"200": _content("The maps.", of[work.MapsAnswer]), **errors}
     named = {"name": "map", "in": "path", "required": True, "schema": {"type": "string", "examples": list(maps)}}
     for mount, one in every:
-        item = paths.setdefault(mount + re.sub(r":(count|index)}", "}", one.path or ""), {})
+        item = paths.setdefault(mount + (one.path or "").replace(":whole", ""), {})
         for method in one.methods:
             described = _described(one, method, [named] if "{map}" in mount else [], of)
             item[method.lower()] = described | {"responses": {**errors, **described["responses"]}}
@@ -201,9 +200,8 @@ def document(
 def _described(one: Operation, method: str, parameters: list[Any], of: Mapping[Any, Any]) -> dict[str, Any]:
     schema = ask.schema_of(one.query)
     parameters = parameters + [
-        {"name": name, "in": "path", "required": True, "schema": {"type": "integer", **least}}
-        for name, kind in re.findall(r"{(\w+):(count|index)}", one.path or "")
-        for least in [{"minimum": 0} if kind == "count" else {}]
+        {"name": name, "in": "path", "required": True, "schema": {"type": "integer"}}
+        for name in re.findall(r"{(\w+):whole}", one.path or "")
     ]
     if method == "GET":
         parameters += [
@@ -261,11 +259,7 @@ def tool_schema(one: Operation, more: Mapping[str, Any], reads_files: bool = Fal
     path = "path of a file, or " if reads_files else ""
     files = {name: {"type": "string", "description": f"{path}base64"} for name in one.files}
     required = [*schema.get("required", ()), *one.needs]
-    return {
-        "type": "object",
-        "properties": {**brief, **files, **more},
-        **({"required": required} if required else {}),
-    }
+    return {"type": "object", "properties": {**brief, **files, **more}, **({"required": required} if required else {})}
 
 
 def _brief(schema: dict[str, Any]) -> dict[str, Any]:

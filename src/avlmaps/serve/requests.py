@@ -8,6 +8,7 @@ import binascii
 import re
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -17,7 +18,6 @@ import numpy as np
 from jaxtyping import UInt8
 from msgspec import Meta, Struct
 
-from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.files import read_regular, user_path
 from avlmaps.core.question import MOST_CHARACTERS, HeardAt
@@ -360,23 +360,18 @@ def decode_photo(content: bytes, limits: Limits) -> UInt8[np.ndarray, "h w 3"]:
     import cv2
 
     size = encoded_size(content)
-    if size is None:
-        raise RequestError("The photo is no PNG or JPEG, or is cut off; send another one.", 415, "photo")
-    if size[0] < 1 or size[1] < 1 or size[0] * size[1] > limits.picture_pixels:
+    if size is not None and not 0 < size[0] * size[1] <= limits.picture_pixels:
         raise RequestError(
-            f"The photo has {size[0]}x{size[1]} pixels; photos have 1 to {limits.picture_pixels:,}; send "
-            "a smaller one.",
-            413,
-            "photo",
-        )
-    try:
-        check_whole(Path("The photo"), content)
-    except RecordingError:
-        raise RequestError("The photo is cut off or damaged; send it again.", 415, "photo") from None
+            f"The photo has {size[0]}x{size[1]} pixels; photos have 1 to {limits.picture_pixels:,}. Send a smaller.",
+            413, "photo",
+        )  # fmt: skip
     # The pose is that of the picture as its pixels lie, so a camera's turn flag must not rotate it.
-    bgr = decode_picture(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-    if bgr is None or bgr.shape[:2] != (size[1], size[0]):
-        raise RequestError("The photo cannot be decoded; send another one.", 415, "photo")
+    bgr = None
+    with suppress(RecordingError):
+        check_whole(Path("The photo"), content)
+        bgr = decode_picture(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    if size is None or bgr is None or bgr.shape[:2] != (size[1], size[0]):
+        raise RequestError("The photo is no whole PNG or JPEG, or is damaged; send it again.", 415, "photo")
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
 
 
@@ -393,28 +388,15 @@ def decode_clip(content: bytes, limits: Limits) -> Sound:
         path.write_bytes(content)
         try:
             track = AudioTrack.open(path)
-            if track.duration_s > limits.clip_s:
-                last = f"The clip lasts {track.duration_s:.0f} s; clips last up to {limits.clip_s:g} s, so cut it."
-                raise RequestError(last, 413, "clip")
-            if track.rate_hz > _HIGHEST_RATE_HZ:
-                fast = f"The clip has {track.rate_hz:,} samples a second; convert it to 48,000."
-                raise RequestError(fast, 413, "clip")
+            if track.duration_s > limits.clip_s or track.rate_hz > _HIGHEST_RATE_HZ:
+                raise RequestError(
+                    f"The clip lasts {track.duration_s:.0f} s at {track.rate_hz:,} samples a second; clips last up to "
+                    f"{limits.clip_s:g} s at {_HIGHEST_RATE_HZ:,}; cut or convert it.",
+                    413, "clip",
+                )  # fmt: skip
             sound = track.read()
         except AudioError as error:
-            sentence = str(error).replace(str(path), "the clip")
-            if folder in sentence:
-                sentence = "the clip cannot be read as sound; send another one."
-            raise RequestError(sentence[:1].upper() + sentence[1:], 415, "clip") from None
+            said = str(error).replace(str(path), "The clip")
+            said = "The clip cannot be read as sound; send another one." if folder in said else said
+            raise RequestError(said, 415, "clip") from None
     return require_audible(sound, "of the request")
-
-
-def numbers_of(intrinsics: str) -> tuple[float, float, float, float]:
-    """Return ``fx,fy,cx,cy``."""
-    try:
-        fx, fy, cx, cy = (float(word) for word in intrinsics.split(","))
-        Pinhole(fx, fy, cx, cy, width=1, height=1)  # no camera has a focal length of 0, or NaN
-    except ValueError:
-        raise RequestError(
-            f"Intrinsics are fx,fy,cx,cy in pixels, such as 525,525,320,240; not {intrinsics[:80]!r}."
-        ) from None
-    return fx, fy, cx, cy

@@ -17,7 +17,7 @@ from starlette.responses import Response
 
 from avlmaps.core.files import read_regular, user_path
 from avlmaps.core.wording import option
-from avlmaps.query.settings import QuerySettings, SoundSettings
+from avlmaps.query.schema import ErrorAnswer
 from avlmaps.serve.guard import App
 from avlmaps.serve.lanes import JSON_TYPE, Lane, Privacy, RequestError
 from avlmaps.serve.settings import ServeError, ServeSettings
@@ -57,8 +57,7 @@ class Service:
         """
         settings = settings or ServeSettings()
         limits = settings.limits
-        querying = QuerySettings(found_at=settings.found_at, sounds=SoundSettings(at=settings.at))
-        shelf = Shelf(maps, limits, note, querying, robot, warm)
+        shelf = Shelf(maps, limits, note, settings.query, robot, warm)
         return cls(
             settings,
             shelf,
@@ -72,14 +71,18 @@ class Service:
         self.quick.close()
         self.slow.close()
 
+    def described(self, error: BaseException) -> tuple[int, ErrorAnswer]:
+        """Return the HTTP status and the JSON of an error; what is a fault of ours goes to the log."""
+        status, answer = self.privacy.described(error)
+        if status >= 500 and not isinstance(error, RequestError):
+            log.error("%s", error, exc_info=error if status == 500 else None)
+        return status, answer
+
 
 def error_response(service: Service, error: BaseException) -> Response:
-    """Return an error as the JSON that the command line prints; what is a fault of ours goes to the log."""
-    status, answer = service.privacy.described(error)
-    if status >= 500 and not isinstance(error, RequestError):
-        log.error("%s", error, exc_info=error if status == 500 else None)
-    headers = error.headers if isinstance(error, RequestError) else {}
-    return Response(encoded(answer), status, headers, JSON_TYPE)
+    """Return an error as the JSON that the command line prints."""
+    status, answer = service.described(error)
+    return Response(encoded(answer), status, getattr(error, "headers", {}), JSON_TYPE)
 
 
 TOKEN_VARIABLE = "AVLMAPS_TOKEN"
@@ -105,32 +108,21 @@ def read_token(path: Path | None) -> str | None:
 
 
 def listening_socket(settings: ServeSettings) -> socket.socket:
-    """Return a bound socket.
+    """Return a socket that listens.
 
     Raises:
         ServeError: the port is taken, or the address is none of this machine's.
     """
+    host, port = settings.host, settings.port
     try:
-        found = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-        family, kind, protocol, _, address = found[0]
-        opened = socket.socket(family, kind, protocol)
+        return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
     except OSError as error:
-        raise ServeError(
-            f"The server cannot listen on {settings.host} ({error.strerror}); check {option('host')}."
-        ) from None
-    try:
-        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        opened.bind(address)
-    except OSError as error:
-        opened.close()
-        if error.errno == errno.EADDRINUSE:
-            raise ServeError(
-                f"Port {settings.port} of {settings.host} is taken by another program; choose one with "
-                f"{option('port', 'N')}, or {option('port', '0')} for any free one."
-            ) from None
-        what = "needs more rights" if error.errno == errno.EACCES else error.strerror
-        raise ServeError(f"The server cannot listen on {settings.host}:{settings.port} ({what}).") from None
-    return opened
+        free = f"{option('port', '0')} for any free one"
+        said = {
+            errno.EADDRINUSE: f"the port is taken by another program; choose one by {option('port', 'N')}, or {free}",
+            errno.EACCES: "it needs more rights",
+        }.get(error.errno or 0, f"{error.strerror or error}; check {option('host')}")
+        raise ServeError(f"The server cannot listen on port {port} of {host}: {said}.") from None
 
 
 def url_of(settings: ServeSettings, opened: socket.socket) -> str:

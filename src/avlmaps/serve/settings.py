@@ -5,9 +5,8 @@ from pathlib import Path
 
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.machine import is_loopback
-from avlmaps.core.question import HeardAt
 from avlmaps.core.wording import option
-from avlmaps.query.settings import FOUND_AT
+from avlmaps.query.settings import QuerySettings
 
 DEFAULT_PORT = 8750
 MB = 1 << 20
@@ -52,8 +51,7 @@ class ServeSettings:
         allowed_hosts: more names in the Host header that are answered, such as that of a reverse proxy.
         tls_certificate: PEM file of the certificate and its chain; None for plain HTTP.
         tls_key: PEM file of its key.
-        found_at: a query is found from this probability of its first goal on.
-        at: the place of a sound, where a request does not say; None: as its words say, else where it was heard.
+        query: settings of queries.
         limits: limits of each request.
     """
 
@@ -63,8 +61,7 @@ class ServeSettings:
     allowed_hosts: tuple[str, ...] = ()
     tls_certificate: Path | None = None
     tls_key: Path | None = None
-    found_at: float = FOUND_AT
-    at: HeardAt | None = None
+    query: QuerySettings = field(default_factory=QuerySettings)
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:

@@ -35,11 +35,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 # A query of each kind loads its model and compiles its loops.
-_WARM = (
-    ("pixels", Modality.OBJECT, "chair"),
-    ("views", Modality.AREA, "kitchen"),
-    ("sounds", Modality.SOUND, "water"),
-)
+_WARM = (("pixels", Modality.OBJECT, "chair"), ("views", Modality.AREA, "kitchen"), ("sounds", Modality.SOUND, "water"))
 _LONGEST_NAME = 100
 
 

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.camera import Pinhole
+from avlmaps.core.camera import Pinhole, intrinsics_of
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable_json, shortened
@@ -54,7 +54,7 @@ from avlmaps.query.words import unknown_note
 from avlmaps.serve import requests
 from avlmaps.serve.drawn import Pyramid, TilesAnswer, full_picture, map_picture, small_picture
 from avlmaps.serve.lanes import Cancellation, RequestError, without_folders
-from avlmaps.serve.requests import AskQuery, NoQuery, RehearseQuery, Uploads, ViewQuery, numbers_of
+from avlmaps.serve.requests import AskQuery, NoQuery, RehearseQuery, Uploads, ViewQuery
 from avlmaps.serve.settings import Limits
 from avlmaps.serve.shelf import ServedMap, Shelf
 
@@ -202,38 +202,21 @@ def list_edits(task: WorkInput, query: requests.NoQuery) -> EditsAnswer:
     return {**task.map.avlmap.edit.history(), "map": task.map.name}
 
 
-_NEEDED = {"rename": ("to",), "rename-room": ("name", "to"), "forbid": ("name",), "pin": ("name", "at")}
-
-
 def edit(task: WorkInput, query: requests.EditQuery) -> EditsAnswer:
     """Correct the map, and return all edits; later queries know it."""
-    editor, by = task.map.avlmap.as_edited_now().edit, query.by or ""
-    for name in _NEEDED.get(query.does, ()):
-        if getattr(query, name) is None:
-            raise RequestError(f"{query.does} needs the value {name!r}; /openapi.json describes it.")
-    name, to, at = query.name or "", query.to or "", query.at
-    match query.does:
-        case "rename":
-            made = editor.rename(query.name, to, at=at, by=by)
-        case "rename-room":
-            made = editor.rename_room(name, to, by=by)
-        case "merge":
-            made = editor.merge(*query.places, to=to, by=by)
-        case "split":
-            made = editor.split(query.name, at=at, plane=query.places, box=query.box, by=by)
-        case "forbid":
-            made = editor.forbid(name, box=query.box, room=query.room, by=by)
-        case "pin":
-            made = editor.pin(name, at or "", by=by)
-        case "undo":
-            made = editor.undo(query.edit or "", by=by)
+    editor = task.map.avlmap.as_edited_now().edit
+    name = (query.edit if query.does == "undo" else query.name) or ""
+    made = editor.make(
+        query.does, name=name, to=query.to or "", at=query.at, places=query.places, box=query.box, room=query.room,
+        by=query.by or "",
+    )  # fmt: skip
     return {**editor.history(), "map": task.map.name, "text": edit_text(made)}
 
 
 def sound_clip(task: WorkInput, query: requests.NoQuery) -> File:
     """Return the FLAC file of a sound."""
     sounds, number = task.map.avlmap.data.sounds, task.path["sound"]
-    if number >= len(sounds):
+    if not 0 <= number < len(sounds):
         raise RequestError(f"The map has {len(sounds)} sounds, counted from 0; there is no {number}.", 404)
     try:
         content = sounds.clips[number].read_bytes()
@@ -250,7 +233,7 @@ def ask_map(task: WorkInput, query: requests.AskQuery) -> Answer:
     return task.map.avlmap.ask(
         query.sentence or "",
         min(query.top, task.limits.goals),
-        None if query.intrinsics is None else numbers_of(query.intrinsics),
+        None if query.intrinsics is None else intrinsics_of(query.intrinsics),
         attachments,
         object=query.object,
         sound=query.sound,
@@ -274,7 +257,7 @@ def locate(task: WorkInput, query: requests.LocateQuery) -> LocateAnswer:
     if not isinstance(photo, Photo):
         raise RequestError("There is no photo; send one as the file 'photo' of a form, or as the body.")
     size = {"width": photo.rgb.shape[1], "height": photo.rgb.shape[0]}
-    camera = None if query.intrinsics is None else Pinhole(*numbers_of(query.intrinsics), **size)
+    camera = None if query.intrinsics is None else Pinhole(*intrinsics_of(query.intrinsics), **size)
     task.watch.step("locating")
     found = task.map.avlmap.locate(photo.rgb, camera, None if camera is not None else photo.focal_35mm)
     return locate_answer(found, task.map.avlmap.data.info.doubts)
@@ -474,7 +457,8 @@ def goal_near(task: WorkInput, query: requests.GoalNearQuery) -> Any:
 
 def encoded(answer: Any) -> bytes:
     """Return an answer as JSON bytes."""
-    return printable_json(msgspec.json.encode(shortened(answer)).decode()).encode()
+    # NumPy's numbers are floats that msgspec does not know
+    return printable_json(msgspec.json.encode(shortened(answer), enc_hook=float).decode()).encode()
 
 
 _BYTES = "application/octet-stream"
@@ -513,7 +497,7 @@ def drawn_contents(task: WorkInput, query: NoQuery) -> dict[str, Any]:
 def drawn_voxel(task: WorkInput, query: NoQuery) -> dict[str, Any]:
     """Return what one voxel is taken for."""
     page, number = task.map.page, task.path["voxel"]
-    if number >= len(page.layout):
+    if not 0 <= number < len(page.layout):
         raise RequestError(f"There is no voxel {number}; the page draws {len(page.layout):,}.", 404)
     return page.describe_voxel(number)
 

@@ -71,7 +71,7 @@ def read_clip(path: Path) -> Sound:
     try:
         sound = AudioTrack.open(path).read()
     except AudioError as fault:
-        raise QueryError(f"The clip {path} cannot be read as sound: {fault}") from fault
+        raise QueryError(f"The clip {fault}") from fault
     return require_audible(sound, str(path))
 
 

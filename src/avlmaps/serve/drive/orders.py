@@ -4,14 +4,14 @@ The only way to a movement is `Dispatcher.confirm` with a token that `Dispatcher
 questions never get there by themselves: nothing here reads an order out of anything but the request for a plan.
 """
 
-import hmac
 import json
 import logging
 import os
 import secrets
 import threading
-from collections import OrderedDict, deque
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from contextvars import copy_context
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
@@ -20,16 +20,17 @@ from pathlib import Path
 from time import monotonic
 from typing import Annotated, Any
 
+import msgspec
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, Struct
 
-from avlmaps.core.errors import AvlmapsError, NavigationError
+from avlmaps.core.errors import AvlmapsError, NavigationError, SeveralFitError, kind_named
 from avlmaps.core.files import state_file
 from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable, printable_json
 from avlmaps.language.commands import MOST_CHARACTERS
-from avlmaps.language.learned_translator import LearnedTranslator, UnclearError
+from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget, parse_program
 from avlmaps.language.translator import Translation
 from avlmaps.navigate.brake import Brake
@@ -37,11 +38,11 @@ from avlmaps.navigate.costmap import floor_of_walk
 from avlmaps.navigate.instruct import Outcome, given_by, instruct
 from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse
 from avlmaps.navigate.skills import RobotSettings
-from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.drive.robots import Machine
 from avlmaps.serve.guard import token_digest
 from avlmaps.serve.lanes import RequestError
 from avlmaps.serve.requests import Request
+from avlmaps.serve.shelf import ServedMap
 
 log = logging.getLogger("avlmaps.serve.drive")
 _REHEARSAL = Budget(seconds=20.0)
@@ -50,16 +51,6 @@ _LONGEST_STOP_S, _STOP_AGAIN_S = 15.0, 0.5
 _WATCH_S = 0.5
 _MOST_PLANS = 16
 _MOST_LINES, _LONGEST_LINE = 50, 500
-_KINDS = {"GoalNotFoundError": "goal-not-found", "NavigationError": "navigation", "ProgramError": "program",
-          "SeveralFitError": "unclear"}  # fmt: skip
-
-
-class DriveError(RequestError):
-    """An order that is not carried out; ``choices`` are answers that would do, for a command that is unclear."""
-
-    def __init__(self, message: str, status: int, kind: str, choices: tuple[str, ...] = ()) -> None:
-        super().__init__(message, status, kind)
-        self.choices = choices
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,40 +61,46 @@ class Who:
     by: str = "http"
 
 
-@dataclass(frozen=True, slots=True)
-class MapNow:
-    """The map as it is now: its name, a word for its content, and itself."""
+_REFUSALS = {
+    "stopped": (409, "The robot was stopped, or took another order, meanwhile; plan again."),
+    "token": (
+        403,
+        "This token confirms no plan: it was used, replaced by an order or a stop, or never given.",
+    ),
+    "expired": (410, "The plan is older than {:g} s; plan again, and confirm sooner."),
+    "usage": (400, "An order is a command (words) or a program, and not both."),
+    "map-changed": (409, "The map was replaced since the plan was made; plan again."),
+    "robot-changed": (409, "The plan was made for another robot; plan again."),
+    "unstopped": (503, "The robot did not confirm its last stop ({}); stop it until it does."),
+    "ending": (503, "The server is ending; it takes no orders."),
+    "busy": (409, "The robot is at another order ({}); wait for its end, or stop it."),
+    "moved": (409, "The robot stands {:.2f} m from where the plan begins, turned by {:.0f} degrees; plan again."),
+    "navigation": (503, "The robot cannot be driven: {}."),
+}
 
-    name: str
-    version: str
-    avlmap: AVLMap = field(repr=False)
+
+def _refused(kind: str, *said: object) -> RequestError:
+    status, sentence = _REFUSALS[kind]
+    return RequestError(sentence.format(*said), status, kind)
 
 
-@dataclass(frozen=True, slots=True)
-class OrderPlan:
-    """What an order would do: ``path`` in metres, recording frame; ``version`` of the map, ``robot`` its identity."""
+class OrderPlan(Struct, frozen=True, kw_only=True):
+    """What an order would do, as clients and the log have it; a token is no part of it."""
 
     order: str
     words: str
     reading: str
     program: str
-    notes: tuple[str, ...]
-    path: tuple[tuple[float, float, float], ...]
+    notes: list[str]
+    path: list[list[float]]  # metres, recording frame
     path_m: float
-    subgoals: tuple[dict[str, Any], ...]
-    start: GroundPose
+    subgoals: list[dict[str, Any]]
+    start: GroundPose  # level frame
     map: str
-    version: str
-    robot: str
+    version: str  # of the map
+    robot: str  # its identity
     choose: tuple[int, ...] = ()
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the plan as clients and the log have it; a token is no part of it."""
-        told = {name: getattr(self, name) for name in _TOLD}
-        return {**told, "path": [list(place) for place in self.path], "path_m": round(self.path_m, 3), "frame": FRAME}
-
-
-_TOLD = ("order", "words", "reading", "program", "notes", "path", "path_m", "subgoals", "map", "version", "robot")
+    frame: str = FRAME
 
 
 class PlanBook:
@@ -112,7 +109,7 @@ class PlanBook:
     def __init__(self, lifetime_s: float) -> None:
         self.lifetime_s = lifetime_s  # of a token
         self.cleared = 0  # how often every plan was forgotten; one that was begun before the last time is not added
-        self._waiting: OrderedDict[bytes, tuple[OrderPlan, float]] = OrderedDict()
+        self._waiting: dict[bytes, tuple[OrderPlan, float]] = {}
 
     def __len__(self) -> int:
         return len(self._waiting)
@@ -121,41 +118,27 @@ class PlanBook:
         """Keep a plan that was requested when ``cleared`` was ``begun``, and return its token; the oldest goes.
 
         Raises:
-            DriveError: the robot was stopped, or took another order, while the plan was computed.
+            RequestError: the robot was stopped, or took another order, while the plan was computed.
         """
         if begun not in (None, self.cleared):
-            raise DriveError(
-                "The robot was stopped, or took another order, while this plan was computed; plan again.",
-                409, "stopped",
-            )  # fmt: skip
+            raise _refused("stopped")
         token = secrets.token_urlsafe(32)
         self._waiting[token_digest(token)] = plan, now_s + self.lifetime_s
-        while len(self._waiting) > _MOST_PLANS:
-            self._waiting.popitem(last=False)
+        if len(self._waiting) > _MOST_PLANS:
+            del self._waiting[next(iter(self._waiting))]
         return token
 
     def take(self, token: str, now_s: float) -> OrderPlan:
-        """Return the plan of a token and forget both.
+        """Return the plan of a token and forget both; the digest is looked up, so that the time shows nothing.
 
         Raises:
-            DriveError: there is no such token, or it is too old.
+            RequestError: there is no such token, or it is too old.
         """
-        given = token_digest(token)
-        found = None
-        for digest in list(self._waiting):  # all of them, so that the time shows nothing
-            if hmac.compare_digest(digest, given):
-                found = digest
-        if found is None:
-            raise DriveError(
-                "This token confirms no plan: it was used, replaced by an order or a stop, or never given; plan again.",
-                403,
-                "token",
-            )
-        plan, until_s = self._waiting.pop(found)
+        plan, until_s = self._waiting.pop(token_digest(token), (None, 0.0))
+        if plan is None:
+            raise _refused("token")
         if now_s > until_s:
-            raise DriveError(
-                f"The plan is older than {self.lifetime_s:g} s; plan again, and confirm sooner.", 410, "expired"
-            )
+            raise _refused("expired", self.lifetime_s)
         return plan
 
     def clear(self) -> None:
@@ -244,7 +227,7 @@ class RunningOrder:
     """A confirmed plan that runs."""
 
     plan: OrderPlan
-    now: MapNow
+    now: ServedMap
     brake: Brake = field(default_factory=Brake)
     lines: deque[str] = field(default_factory=lambda: deque(maxlen=_MOST_LINES))
     thread: threading.Thread | None = None
@@ -258,7 +241,7 @@ class Dispatcher:
     def __init__(
         self,
         machine: Machine,
-        current: Callable[[], MapNow],
+        current: Callable[[], ServedMap],
         order_log: OrderLog,
         *,
         token_s: float = 60.0,
@@ -302,27 +285,30 @@ class Dispatcher:
         several things is meant.
 
         Raises:
-            DriveError: there is no plan, and so no token; the sentence says why.
+            RequestError: there is no plan, and so no token; the sentence says why.
         """
         begun = self.begun if begun is None else begun
-        try:
+        with self._refusing(who, words=words, program=program):
             with self._preparing:
                 self._require_idle()
                 plan = self._planned(words, program, choose)
             with self._lock:
                 token = self._book.add(plan, self._clock(), begun)
-        except AvlmapsError as error:
-            refused = _refusal(error)
-            entry = {"who": asdict(who), "words": words, "program": program}
-            self._note("refused", {**entry, "kind": refused.kind, "outcome": str(refused)})
-            raise refused from None
-        try:
-            self._log.write("planned", {"who": asdict(who), **plan.to_json()})
-        except NavigationError as error:
-            raise _refusal(error) from None
+            told = msgspec.to_builtins(plan)
+            self._log.write("planned", {"who": asdict(who), **told})
         self._changed()
         # The token stands before the path, which may be long.
-        return {"order": plan.order, "token": token, "expires_in_s": self._book.lifetime_s, **plan.to_json()}
+        return {"order": plan.order, "token": token, "expires_in_s": self._book.lifetime_s, **told}
+
+    @contextmanager
+    def _refusing(self, who: Who, **entry: str) -> Generator[None]:
+        """Log what is refused, and say it to the client."""
+        try:
+            yield
+        except AvlmapsError as error:
+            refused = _refusal(error)
+            self._note("refused", {"who": asdict(who), **entry, "kind": refused.kind, "outcome": str(refused)})
+            raise refused from None
 
     def _planned(self, words: str, program: str, choose: tuple[int, ...]) -> OrderPlan:
         now = self._current()
@@ -330,35 +316,35 @@ class Dispatcher:
         choose = choose[1:] if translation.chosen else choose
         obstacles = self._machine.prepare(now.avlmap, now.version)
         if fault := self._machine.fault():
-            raise NavigationError(f"The robot cannot be driven: {fault.rstrip('.')}.")
+            raise _refused("navigation", fault.rstrip("."))
         start = self._machine.pose()
         outcome = rehearse(
             words, translation, now.avlmap, obstacles, start, shape=self._machine.shape,
             settings=self._settings(choose), budget=_REHEARSAL,
         )  # fmt: skip
         if outcome.error is not None:
-            kind = _KINDS.get(outcome.error_type or "", "refused")
-            raise DriveError(f"There is no plan: {outcome.error}", 422, kind, outcome.choices)
+            kind = _kind(outcome.error_type or "RefusedError")
+            raise RequestError(f"There is no plan: {outcome.error}", 422, kind, outcome.choices)
         path = path_in_world(outcome, now.avlmap, self._floor_m(now))
         return OrderPlan(
             order=secrets.token_hex(8),
             words=words,
             reading=translation.plan or _reading(outcome),
             program=translation.program,
-            notes=(*translation.notes, *(note for note in outcome.notes if note not in translation.notes)),
-            path=tuple((round(float(x), 3), round(float(y), 3), round(float(z), 3)) for x, y, z in path),
-            path_m=outcome.path_m,
-            subgoals=tuple(move.to_json() for move in outcome.subgoals),
-            start=start,
+            notes=list(dict.fromkeys((*translation.notes, *outcome.notes))),
+            path=np.round(path, 3).tolist(),
+            path_m=round(outcome.path_m, 3),
+            subgoals=[move.to_json() for move in outcome.subgoals],
             map=now.name,
             version=now.version,
             robot=self._machine.identity,
+            start=start,
             choose=choose,
         )
 
-    def _read(self, words: str, program: str, now: MapNow, choose: tuple[int, ...]) -> Translation:
+    def _read(self, words: str, program: str, now: ServedMap, choose: tuple[int, ...]) -> Translation:
         if bool(words.strip()) == bool(program.strip()):
-            raise DriveError("An order is a command (words) or a program, and not both.", 400, "usage")
+            raise _refused("usage")
         if program.strip():
             parse_program(program)
             return Translation(program)
@@ -367,7 +353,7 @@ class Dispatcher:
     def _settings(self, choose: tuple[int, ...]) -> RobotSettings:
         return RobotSettings(guess=self._machine.guess, choose=choose)
 
-    def _floor_m(self, now: MapNow) -> float:
+    def _floor_m(self, now: ServedMap) -> float:
         if self._floor is None or self._floor[0] != now.version:
             self._floor = now.version, floor_of_walk(now.avlmap)
         return self._floor[1]
@@ -378,27 +364,22 @@ class Dispatcher:
         """Start the plan of a token.
 
         Raises:
-            DriveError: nothing is started; the sentence says why.
+            RequestError: nothing is started; the sentence says why.
         """
-        try:
-            with self._preparing:
-                order = self._begun(token)
-                try:
-                    self._require_ready(order)
-                    self._log.write("confirmed", {"who": asdict(who), **order.plan.to_json()})
-                    if order.brake.pulled:
-                        raise DriveError("The robot was stopped before the order began; plan again.", 409, "stopped")
-                    run = copy_context().run  # what the order says is read over HTTP
-                    order.thread = threading.Thread(target=run, args=(self._run, order, who), name="avlmaps-order")
-                    order.thread.start()
-                except BaseException:
-                    with self._lock:
-                        self._running = None
-                    raise
-        except AvlmapsError as error:
-            refused = _refusal(error)
-            self._note("refused", {"who": asdict(who), "kind": refused.kind, "outcome": str(refused)})
-            raise refused from None
+        with self._refusing(who), self._preparing:
+            order = self._begun(token)
+            try:
+                self._require_ready(order)
+                self._log.write("confirmed", {"who": asdict(who), **msgspec.to_builtins(order.plan)})
+                if order.brake.pulled:
+                    raise _refused("stopped")
+                run = copy_context().run  # what the order says is read over HTTP
+                order.thread = threading.Thread(target=run, args=(self._run, order, who), name="avlmaps-order")
+                order.thread.start()
+            except BaseException:
+                with self._lock:
+                    self._running = None
+                raise
         self._changed()
         return {"order": order.plan.order, "state": "driving", "reading": order.plan.reading}
 
@@ -408,13 +389,11 @@ class Dispatcher:
         with self._lock:
             plan = self._book.take(token, self._clock())
             if plan.version != now.version or plan.map != now.name:
-                raise DriveError("The map was replaced since the plan was made; plan again.", 409, "map-changed")
+                raise _refused("map-changed")
             if plan.robot != self._machine.identity:
-                raise DriveError("The plan was made for another robot; plan again.", 409, "robot-changed")
+                raise _refused("robot-changed")
             if self._fault:
-                raise DriveError(
-                    f"The robot did not confirm its last stop ({self._fault}); stop it until it does.", 503, "unstopped"
-                )
+                raise _refused("unstopped", self._fault)
             self._book.clear()  # other plans begin where the robot stands now
             self._running = RunningOrder(plan, now)
             return self._running
@@ -422,27 +401,18 @@ class Dispatcher:
     def _require_idle(self) -> None:
         with self._lock:
             if self._closed:
-                raise DriveError("The server is ending; it takes no orders.", 503, "ending")
+                raise _refused("ending")
             if self._running is not None:
-                raise DriveError(
-                    f"The robot is at another order ({self._running.plan.order}); wait for its end, or stop it.",
-                    409,
-                    "busy",
-                )
+                raise _refused("busy", self._running.plan.order)
 
     def _require_ready(self, order: RunningOrder) -> None:
-        self._machine.prepare(order.now.avlmap, order.now.version)
+        self._machine.prepare(order.now.avlmap, order.plan.version)
         if fault := self._machine.fault():
-            raise DriveError(f"The robot cannot be driven: {fault.rstrip('.')}.", 503, "navigation")
+            raise _refused("navigation", fault.rstrip("."))
         here, start = self._machine.pose(), order.plan.start
         turned_rad = abs(wrap_angle(here.heading_rad - start.heading_rad))
         if here.distance_m(start) > _MOVED_M or turned_rad > _MOVED_RAD:
-            raise DriveError(
-                f"The robot stands {here.distance_m(start):.2f} m from where the plan begins, turned by "
-                f"{degrees(turned_rad):.0f} degrees; plan again.",
-                409,
-                "moved",
-            )
+            raise _refused("moved", here.distance_m(start), degrees(turned_rad))
 
     def _run(self, order: RunningOrder, who: Who) -> None:
         outcome: Outcome | None = None
@@ -453,7 +423,7 @@ class Dispatcher:
             outcome = instruct(
                 order.plan.words, order.now.avlmap, self._machine.driver(order.brake), LearnedTranslator(),
                 settings=self._settings(order.plan.choose), readable=NO_FILES,
-                translation=Translation(order.plan.program, order.plan.notes, order.plan.reading),
+                translation=Translation(order.plan.program, tuple(order.plan.notes), order.plan.reading),
                 tell=lambda line: self._tell(order, line), pause=order.brake.pause,
             )  # fmt: skip
         except Exception:
@@ -482,7 +452,7 @@ class Dispatcher:
         while not order.over.wait(_WATCH_S):
             try:
                 now = self._current()
-                added = {} if now.version == order.now.version else _forbidden(now)
+                added = {} if now.version == order.plan.version else _forbidden(now)
             except Exception:  # a map that is being written, or that was taken away, forbids nothing new
                 log.debug("the map of order %s cannot be read", order.plan.order, exc_info=True)
                 continue
@@ -555,6 +525,16 @@ class Dispatcher:
     # Status.
 
     @property
+    def robot(self) -> str:
+        """The robot's name."""
+        return self._machine.name
+
+    @property
+    def log_file(self) -> Path:
+        """The log of orders."""
+        return self._log.path
+
+    @property
     def fault(self) -> str:
         """Why the robot may still drive although it was stopped last; "" where it stood."""
         return self._fault
@@ -604,18 +584,20 @@ class Dispatcher:
         }
 
 
-def _forbidden(now: MapNow) -> dict[str, str]:
+def _forbidden(now: ServedMap) -> dict[str, str]:
     """Return the areas of a map that no robot enters: their names by the ids of their edits."""
     return {edit.id: edit.name for edit in now.avlmap.edited.edits if edit.does == "forbid"}
 
 
-def _refusal(error: AvlmapsError) -> DriveError:
-    if isinstance(error, DriveError):
+def _refusal(error: AvlmapsError) -> RequestError:
+    if isinstance(error, RequestError):
         return error
-    if isinstance(error, UnclearError):
-        return DriveError(str(error), 422, "unclear", error.choices)
-    kind = _KINDS.get(type(error).__name__, type(error).__name__.removesuffix("Error").lower())
-    return DriveError(str(error), 503 if isinstance(error, NavigationError) else 422, kind)
+    status = 503 if isinstance(error, NavigationError) else 422
+    return RequestError(str(error), status, _kind(type(error).__name__), getattr(error, "choices", ()))
+
+
+def _kind(error_type: str) -> str:
+    return "unclear" if error_type == SeveralFitError.__name__ else kind_named(error_type)
 
 
 def _reading(outcome: Outcome) -> str:
