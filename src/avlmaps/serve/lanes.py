@@ -3,10 +3,9 @@
 import asyncio
 import re
 import threading
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from contextvars import copy_context
+from contextvars import ContextVar, copy_context
 from pathlib import Path
 from typing import TypeVar
 
@@ -56,23 +55,12 @@ class Cancellation:
             self._report(stage, done, total)
 
 
-_here = threading.local()
+_here: ContextVar[Cancellation | None] = ContextVar("watch", default=None)
 
 
 def watch_here() -> Cancellation:
-    """Return the watch of the work that runs in this thread; outside of any, one that nobody looks at."""
-    return getattr(_here, "watch", None) or Cancellation()
-
-
-@contextmanager
-def watching(watch: Cancellation) -> Iterator[None]:
-    """Make a watch that of this thread's work."""
-    before = getattr(_here, "watch", None)
-    _here.watch = watch
-    try:
-        yield
-    finally:
-        _here.watch = before
+    """Return the watch of the work that runs in this context; outside of any, one that nobody looks at."""
+    return _here.get() or Cancellation()
 
 
 class Lane:
@@ -109,9 +97,9 @@ class Lane:
         watch = Cancellation(report)
 
         def watched() -> T:
-            with watching(watch):
-                watch.step("started")
-                return work(watch)
+            _here.set(watch)
+            watch.step("started")
+            return work(watch)
 
         future = self._threads.submit(copy_context().run, watched)
         future.add_done_callback(self._freed)

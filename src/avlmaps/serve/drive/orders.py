@@ -18,7 +18,7 @@ from datetime import UTC, datetime
 from math import degrees
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 import numpy as np
@@ -43,6 +43,9 @@ from avlmaps.serve.guard import token_digest
 from avlmaps.serve.lanes import RequestError
 from avlmaps.serve.requests import Request
 from avlmaps.serve.shelf import ServedMap
+
+if TYPE_CHECKING:
+    from avlmaps.maps.obstacles import Obstacles
 
 log = logging.getLogger("avlmaps.serve.drive")
 _REHEARSAL = Budget(seconds=20.0)
@@ -75,7 +78,6 @@ _REFUSALS = {
     "ending": (503, "The server is ending; it takes no orders."),
     "busy": (409, "The robot is at another order ({}); wait for its end, or stop it."),
     "moved": (409, "The robot stands {:.2f} m from where the plan begins, turned by {:.0f} degrees; plan again."),
-    "navigation": (503, "The robot cannot be driven: {}."),
 }
 
 
@@ -255,7 +257,6 @@ class Dispatcher:
         self._last: dict[str, Any] | None = None
         self._fault = ""
         self._change = 0
-        self._floor: tuple[str, float] | None = None
         self._closed = False
 
     # Planning.
@@ -266,10 +267,13 @@ class Dispatcher:
         Raises:
             NavigationError: it cannot be reached, or cannot stand on the map.
         """
-        now = self._current()
-        self._machine.prepare(now.avlmap, now.version)
+        self._ready(self._current())
+
+    def _ready(self, now: ServedMap) -> "Obstacles":
+        obstacles = self._machine.prepare(now.avlmap, now.version)
         if fault := self._machine.fault():
-            raise NavigationError(f"The {self._machine.name} cannot be driven: {fault}.")
+            raise NavigationError(f"The {self._machine.name} cannot be driven: {fault.rstrip('.')}.")
+        return obstacles
 
     @property
     def begun(self) -> int:
@@ -314,10 +318,7 @@ class Dispatcher:
         now = self._current()
         translation = self._read(words, program, now, choose)
         choose = choose[1:] if translation.chosen else choose
-        obstacles = self._machine.prepare(now.avlmap, now.version)
-        if fault := self._machine.fault():
-            raise _refused("navigation", fault.rstrip("."))
-        start = self._machine.pose()
+        obstacles, start = self._ready(now), self._machine.pose()
         outcome = rehearse(
             words, translation, now.avlmap, obstacles, start, shape=self._machine.shape,
             settings=self._settings(choose), budget=_REHEARSAL,
@@ -325,7 +326,7 @@ class Dispatcher:
         if outcome.error is not None:
             kind = _kind(outcome.error_type or "RefusedError")
             raise RequestError(f"There is no plan: {outcome.error}", 422, kind, outcome.choices)
-        path = path_in_world(outcome, now.avlmap, self._floor_m(now))
+        path = path_in_world(outcome, now.avlmap, _floor_m(now))
         return OrderPlan(
             order=secrets.token_hex(8),
             words=words,
@@ -352,11 +353,6 @@ class Dispatcher:
 
     def _settings(self, choose: tuple[int, ...]) -> RobotSettings:
         return RobotSettings(guess=self._machine.guess, choose=choose)
-
-    def _floor_m(self, now: ServedMap) -> float:
-        if self._floor is None or self._floor[0] != now.version:
-            self._floor = now.version, floor_of_walk(now.avlmap)
-        return self._floor[1]
 
     # Driving.
 
@@ -406,9 +402,7 @@ class Dispatcher:
                 raise _refused("busy", self._running.plan.order)
 
     def _require_ready(self, order: RunningOrder) -> None:
-        self._machine.prepare(order.now.avlmap, order.plan.version)
-        if fault := self._machine.fault():
-            raise _refused("navigation", fault.rstrip("."))
+        self._ready(order.now)
         here, start = self._machine.pose(), order.plan.start
         turned_rad = abs(wrap_angle(here.heading_rad - start.heading_rad))
         if here.distance_m(start) > _MOVED_M or turned_rad > _MOVED_RAD:
@@ -575,13 +569,17 @@ class Dispatcher:
     def _pose(self) -> dict[str, Any] | None:
         try:
             pose, now = self._machine.pose(), self._current()
-            place = now.avlmap.space.world(np.array([pose.x_m, pose.y_m, self._floor_m(now)]))
+            place = now.avlmap.space.world(np.array([pose.x_m, pose.y_m, _floor_m(now)]))
         except AvlmapsError:
             return None
         return {
             "position": [round(float(value), 3) for value in place],
             "heading_deg": round(degrees(pose.heading_rad), 1),
         }
+
+
+def _floor_m(now: ServedMap) -> float:
+    return now.once("floor", lambda: floor_of_walk(now.avlmap))
 
 
 def _forbidden(now: ServedMap) -> dict[str, str]:
