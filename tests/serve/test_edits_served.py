@@ -62,7 +62,7 @@ def test_an_edit_from_beside_the_server_is_seen_at_the_next_request(
     [
         ({"does": "rename", "name": "red"}, 400, "rename needs to"),
         ({"does": "explode"}, 400, "does not fit"),
-        ({"does": "pin", "name": "x", "at": "here"}, 422, "A place is x,y"),
+        ({"does": "pin", "name": "x", "at": "here"}, 400, "A place is x,y"),
         ({"does": "merge"}, 422, "fewer than two"),
         ({"does": "undo", "edit": "12345678"}, 422, "no edit '12345678'"),
         ({"does": "forbid", "name": "x", "box": [0.0, 0.0, 1.0]}, 422, "A box is x0,y0,x1,y1"),

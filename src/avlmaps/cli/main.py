@@ -76,8 +76,8 @@ def _main(words: list[str]) -> None:
         if _wants_json(words):
             _emit_error(output.kind_of(error), str(error))
         _complain(error, 1)
-        if isinstance(error, output.UsageError):
-            sys.stderr.write(f"For all of it: {' '.join(['avlmaps', *error.verb, '--help'])}\n")
+        if isinstance(error, output.UsageError) and error.help:
+            sys.stderr.write(f"For all of it: {error.help}\n")
         sys.exit(2 if isinstance(error, output.UsageError) else 1)
     sys.exit(_run(verb))
 
@@ -90,7 +90,6 @@ def _wants_json(words: Sequence[str]) -> bool:
 def _run(verb: "Verb") -> int:
     try:
         with _models_in_force(verb), _compiling(verb):
-            verb.require_bounds()
             verb.run()
     except output.AnsweredError as error:
         return _complain(error, error.status)

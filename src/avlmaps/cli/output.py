@@ -13,11 +13,11 @@ from avlmaps.core.wording import place_text
 
 
 class UsageError(Exception):
-    """The words of a command do not fit together; exit status 2. ``verb`` is the verb whose help says what fits."""
+    """The words of a command do not fit together; exit status 2. ``help`` is a command that says what fits."""
 
-    def __init__(self, message: str, *verb: str) -> None:
+    def __init__(self, message: str, help: str = "") -> None:
         super().__init__(message)
-        self.verb = verb
+        self.help = help
 
 
 class AddressSpaceError(MemoryError):

@@ -91,7 +91,7 @@ def read_command(words: Sequence[str]) -> Verb:
         if name not in verbs:
             if set(words) & {"--help", "-h"}:
                 tyro.cli(_any_verb(verbs), prog="avlmaps", description=_DESCRIPTION, args=words, config=CONFIG)
-            raise UsageError(meant(words, "", verbs))
+            raise UsageError(meant(words, "", verbs), "avlmaps --help")
     return read_verb(_own(name) if name in _OWN else installed()[0][name], words[1:], f"avlmaps {name}")
 
 
@@ -233,6 +233,6 @@ def read_verb(verb: type[V], words: Sequence[str], prog: str) -> V:
             sys.stderr.write(printed.getvalue())
             raise
         name = prog.split()[-1]
-        raise UsageError(meant([name, *words], printed.getvalue(), {name: verb}), name) from None
+        raise UsageError(meant([name, *words], printed.getvalue(), {name: verb}), f"{prog} --help") from None
     read.require_bounds()
     return read
