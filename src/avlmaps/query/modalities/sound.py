@@ -71,7 +71,9 @@ def read_clip(path: Path) -> Sound:
     try:
         sound = AudioTrack.open(path).read()
     except AudioError as fault:
-        raise QueryError(f"The clip {fault}") from fault
+        said = str(fault)
+        unread = f"{path} cannot be read as sound: {said}"
+        raise QueryError(f"The clip {said if said.startswith(str(path)) else unread}") from fault
     return require_audible(sound, str(path))
 
 
