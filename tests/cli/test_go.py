@@ -144,8 +144,12 @@ def test_what_cannot_be_obeyed_is_told_with_status_1_and_json_all_the_same(run, 
         (("MAP", "go to the chair", "--scene", "house:7", "--start", "nan,1,2"), 2, "--start takes x,y,heading"),
         (("MAP", "go to the chair", "--robot", "nav2", "--start", "1,2,3"), 2, "belong to a simulated robot"),
         (("MAP", "go to the chair", "--scene", "missing.glb"), 1, "there is no scene"),
-        (("MAP", "go to the chair", "--scene", "house:7", "--found-at", "2"), 1, "at a probability of 2"),
-        (("MAP", "go to the chair", "--dry-run", "--found-at", "2"), 1, "at a probability of 2"),
+        (
+            ("MAP", "go to the chair", "--scene", "house:7", "--found-at", "2"),
+            2,
+            "--found-at takes a number from 0 to 1",
+        ),
+        (("MAP", "go to the chair", "--dry-run", "--found-at", "2"), 2, "--found-at takes a number from 0 to 1"),
     ],
 )
 def test_each_mistake_is_one_sentence(run, built: Path, words: tuple[str, ...], status: int, sentence: str) -> None:

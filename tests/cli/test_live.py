@@ -69,8 +69,8 @@ def test_what_into_needs_is_said(run, walk: Path, tmp_path: Path, words: tuple[s
     ("words", "said"),
     [
         (("--rate", "2", "--as-fast-as-possible"), "do not go together"),
-        (("--rate", "inf"), "--rate is inf"),
-        (("--give-up-s", "-5"), "--give-up-s is -5"),
+        (("--rate", "inf"), "--rate takes a number over 0 to 1e+06"),
+        (("--give-up-s", "-5"), "--give-up-s takes a number over 0"),
     ],
 )
 def test_options_that_contradict_are_refused(

@@ -76,8 +76,8 @@ WRONG = (
     (("--model", "pixels=nope"), 1, "There is no pixels backend called 'nope'"),
     (("--model", "pixels=colours", "--model", "pixels=embedded"), 2, "--model names pixels twice"),
     (("--model", "pixels=colours@large"), 1, "has no models to choose from; leave @large out"),
-    (("--feature-cache-gb", "0"), 1, "The feature cache's limit is 0.0 GB"),
-    (("--batch", "-1"), 1, "batch is -1"),
+    (("--feature-cache-gb", "0"), 2, "--feature-cache-gb takes a number over 0"),
+    (("--batch", "-1"), 2, "--batch takes a number from 1 on"),
     (("--profile", "best"), 1, "There is no profile called 'best'"),
 )
 
@@ -155,4 +155,4 @@ def test_fetching_without_a_place_says_how_to_make_the_files(empty: Path, run) -
     assert (status, out, err.count("\n")) == (1, "", 1)
     assert "No files of the profile light are published yet; make them with python -m training.light" in err
     status, _, err = run("profiles", "--from", "somewhere")
-    assert status == 1 and "add --fetch light" in err
+    assert status == 2 and "add --fetch light" in err

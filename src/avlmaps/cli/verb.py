@@ -65,9 +65,9 @@ def _require_within(option: str, value: float, bounds: Meta) -> None:
     low, over, high = bounds.ge, bounds.gt, bounds.le
     if (low is None or value >= low) and (over is None or value > over) and (high is None or value <= high):
         return
-    least = f"over {over:g}" if low is None else f"from {low:g}"
-    most = " on" if high is None else f" to {high:g}"
-    raise UsageError(f"{option} takes a number {least}{most if low is not None else ''}, not {value:g}.")
+    least = f"over {over:g}" if low is None else f"from {low:g} on" if high is None else f"from {low:g}"
+    most = "" if high is None else f" to {high:g}"
+    raise UsageError(f"{option} takes a number {least}{most}, not {value:g}.")
 
 
 def idle(options: "DataclassInstance", names: Sequence[str], why: str) -> list[str]:
