@@ -1,16 +1,21 @@
 """How well photos are located, and at what cost: keypoints and places beside each other, in one run.
 
 python benchmarks/locate.py RECORDING [--elsewhere FOLDER] [--photos 60] [--pairs 25] [--json]
+python benchmarks/locate.py --homes house:1000000:held-out ... --methods xfeat rootsift
 
 Every other frame of the recording makes the map, frames in between are the photos, and their own poses are the truth:
 right is within 25 cm and 10 degrees. Photos are taken as they are, darkened, noisy, blurred and through another focal
 length. Pairs are single keyframes as a map and photos turned from them by an angle. In the last rows nothing is there
 to be found: other places, and a map that holds the place twice, 100 m apart, where the answer must say so.
+
+Homes are recorded twice: on the day of the map, and on another day and another walk, with things moved. The photos are
+of the second walk, by day and by the light of the lamps alone; photos of the next home are of elsewhere.
 """
 
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,18 +31,44 @@ from avlmaps.core.columns import concat  # noqa: E402
 from avlmaps.core.poses import inverse, rotation_angle_rad  # noqa: E402
 from avlmaps.maps.types import Keyframes  # noqa: E402
 from avlmaps.perception.encoders import Encoders  # noqa: E402
+from avlmaps.perception.protocols import LocalFeatures, ModelCard  # noqa: E402
 from avlmaps.query.locate import LocatableMap, LocateSettings, locate  # noqa: E402
 from avlmaps.recordings.open import open_recording  # noqa: E402
 from avlmaps.recordings.types import Recording, Subset  # noqa: E402
 from avlmaps_sim.bench.harness.figures import in_percent, wilson  # noqa: E402
 from avlmaps_sim.bench.locate import map_of  # noqa: E402
+from avlmaps_sim.recorder import RecordSettings, record_scene  # noqa: E402
+from avlmaps_sim.scenes import on_day, open_scene  # noqa: E402
 
 NEAR_M, NEAR_RAD = 0.25, np.deg2rad(10.0)
 TURNED_DEG = ((10, 25), (25, 45), (45, 70))
 SEED = 0
-# Learned and handmade keypoints and places, by the names of the registry.
-METHODS: dict[str, dict[str, str]] = {"xfeat": {"local": "xfeat", "place": "xfeat", "matcher": "xfeat"}}
 Picture = np.ndarray
+_CARD = ModelCard("pooled", 64, "MIT", "0" * 64)
+
+
+@dataclass(frozen=True, slots=True)
+class Pooled:
+    """The mean of a picture's descriptors as the descriptor of its place, to compare VLAD with."""
+
+    card: ModelCard = field(default=_CARD)
+
+    def fit(self, local: Sequence[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:
+        """Learn nothing."""
+        return {}
+
+    def encode(self, rgb: Picture, local: LocalFeatures, state: dict[str, np.ndarray]) -> np.ndarray:
+        """Return a unit vector; zero where there are no keypoints."""
+        total = local.descriptors.sum(axis=0, dtype=np.float32)
+        return total / max(float(np.linalg.norm(total)), 1e-9)
+
+
+# Keypoints, places and matchers that are compared, by the names of the registry.
+METHODS: dict[str, dict[str, object]] = {
+    "xfeat": {"local": "xfeat", "place": "xfeat", "matcher": "xfeat"},
+    "xfeat, pooled places": {"local": "xfeat", "place": Pooled(), "matcher": "xfeat"},
+    "rootsift": {"local": "rootsift", "place": "vlad", "matcher": "mutual-ratio"},
+}
 
 
 def _gamma(rgb: Picture, gain: float, noise: float, rng: np.random.Generator) -> Picture:
@@ -79,31 +110,41 @@ def photos_of(recording: Recording, rows: Sequence[int]) -> list[Truth]:
     return [Truth(frame.rgb, frame.world_from_camera @ colour_from_depth) for frame in frames]
 
 
-def located(stored: LocatableMap, truth: Truth, camera: Pinhole | None = None) -> tuple[str, float]:
-    """Return ``right``, ``wrong``, ``none`` or ``twice`` for a photo, and the seconds that it took."""
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """``right``, ``wrong``, ``none`` or ``twice`` for a photo, how far off, and the seconds that it took."""
+
+    said: str
+    off_m: float
+    took_s: float
+
+
+def located(stored: LocatableMap, truth: Truth, camera: Pinhole | None = None) -> Answer:
+    """Locate a photo."""
     begin_s = time.thread_time()
-    settings = LocateSettings()
-    found = locate(stored, truth.rgb, camera, np.random.default_rng(SEED), settings)
+    found = locate(stored, truth.rgb, camera, np.random.default_rng(SEED), LocateSettings())
     took_s = time.thread_time() - begin_s
     if found.elsewhere is not None:
-        return "twice", took_s
+        return Answer("twice", np.inf, took_s)
     if found.world_from_camera is None:
-        return "none", took_s
+        return Answer("none", np.inf, took_s)
     if truth.world_from_camera is None:
-        return "wrong", took_s
-    off_m = np.linalg.norm((found.world_from_camera - truth.world_from_camera)[:3, 3])
+        return Answer("wrong", np.inf, took_s)
+    off_m = float(np.linalg.norm((found.world_from_camera - truth.world_from_camera)[:3, 3]))
     near = off_m <= NEAR_M and rotation_angle_rad(found.world_from_camera, truth.world_from_camera) <= NEAR_RAD
-    return ("right" if near else "wrong"), took_s
+    return Answer("right" if near else "wrong", off_m, took_s)
 
 
-def row_of(method: str, what: str, answers: Sequence[tuple[str, float]], wanted: str = "right") -> dict[str, object]:
+def row_of(method: str, what: str, answers: Sequence[Answer], wanted: str = "right") -> dict[str, object]:
     """Return one line of the table."""
-    said = [answer for answer, _ in answers]
+    said = [answer.said for answer in answers]
     hits = said.count(wanted)
+    off_m = [answer.off_m for answer in answers if answer.said == "right"]
     return {
         "keypoints": method, "photos": what, "of": len(said), "as they should": hits,
         "95 %": in_percent(wilson(hits, len(said))), "wrong": said.count("wrong"),
-        "s a photo": float(np.median([took_s for _, took_s in answers])) if answers else 0.0,
+        "median cm": 100.0 * float(np.median(off_m)) if off_m else "",
+        "s a photo": float(np.median([answer.took_s for answer in answers])) if answers else 0.0,
     }  # fmt: skip
 
 
@@ -137,14 +178,9 @@ def pairs_of(stored: LocatableMap, recording: Recording, between_deg: tuple[int,
 
 
 def measure(method: str, recording: Recording, elsewhere: Sequence[Picture], photos: int, pairs: int) -> list[Any]:
-    """Return the lines of one way to locate photos."""
+    """Return the lines of one way to locate photos in a recording."""
     rng = np.random.default_rng(SEED)
-    used = Encoders.named("embedded", **METHODS[method], pixels=None, sounds=None)
-    begin_s = time.thread_time()
-    stored = map_of(Subset(recording, np.arange(0, len(recording), 2)), used, rng)
-    keyframes: Keyframes = stored.keyframes
-    made_s = (time.thread_time() - begin_s) / len(keyframes)
-    held = sum(np.asarray(getattr(keyframes, name)).nbytes for name in ("place", "xy", "descriptors", "points_world"))
+    stored = mapped(method, Subset(recording, np.arange(0, len(recording), 2)))
     rows = np.arange(1, len(recording), 2)
     truths = photos_of(recording, rows[np.linspace(0, len(rows) - 1, min(photos, len(rows))).astype(int)].tolist())
     lines: list[dict[str, object]] = []
@@ -161,26 +197,82 @@ def measure(method: str, recording: Recording, elsewhere: Sequence[Picture], pho
     lines.append(row_of(method, "the place is there twice", [located(twice, truth) for truth in truths[::3]], "twice"))
     answers = [located(stored, Truth(rgb, None)) for rgb in elsewhere]
     answers += [located(stored, Truth(np.ascontiguousarray(one.rgb[:, ::-1]), None)) for one in truths]
-    lines.append(row_of(method, "elsewhere and mirrored", answers, "none"))
+    return [*lines, row_of(method, "elsewhere and mirrored", answers, "none")]
+
+
+def mapped(method: str, recording: Recording) -> LocatableMap:
+    """Return the keyframes of a map; print what each costs."""
+    used = Encoders.named("embedded", **METHODS[method], pixels=None, sounds=None)
+    begin_s = time.thread_time()
+    stored = map_of(recording, used, np.random.default_rng(SEED))
+    keyframes: Keyframes = stored.keyframes
+    made_s = (time.thread_time() - begin_s) / len(keyframes)
+    held = sum(np.asarray(getattr(keyframes, name)).nbytes for name in ("place", "xy", "descriptors", "points_world"))
     print(f"{method}: {len(keyframes)} keyframes, {made_s:.3f} s and {held / len(keyframes) / 1e3:.0f} kB each")
-    return lines
+    return stored
+
+
+def walked(spec: str, folder: Path, frames: int, *, lamps_alone: bool = False) -> Recording:
+    """Record a scene as a camera of 640x480 sees it, by day or by its lamps alone."""
+    scene = open_scene(spec)
+    if lamps_alone:  # the light of windows is bluish, that of lamps is not
+        scene = replace(scene, lights=tuple(one for one in scene.lights if one.colour[0] >= one.colour[2]))
+    record_scene(scene, folder, RecordSettings(size=(640, 480), hearing="none", sources=0, max_frames=frames))
+    return open_recording(folder)
+
+
+def measure_homes(method: str, homes: Sequence[tuple[Recording, Recording, Recording]], photos: int) -> list[Any]:
+    """Return the lines of one way to locate photos of homes; each home is its map, another day, and that by night."""
+    rng, answers = np.random.default_rng(SEED), dict[str, list[Answer]]()
+    days = [photos_of(day, np.linspace(0, len(day) - 1, photos).astype(int).tolist()) for _, day, _ in homes]
+    for number, (first, _, night) in enumerate(homes):
+        stored = mapped(method, first)
+        nightly = photos_of(night, np.linspace(0, len(night) - 1, photos).astype(int).tolist())
+        dim = [replace(one, rgb=CONDITIONS["dim and noisy"](one.rgb, rng)) for one in nightly]
+        others = [replace(one, world_from_camera=None) for one in days[(number + 1) % len(days)]]
+        twice = doubled(stored)
+        for name, of, truths in (
+            ("another day", stored, days[number]), ("another day, by lamps", stored, nightly),
+            ("another day, by lamps, dim and noisy", stored, dim), ("two identical homes", twice, days[number][::3]),
+            ("another home", stored, others),
+        ):  # fmt: skip
+            answers.setdefault(name, []).extend(located(of, truth) for truth in truths)
+    wanted = {"two identical homes": "twice", "another home": "none"}
+    return [row_of(method, name, some, wanted.get(name, "right")) for name, some in answers.items()]
 
 
 def main() -> None:
     """Measure each method, print."""
     arguments = timing.parser(__doc__ or "")
-    arguments.add_argument("recording", type=Path)
+    arguments.add_argument("recording", type=Path, nargs="?")
     arguments.add_argument("--elsewhere", type=Path, help="folder of photos of other places")
+    arguments.add_argument("--homes", nargs="*", default=[], help="two scenes or more by name, each on two days")
     arguments.add_argument("--photos", type=int, default=60)
     arguments.add_argument("--pairs", type=int, default=25)
-    arguments.add_argument("--methods", nargs="*", default=list(METHODS))
+    arguments.add_argument("--frames", type=int, default=160, help="of each walk through a home")
+    arguments.add_argument("--methods", nargs="*", default=list(METHODS), choices=list(METHODS))
     given = arguments.parse_args()
     cv2.setNumThreads(1)
-    recording = open_recording(given.recording)
-    paths = sorted(given.elsewhere.glob("*.jpg"))[: given.photos] if given.elsewhere else []
-    elsewhere = [np.ascontiguousarray(np.asarray(cv2.imread(str(path)))[..., ::-1]) for path in paths]
-    lines = [line for one in given.methods for line in measure(one, recording, elsewhere, given.photos, given.pairs)]
-    timing.show("Photos located", lines, {"recording": given.recording.name, "frames": len(recording)}, given.json)
+    lines: list[dict[str, object]] = []
+    if given.recording:
+        recording = open_recording(given.recording)
+        paths = sorted(given.elsewhere.glob("*.jpg"))[: given.photos] if given.elsewhere else []
+        elsewhere = [np.ascontiguousarray(np.asarray(cv2.imread(str(path)))[..., ::-1]) for path in paths]
+        for method in given.methods:
+            lines += measure(method, recording, elsewhere, given.photos, given.pairs)
+    if given.homes:
+        with tempfile.TemporaryDirectory() as folder:
+            homes = [
+                (
+                    walked(spec, Path(folder) / f"{number}-map", given.frames),
+                    walked(on_day(spec, 1), Path(folder) / f"{number}-day", given.frames),
+                    walked(on_day(spec, 1), Path(folder) / f"{number}-night", given.frames, lamps_alone=True),
+                )
+                for number, spec in enumerate(given.homes)
+            ]
+            for method in given.methods:
+                lines += measure_homes(method, homes, given.photos)
+    timing.show("Photos located", lines, {}, given.json)
 
 
 if __name__ == "__main__":

@@ -293,6 +293,15 @@ def shown(figure: Figure, found: Mapping[str, Any] | None) -> str:
     return NOT_YET
 
 
+def is_there(figure: Figure, found: Mapping[str, Any]) -> bool:
+    """Return whether a result is in what a command printed; of a table some row will do."""
+    if shown(figure, found) != NOT_YET:
+        return True
+    tables = found["answer"]["tables"] if figure.table else {}
+    wanted = {word.removeprefix("+") for word in re.findall(r"\{([^}]+)\}", figure.form)}
+    return any(name.startswith(figure.table) and wanted <= set(one["columns"]) for name, one in tables.items())
+
+
 def pooled(table: Mapping[str, Any]) -> list[Any]:
     """Add up the commands of the sealed rounds after the fourth: the rows of rounds below that of the fourth."""
     rows = [row for row in table["rows"] if str(row[0]).endswith(", commands")]
