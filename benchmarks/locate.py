@@ -1,7 +1,7 @@
 """How well photos are located, and at what cost: keypoints and places beside each other, in one run.
 
 python benchmarks/locate.py RECORDING [--elsewhere FOLDER] [--photos 60] [--pairs 25] [--json]
-python benchmarks/locate.py --homes house:1000000:held-out ... --methods xfeat rootsift
+python benchmarks/locate.py --homes house:1000000:held-out ... --methods xfeat
 
 Every other frame of the recording makes the map, frames in between are the photos, and their own poses are the truth:
 right is within 25 cm and 10 degrees. Photos are taken as they are, darkened, noisy, blurred and through another focal
@@ -67,7 +67,6 @@ class Pooled:
 METHODS: dict[str, dict[str, object]] = {
     "xfeat": {"local": "xfeat", "place": "xfeat", "matcher": "xfeat"},
     "xfeat, pooled places": {"local": "xfeat", "place": Pooled(), "matcher": "xfeat"},
-    "rootsift": {"local": "rootsift", "place": "vlad", "matcher": "mutual-ratio"},
 }
 
 
@@ -213,21 +212,21 @@ def mapped(method: str, recording: Recording) -> LocatableMap:
 
 
 def walked(spec: str, folder: Path, frames: int, *, lamps_alone: bool = False) -> Recording:
-    """Record a scene as a camera of 640x480 sees it, by day or by its lamps alone."""
+    """Record a scene by day, or by its lamps alone."""
     scene = open_scene(spec)
     if lamps_alone:  # the light of windows is bluish, that of lamps is not
         scene = replace(scene, lights=tuple(one for one in scene.lights if one.colour[0] >= one.colour[2]))
-    record_scene(scene, folder, RecordSettings(size=(640, 480), hearing="none", sources=0, max_frames=frames))
+    record_scene(scene, folder, RecordSettings(hearing="none", sources=0, max_frames=frames))
     return open_recording(folder)
 
 
-def measure_homes(method: str, homes: Sequence[tuple[Recording, Recording, Recording]], photos: int) -> list[Any]:
+def measure_homes(method: str, homes: Sequence[tuple[Recording, Recording, Recording]]) -> list[Any]:
     """Return the lines of one way to locate photos of homes; each home is its map, another day, and that by night."""
     rng, answers = np.random.default_rng(SEED), dict[str, list[Answer]]()
-    days = [photos_of(day, np.linspace(0, len(day) - 1, photos).astype(int).tolist()) for _, day, _ in homes]
+    days = [photos_of(day, range(len(day))) for _, day, _ in homes]
     for number, (first, _, night) in enumerate(homes):
         stored = mapped(method, first)
-        nightly = photos_of(night, np.linspace(0, len(night) - 1, photos).astype(int).tolist())
+        nightly = photos_of(night, range(len(night)))
         dim = [replace(one, rgb=CONDITIONS["dim and noisy"](one.rgb, rng)) for one in nightly]
         others = [replace(one, world_from_camera=None) for one in days[(number + 1) % len(days)]]
         twice = doubled(stored)
@@ -249,7 +248,7 @@ def main() -> None:
     arguments.add_argument("--homes", nargs="*", default=[], help="two scenes or more by name, each on two days")
     arguments.add_argument("--photos", type=int, default=60)
     arguments.add_argument("--pairs", type=int, default=25)
-    arguments.add_argument("--frames", type=int, default=160, help="of each walk through a home")
+    arguments.add_argument("--frames", type=int, default=160, help="of the walk that maps a home")
     arguments.add_argument("--methods", nargs="*", default=list(METHODS), choices=list(METHODS))
     given = arguments.parse_args()
     cv2.setNumThreads(1)
@@ -265,13 +264,13 @@ def main() -> None:
             homes = [
                 (
                     walked(spec, Path(folder) / f"{number}-map", given.frames),
-                    walked(on_day(spec, 1), Path(folder) / f"{number}-day", given.frames),
-                    walked(on_day(spec, 1), Path(folder) / f"{number}-night", given.frames, lamps_alone=True),
+                    walked(on_day(spec, 1), Path(folder) / f"{number}-day", given.photos),
+                    walked(on_day(spec, 1), Path(folder) / f"{number}-night", given.photos, lamps_alone=True),
                 )
                 for number, spec in enumerate(given.homes)
             ]
             for method in given.methods:
-                lines += measure_homes(method, homes, given.photos)
+                lines += measure_homes(method, homes)
     timing.show("Photos located", lines, {}, given.json)
 
 

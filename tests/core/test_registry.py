@@ -39,6 +39,11 @@ def test_an_unknown_name_lists_the_known_ones():
         registry.load(Kind.PLACE, "nope")
 
 
+def test_a_backend_of_an_older_map_says_what_to_do():
+    with pytest.raises(BackendError, match=r"'rootsift' is gone; .* build the map again"):
+        registry.load(Kind.LOCAL, "rootsift")
+
+
 def test_a_missing_package_names_the_extra_to_install():
     backend = Backend(Kind.VIEWS, "far", "far.away:Model", extra="foundation", needs=("no_such_package_here",))
     registry.register(backend)

@@ -18,7 +18,7 @@ UP_IN_WORLD = np.array([0.0, -0.892, -0.452])
 
 @pytest.fixture(scope="module")
 def kitchen(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> MapData:
-    register_profile(Encoders("seeing", pixels="colours", local="rootsift", place="vlad", matcher="mutual-ratio"))
+    register_profile(Encoders("seeing", pixels="colours", local="xfeat", place="xfeat", matcher="xfeat"))
     walk = Subset(open_recording(shared_data / "data" / "redkitchen"), range(0, 500, 50))
     path = tmp_path_factory.mktemp("maps") / "kitchen.avlmap"
     return build_map(walk, path, "seeing", BuildSettings(frames=FrameSettings(per_part=4)), progress=False)

@@ -13,6 +13,7 @@ from build_fakes import SETTINGS, Corners, Ears, Pixels, Places, Walk, register_
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as some
+from safetensors.numpy import load_file
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
@@ -116,7 +117,7 @@ def torch_like(monkeypatch: pytest.MonkeyPatch) -> Encoders:
 
 def array_files(path: Path) -> dict[str, bytes]:
     """Return all arrays of a map, by file."""
-    return {str(file.relative_to(path)): file.read_bytes() for file in path.rglob("*.npy")}
+    return {str(file.relative_to(path)): file.read_bytes() for file in path.rglob("*.safetensors")}
 
 
 # The store
@@ -126,40 +127,41 @@ def array_files(path: Path) -> dict[str, bytes]:
 def test_what_is_kept_comes_back_bit_by_bit(tmp_path_factory: pytest.TempPathFactory, array: np.ndarray) -> None:
     store = FeatureStore(tmp_path_factory.mktemp("store"))
     assert store.get(Kind.PIXELS, CARD, "k") is None
-    store.put(Kind.PIXELS, CARD, "k", array)
-    found = store.get(Kind.PIXELS, CARD, "k")
-    assert found is not None
+    store.put(Kind.PIXELS, CARD, "k", {"features": array})
+    kept = store.get(Kind.PIXELS, CARD, "k")
+    assert kept is not None
+    found = kept["features"]
     assert found.dtype == array.dtype and found.tobytes() == array.tobytes() and found.shape == array.shape
     assert store.get(Kind.VIEWS, CARD, "k") is None, "another module's"
     assert store.get(Kind.PIXELS, replace(CARD, checksum="f" * 64), "k") is None, "another model's"
 
 
-def test_a_kept_file_is_a_plain_npy_in_a_folder_named_for_its_model(tmp_path: Path) -> None:
-    FeatureStore(tmp_path).put(Kind.PIXELS, replace(CARD, id="google/tips ../x"), "k", np.ones((2, 3), np.float16))
-    (file,) = tmp_path.rglob("*.npy")
+def test_a_kept_file_is_safetensors_in_a_folder_named_for_its_model(tmp_path: Path) -> None:
+    one = {"features": np.ones((2, 3), np.float16)}
+    FeatureStore(tmp_path).put(Kind.PIXELS, replace(CARD, id="google/tips ../x"), "k", one)
+    (file,) = tmp_path.rglob("*.safetensors")
     assert file.parent.name == f"pixels-google-tips-..-x-{CARD.checksum[:16]}"
     assert file.parent.parent == tmp_path
-    assert np.array_equal(np.load(file, allow_pickle=False), np.ones((2, 3)))
+    assert np.array_equal(load_file(file)["features"], np.ones((2, 3)))
 
 
-@pytest.mark.parametrize("harm", ["cut", "flip", "empty"])
-def test_a_spoiled_file_counts_as_none_and_goes(tmp_path: Path, harm: str) -> None:
-    store = FeatureStore(tmp_path)
-    store.put(Kind.PIXELS, CARD, "k", np.arange(12, dtype=np.float16))
-    (file,) = tmp_path.rglob("*.npy")
-    whole = bytearray(file.read_bytes())
-    whole[-10] ^= 1
-    file.write_bytes({"cut": bytes(whole[:-6]), "flip": bytes(whole), "empty": b""}[harm])
+@pytest.mark.parametrize("left", [0, 4, -6])
+def test_a_file_that_was_cut_counts_as_none_and_is_replaced(tmp_path: Path, left: int) -> None:
+    store, kept = FeatureStore(tmp_path), {"features": np.arange(12, dtype=np.float16)}
+    store.put(Kind.PIXELS, CARD, "k", kept)
+    (file,) = tmp_path.rglob("*.safetensors")
+    file.write_bytes(file.read_bytes()[:left])
     assert store.get(Kind.PIXELS, CARD, "k") is None
-    assert not file.exists()
+    store.put(Kind.PIXELS, CARD, "k", kept)
+    assert store.get(Kind.PIXELS, CARD, "k") is not None
 
 
 def test_what_was_used_longest_ago_goes_first(tmp_path: Path) -> None:
-    one = np.zeros(2000, np.float16)  # 4 kB
+    one = {"features": np.zeros(2000, np.float16)}  # 4 kB
     earlier = FeatureStore(tmp_path, 4.5e6)
     for i in range(5):
         earlier.put(Kind.PIXELS, CARD, f"old{i}", one)
-    files = {file.stem: file for file in tmp_path.rglob("*.npy")}
+    files = {file.stem: file for file in tmp_path.rglob("*.safetensors")}
     size = files["old0"].stat().st_size
     for age, name in enumerate(["old3", "old1", "old4", "old0", "old2"]):  # old3 was used last of all
         os.utime(files[name], (time.time() - 1000 - age, time.time() - 1000 - age))
@@ -173,7 +175,7 @@ def test_what_was_used_longest_ago_goes_first(tmp_path: Path) -> None:
         later.put(Kind.PIXELS, CARD, "new", one)
     finally:
         module._LARGEST_SHARE = share
-    left = {file.stem for file in tmp_path.rglob("*.npy")}
+    left = {file.stem for file in tmp_path.rglob("*.safetensors")}
     assert left == {"new", "old2", "old3", "old1"}, "90 % of the limit is left, the least recently used are gone"
 
 
@@ -184,8 +186,8 @@ def test_a_build_that_is_larger_than_the_store_keeps_its_first_frames(
     store = FeatureStore(tmp_path, 1e6)
     store._opened_s -= 10.0
     for i in range(1200):
-        store.put(Kind.PIXELS, CARD, f"{i:04d}", np.zeros(450, np.float16))
-    kept = sorted(file.stem for file in tmp_path.rglob("*.npy"))
+        store.put(Kind.PIXELS, CARD, f"{i:04d}", {"features": np.zeros(420, np.float16)})
+    kept = sorted(file.stem for file in tmp_path.rglob("*.safetensors"))
     assert kept == [f"{i:04d}" for i in range(len(kept))]
     assert 800 < len(kept) < 1000
     assert capsys.readouterr().err.count("cache is full") == 1
@@ -194,11 +196,11 @@ def test_a_build_that_is_larger_than_the_store_keeps_its_first_frames(
 def test_too_large_features_are_told_once_and_not_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     store = FeatureStore(tmp_path, 1e6)
     for key in "ab":
-        store.put(Kind.PIXELS, CARD, key, np.zeros(10_000, np.float16))
+        store.put(Kind.PIXELS, CARD, key, {"features": np.zeros(10_000, np.float16)})
     said = capsys.readouterr().err
     assert said.count("note: Features of fake/pixels are not cached") == 1
     assert "CacheSettings.limit_gb" in said
-    assert not list(tmp_path.rglob("*.npy"))
+    assert not list(tmp_path.rglob("*.safetensors"))
 
 
 def test_a_folder_that_cannot_be_written_is_a_note_and_no_error(
@@ -206,21 +208,21 @@ def test_a_folder_that_cannot_be_written_is_a_note_and_no_error(
 ) -> None:
     (tmp_path / "file").write_text("no folder")
     store = FeatureStore(tmp_path / "file")
-    store.put(Kind.PIXELS, CARD, "a", np.zeros(3, np.float16))
-    store.put(Kind.PIXELS, CARD, "b", np.zeros(3, np.float16))
+    store.put(Kind.PIXELS, CARD, "a", {"features": np.zeros(3, np.float16)})
+    store.put(Kind.PIXELS, CARD, "b", {"features": np.zeros(3, np.float16)})
     assert capsys.readouterr().err.count("note: Features are not cached any longer") == 1
     assert store.get(Kind.PIXELS, CARD, "a") is None
 
 
 def test_what_a_killed_build_left_half_written_goes_when_it_is_old(tmp_path: Path) -> None:
     store = FeatureStore(tmp_path)
-    store.put(Kind.PIXELS, CARD, "a", np.zeros(3, np.float16))
-    (file,) = tmp_path.rglob("*.npy")
+    store.put(Kind.PIXELS, CARD, "a", {"features": np.zeros(3, np.float16)})
+    (file,) = tmp_path.rglob("*.safetensors")
     old, young = file.with_name("x.1-1.partial"), file.with_name("y.1-1.partial")
     for path in (old, young):
         path.write_bytes(b"half")
     os.utime(old, (time.time() - 7200, time.time() - 7200))
-    FeatureStore(tmp_path).put(Kind.PIXELS, CARD, "b", np.zeros(3, np.float16))
+    FeatureStore(tmp_path).put(Kind.PIXELS, CARD, "b", {"features": np.zeros(3, np.float16)})
     assert not old.exists() and young.exists()
 
 

@@ -147,7 +147,7 @@ def test_a_path_is_called_by_its_last_name() -> None:
 def test_other_keypoints_bring_the_matcher_that_was_made_for_them() -> None:
     foundation, paper = profile("foundation"), profile("paper")
     assert foundation.choosing({Kind.LOCAL: "aliked@aliked-n32"}).name_of(Kind.MATCHER) == "lightglue-aliked"
-    assert foundation.choosing({Kind.LOCAL: "rootsift"}).name_of(Kind.MATCHER) == "mutual-ratio"
+    assert foundation.choosing({Kind.LOCAL: "xfeat"}).name_of(Kind.MATCHER) == "xfeat"
     assert paper.choosing({Kind.LOCAL: "disk"}).name_of(Kind.MATCHER) == "lightglue-disk"
     assert paper.choosing({Kind.LOCAL: "disk", Kind.MATCHER: "mutual-ratio"}).name_of(Kind.MATCHER) == "mutual-ratio"
     assert paper.choosing({Kind.PIXELS: "tipsv2"}).name_of(Kind.MATCHER) == "superglue"

@@ -115,7 +115,7 @@ def test_a_matcher_that_changes_its_mind_is_found_out() -> None:
     ],
 )
 def test_keypoints_with_scores_or_a_size_that_cannot_be_are_found_out(told, said: str) -> None:
-    real = load(Kind.LOCAL, "rootsift")
+    real = load(Kind.LOCAL, "xfeat")
 
     class Wrong:
         card = real.card

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check
-from avlmaps.perception.embedded.xfeat import MAX_KEYPOINTS, MAX_SIDE_PX, XFeat, _cubic
+from avlmaps.perception.embedded.keypoints import MAX_KEYPOINTS, MAX_SIDE_PX, XFeat, _cubic
 
 XFEAT = XFeat()
 

@@ -11,7 +11,7 @@ from avlmaps.core.columns import concat
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.maps.keyframes.album import describe_keyframe
 from avlmaps.maps.keyframes.choose import KeyframeSettings
-from avlmaps.perception.embedded.keypoints import RootSift
+from avlmaps.perception.embedded.keypoints import XFeat
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 from avlmaps.query.locate import LocateSettings, locate, locate_features
@@ -29,22 +29,22 @@ def score_of(xy: np.ndarray) -> np.ndarray:
 
 @dataclass
 class Scored:
-    """RootSIFT's keypoints with scores."""
+    """XFeat's keypoints with scores of a test's own, or with none."""
 
-    card = RootSift().card
+    card = XFeat().card
     told: bool = True
-    finder: RootSift = field(default_factory=RootSift)
+    finder: XFeat = field(default_factory=XFeat)
 
     def encode(self, rgb: np.ndarray) -> LocalFeatures:
         found = self.finder.encode(rgb)
         if not self.told:
-            return found
+            return LocalFeatures(found.xy, found.descriptors)
         return replace(found, score=score_of(found.xy), size=(rgb.shape[1], rgb.shape[0]))
 
 
 @dataclass
 class Watching:
-    """A matcher by RootSIFT that keeps what it was given."""
+    """A matcher that keeps what it was given."""
 
     card = CARD
     given: list[tuple[LocalFeatures, LocalFeatures]] = field(default_factory=list)
@@ -55,7 +55,7 @@ class Watching:
 
 
 def encoders_of(local: Any, matcher: Any) -> Any:
-    return Encoders(local=local, place="vlad", matcher=matcher)
+    return Encoders(local=local, place="xfeat", matcher=matcher)
 
 
 def stored_by(local: Any, matcher: Any) -> LocatableMap:
@@ -123,7 +123,7 @@ class Planted:
 
 @pytest.mark.parametrize("count, located", [(400, True), (40, True), (5, False)])
 def test_planted_matches_of_few_or_many_keypoints_are_believed_by_the_same_rules(count: int, located: bool) -> None:
-    """DISK and SuperPoint find twice as many keypoints as RootSIFT, or far fewer; one set of thresholds is for all."""
+    """DISK and SuperPoint find 2,000 keypoints, or far fewer; one set of thresholds is for all."""
     rng = np.random.default_rng(1)
     frame = WALK.frame(4)
     xy = rng.uniform((8, 8), (312, 232), (4 * count, 2)).astype(np.float32)

@@ -97,10 +97,9 @@ _BUILT_IN = (
     Backend(Kind.VIEWS, "embedded", f"{_EMBEDDED}.pixels:EmbeddedViews"),
     Backend(Kind.VIEWS, "embedded-synthetic", f"{_EMBEDDED}.pixels:synthetic_views"),
     Backend(Kind.SOUNDS, "embedded", f"{_EMBEDDED}.sounds:EmbeddedSounds"),
-    Backend(Kind.LOCAL, "xfeat", f"{_EMBEDDED}.xfeat:XFeat", licence="Apache-2.0", matcher="xfeat"),
-    Backend(Kind.PLACE, "xfeat", f"{_EMBEDDED}.xfeat:xfeat_places"),
-    Backend(Kind.MATCHER, "xfeat", f"{_EMBEDDED}.xfeat:xfeat_matcher"),
-    Backend(Kind.LOCAL, "rootsift", f"{_EMBEDDED}.keypoints:RootSift"),
+    Backend(Kind.LOCAL, "xfeat", f"{_EMBEDDED}.keypoints:XFeat", licence="Apache-2.0", matcher="xfeat"),
+    Backend(Kind.PLACE, "xfeat", f"{_EMBEDDED}.keypoints:xfeat_places"),
+    Backend(Kind.MATCHER, "xfeat", f"{_EMBEDDED}.keypoints:xfeat_matcher"),
     Backend(Kind.PLACE, "vlad", f"{_EMBEDDED}.keypoints:Vlad"),
     Backend(Kind.MATCHER, "mutual-ratio", f"{_EMBEDDED}.keypoints:MutualRatio"),
 )
@@ -109,6 +108,8 @@ _TRAINED = (
     Backend(Kind.PIXELS, "trained", f"{_EMBEDDED}.pixels:trained_pixels", model="eyes", licence="your own"),
     Backend(Kind.VIEWS, "trained", f"{_EMBEDDED}.pixels:trained_views", model="eyes", licence="your own"),
 )
+# Backends of older releases, which maps still name, and what to do.
+_GONE = {"rootsift": "photos are located by better keypoints since 0.3: build the map again from its recording"}
 _registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in (*_BUILT_IN, *_TRAINED)}
 
 
@@ -178,6 +179,8 @@ def find(kind: Kind, name: str) -> Backend:
         return _registered[kind, name]
     known = {b.name: b for b in backends() if b.kind == kind}
     if name not in known:
+        if name in _GONE:
+            raise BackendError(f"The {kind} backend {name!r} is gone; {_GONE[name]}.")
         if get := how_to_get("backends", f"{kind}:{name}"):
             raise BackendError(f"The {kind} backend {name!r} is not installed; get it with: {get}")
         raise BackendError(

@@ -1,26 +1,26 @@
 """Encoders that remember: what one of them has made of a frame or a sound it does not make again.
 
-One folder for each model, one ``.npy`` file for each frame or sound, its name the hash of all that the model saw.
-Behind the array stand four bytes, the CRC-32 of what is before them: a file that a power cut has spoiled counts as
-none. Files are replaced whole, so that several builds may share the store. Features of pixels by slow models pass
-through float16 with the store and without, so that a map is the same, bit by bit, in both cases.
+One folder for each model, one ``.safetensors`` file for each frame or sound, its name the hash of all that the model
+saw. Files are replaced whole, so that several builds may share the store; one that cannot be read counts as none.
+Features of pixels by slow models pass through float16 with the store and without, so that a map is the same, bit by
+bit, in both cases.
 """
 
 import hashlib
-import io
 import re
 import threading
 import time
-import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from os import getpid, utime
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float32, UInt8
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.files import user_path
@@ -48,7 +48,7 @@ _GB = 1e9
 _LARGEST_SHARE = 1e-2  # of the limit: at least a hundred frames find room
 _AFTER_SWEEPING = 0.9
 _ABANDONED_S = 3600.0
-_CRC_BYTES = 4
+FEATURES = "features"  # the name of an encoder's only array
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,35 +92,32 @@ class FeatureStore:
         self._warned: set[str] = set()
         self._lock = threading.Lock()
 
-    def get(self, kind: Kind, card: ModelCard, key: str) -> np.ndarray | None:
-        """Return stored features, None where there are none that can be read."""
+    def get(self, kind: Kind, card: ModelCard, key: str) -> Mapping[str, np.ndarray] | None:
+        """Return stored arrays by name, None where there are none that can be read."""
         path = self._path(kind, card, key)
         try:
-            array = _unpacked(path.read_bytes())
-        except OSError:
+            arrays = load(path.read_bytes())
+        except (OSError, SafetensorError):
             return None
         with suppress(OSError):
-            if array is None:
-                path.unlink()
-            else:
-                utime(path)  # used now, which is what sweeping goes by
-        if array is not None:
-            with self._lock:
-                self.found[kind] = self.found.get(kind, 0) + 1
-        return array
+            utime(path)  # used now, which is what sweeping goes by
+        with self._lock:
+            self.found[kind] = self.found.get(kind, 0) + 1
+        return arrays
 
-    def put(self, kind: Kind, card: ModelCard, key: str, array: np.ndarray) -> None:
-        """Store features, if there is room for them."""
+    def put(self, kind: Kind, card: ModelCard, key: str, arrays: Mapping[str, np.ndarray]) -> None:
+        """Store arrays by name, if there is room for them."""
         if self._full:
             return
-        if array.nbytes > _LARGEST_SHARE * self.limit_bytes:
-            needed = array.nbytes / _LARGEST_SHARE / _GB
+        content = save({name: np.ascontiguousarray(array) for name, array in arrays.items()})
+        if len(content) > _LARGEST_SHARE * self.limit_bytes:
+            needed = len(content) / _LARGEST_SHARE / _GB
             self._tell(
-                f"Features of {card.id} are not cached: they take {array.nbytes / 1e6:.0f} MB a frame, and a hundred "
+                f"Features of {card.id} are not cached: they take {len(content) / 1e6:.0f} MB a frame, and a hundred "
                 f"frames must find room ({option('feature-cache-gb', f'{needed:.0f}')})."
             )
             return
-        content, path = _packed(array), self._path(kind, card, key)
+        path = self._path(kind, card, key)
         try:
             if not self._make_room(len(content)):
                 return
@@ -137,7 +134,7 @@ class FeatureStore:
 
     def _path(self, kind: Kind, card: ModelCard, key: str) -> Path:
         named = re.sub(r"[^A-Za-z0-9._-]+", "-", card.id).strip(".-")[:60]
-        return self.folder / f"{kind}-{named}-{card.checksum[:16]}" / f"{key}.npy"
+        return self.folder / f"{kind}-{named}-{card.checksum[:16]}" / f"{key}.safetensors"
 
     def _make_room(self, size: int) -> bool:
         with self._lock:
@@ -179,9 +176,9 @@ class FeatureStore:
                 if path.parent.is_symlink():
                     continue
                 state = path.stat()
-                if path.suffix == ".npy":
+                if path.suffix != ".partial":
                     found.append((state.st_mtime, state.st_size, path))
-                elif path.suffix == ".partial" and time.time() - state.st_mtime > _ABANDONED_S:
+                elif time.time() - state.st_mtime > _ABANDONED_S:
                     path.unlink()
         return found
 
@@ -189,23 +186,6 @@ class FeatureStore:
         if sentence not in self._warned:
             self._warned.add(sentence)
             say(f"note: {sentence}")
-
-
-def _packed(array: np.ndarray) -> bytes:
-    stream = io.BytesIO()
-    np.lib.format.write_array(stream, np.ascontiguousarray(array), allow_pickle=False)
-    content = stream.getvalue()
-    return content + zlib.crc32(content).to_bytes(_CRC_BYTES, "little")
-
-
-def _unpacked(content: bytes) -> np.ndarray | None:
-    body, crc = content[:-_CRC_BYTES], content[-_CRC_BYTES:]
-    if len(crc) < _CRC_BYTES or zlib.crc32(body).to_bytes(_CRC_BYTES, "little") != crc:
-        return None
-    try:
-        return np.lib.format.read_array(io.BytesIO(body), allow_pickle=False)
-    except (ValueError, EOFError):
-        return None
 
 
 def key_of(*seen: np.ndarray | str | float | int | None) -> str:
@@ -250,13 +230,12 @@ class _Memory:
         self.kind, self.card, self.store = kind, card, store
 
     def once(self, make: Callable[[], np.ndarray], *seen: Any) -> np.ndarray:
-        """Return what is made of what is seen, made once."""
-        (made,) = self.each(lambda _: [make()], [seen])
-        return made
+        """Return the features that are made of what is seen, made once."""
+        return self.each(lambda _: [{FEATURES: make()}], [seen])[0][FEATURES]
 
     def each(
-        self, make: Callable[[list[int]], Sequence[np.ndarray]], seen: Sequence[Sequence[Any]]
-    ) -> list[np.ndarray]:
+        self, make: Callable[[list[int]], Sequence[Mapping[str, np.ndarray]]], seen: Sequence[Sequence[Any]]
+    ) -> list[Mapping[str, np.ndarray]]:
         """Return what is made of each that is seen; those that are not in the store are made together.
 
         Args:
@@ -273,7 +252,7 @@ class _Memory:
         for number in reversed(missing):  # pixels of a frame take 150 MB: none is held twice for long
             kept[number] = fresh = made.pop()
             self.store.put(self.kind, self.card, keys[number], fresh)
-        return [cast(np.ndarray, one) for one in kept]
+        return [one for one in kept if one is not None]
 
 
 def cached(kind: Kind, encoder: Any, store: FeatureStore | None, *, half: bool = False) -> Any:
@@ -290,15 +269,19 @@ def cached(kind: Kind, encoder: Any, store: FeatureStore | None, *, half: bool =
     def pixels(frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
         rounded = np.float16 if half else np.float32
         made = memory.each(
-            lambda rows: [one.astype(rounded) for one in encode_batch(encoder, [frames[row] for row in rows])],
+            lambda rows: [
+                {FEATURES: one.astype(rounded)} for one in encode_batch(encoder, [frames[row] for row in rows])
+            ],
             [_seen_in(frame) for frame in frames],
         )
-        return [features.astype(np.float32, copy=False) for features in made]
+        return [one[FEATURES].astype(np.float32, copy=False) for one in made]
 
     def views(frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
         seen = [_seen_in(frame) for frame in frames]
-        rows = memory.each(lambda rows: list(unmasked(encoder.encode([frames[row] for row in rows]))), seen)
-        return np.stack(rows) if rows else np.zeros((0, encoder.card.dim), np.float32)
+        made = memory.each(
+            lambda rows: [{FEATURES: one} for one in unmasked(encoder.encode([frames[row] for row in rows]))], seen
+        )
+        return np.stack([one[FEATURES] for one in made]) if made else np.zeros((0, encoder.card.dim), np.float32)
 
     def sounds(sound: Sound) -> Float32[np.ndarray, "windows d"]:
         return memory.once(lambda: _features(encoder.encode(sound)), sound.samples, sound.rate_hz)
@@ -311,7 +294,9 @@ def cached(kind: Kind, encoder: Any, store: FeatureStore | None, *, half: bool =
         return memory.once(lambda: _features(encoder.encode(rgb, local, state)), *seen)
 
     def keypoints(rgb: UInt8[np.ndarray, "h w 3"]) -> LocalFeatures:
-        return _keypoints(memory.once(lambda: _as_rows(encoder.encode(rgb)), rgb), (rgb.shape[1], rgb.shape[0]))
+        (made,) = memory.each(lambda _: [_arrays_of(encoder.encode(rgb))], [[rgb]])
+        width, height = made["size"].tolist()
+        return LocalFeatures(made["xy"], made["descriptors"], made["score"], (width, height))
 
     names = (*members_of(FrameSoundEncoder if kind is Kind.SOUNDS else PROTOCOLS[kind]), "keyframes_only")
     others: dict[Kind, dict[str, Any]] = {
@@ -349,18 +334,6 @@ def _seen_in(frame: Frame) -> list[np.ndarray | str | float | None]:
     return [frame.rgb, frame.depth_m, frame.world_from_camera, cameras, np.asarray(rig.rgb_from_depth), *stands]
 
 
-def _as_rows(local: LocalFeatures) -> np.ndarray:
-    """Return keypoints as one array of rows, in float32, because they are sub-pixel."""
-    columns = [(name, getattr(local, name)) for name in ("xy", "descriptors", "score")]
-    columns = [(name, column) for name, column in columns if len(column) == len(local.xy)]
-    layout = [(name, "<f4", column.shape[1:]) for name, column in columns]
-    rows = np.zeros(len(local.xy), np.dtype([*layout, *([("sized", "u1")] if local.size != (0, 0) else [])]))
-    for name, column in columns:
-        rows[name] = column
-    return rows
-
-
-def _keypoints(rows: np.ndarray, size: tuple[int, int]) -> LocalFeatures:
-    names = rows.dtype.names or ()
-    columns = {name: np.ascontiguousarray(rows[name]) for name in names if name != "sized"}
-    return LocalFeatures(**columns, size=size if "sized" in names else (0, 0))
+def _arrays_of(local: LocalFeatures) -> dict[str, np.ndarray]:
+    columns = {name: np.asarray(getattr(local, name), np.float32) for name in ("xy", "descriptors", "score")}
+    return {**columns, "size": np.array(local.size)}

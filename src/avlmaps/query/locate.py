@@ -97,8 +97,8 @@ _SEARCH: dict[FocalSource, _FocalSearch] = {
 class LocateSettings:
     """How a picture is located, and when it counts as located.
 
-    The measurements are of RootSIFT's thousand keypoints. Keypoints and matchers of other kinds are judged by the same
-    numbers: they count points that agree with one pose, parts of matches and of the picture, never likeness.
+    Keypoints and matchers of every kind are judged by the same numbers: they count points that agree with one pose,
+    parts of matches and of the picture, never likeness.
     """
 
     enough_inliers: int = 60

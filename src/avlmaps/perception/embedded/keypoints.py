@@ -1,71 +1,101 @@
-"""The keypoints that ship: RootSIFT, VLAD over its descriptors, and mutual nearest neighbours with a ratio."""
+"""Keypoints, places and matches that ship: XFeat, VLAD over its descriptors, and mutual nearest neighbours.
+
+XFeat (Potje and others, CVPR 2024) is learned, so that a photo in dim light is located as well. The network (published
+under Apache-2.0, exported by ``training/xfeat.py``) sees the mean of the colours, with sides that are multiples of 32,
+and gives each pixel a heat, each cell of 8x8 pixels a reliability and a descriptor of 64 numbers. Keypoints are maxima
+of the heat in windows of 5x5; their descriptors are interpolated between the cells.
+"""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Float32, Int, UInt8
+from jaxtyping import Float32, Float64, Int, UInt8
 
+from avlmaps.perception.networks import open_network
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 
-DESCRIPTOR_DIM = 128
-MAX_KEYPOINTS = 1000
-MAX_SIDE_PX = 1280
-# cv2 puts the centre of the first pixel at (0, 0), this package at (0.5, 0.5).
-_PIXEL_CENTRE = 0.5
+DIM = 64
+MAX_KEYPOINTS = 1500
+MIN_SIDE_PX, MAX_SIDE_PX = 640, 1280  # keypoints are whole pixels, so that a small picture is looked at enlarged
+LEAST_HEAT = 0.05
+_XFEAT_RATIO = 0.9  # XFeat's descriptors differ less from the second nearest than others
+_STEP_PX, _CELL_PX, _WINDOW_PX = 32, 8, 5
+_CUBIC = -0.75
+_WEIGHTS = Path(__file__).parent / "weights" / "xfeat.onnx"
 
 
-class RootSift:
-    """Finds the strongest SIFT keypoints of a picture (Lowe 2004) and describes them by RootSIFT (Arandjelović 2012).
-
-    A picture with a side of more than ``MAX_SIDE_PX`` is encoded in a smaller copy; the keypoints are returned in the
-    pixels of the given picture nevertheless.
-    """
+class XFeat:
+    """Finds the strongest XFeat keypoints of a picture."""
 
     def __init__(self) -> None:
-        constants = f"rootsift-1 keypoints={MAX_KEYPOINTS} side={MAX_SIDE_PX} precise_upscale=1"
+        graph = _WEIGHTS.read_bytes()
+        self._network = open_network(graph)
+        constants = f"xfeat-2 keypoints={MAX_KEYPOINTS} side={MIN_SIDE_PX}-{MAX_SIDE_PX} heat={LEAST_HEAT}"
         self.card = ModelCard(
-            id="avlmaps/rootsift-1",
-            dim=DESCRIPTOR_DIM,
-            licence="MIT",
-            checksum=hashlib.sha256(constants.encode()).hexdigest(),
-            note="needs texture; fails on blank walls, at night and under strong changes of view",
+            id="xfeat-2",
+            dim=DIM,
+            licence="Apache-2.0",
+            checksum=hashlib.sha256(graph + constants.encode()).hexdigest(),
+            note="keypoints are whole pixels",
         )
-        self._sift = cv2.SIFT_create(nfeatures=MAX_KEYPOINTS, enable_precise_upscale=True)  # pyright: ignore[reportAttributeAccessIssue]
 
     def encode(self, rgb: UInt8[np.ndarray, "h w 3"]) -> LocalFeatures:
-        """Return at most ``MAX_KEYPOINTS`` keypoints, the strongest first; none for a blank picture."""
-        gray = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-        shrink = min(1.0, MAX_SIDE_PX / max(gray.shape))
-        if shrink < 1.0:
-            size = (max(1, round(gray.shape[1] * shrink)), max(1, round(gray.shape[0] * shrink)))
-            gray = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
-        found, histograms = self._sift.detectAndCompute(gray, None)
-        if histograms is None or not len(found):
-            return _no_features()
-        xy = np.array([keypoint.pt for keypoint in found], np.float64)
-        response = np.array([keypoint.response for keypoint in found])
-        # cv2 finds keypoints in threads and returns ties beyond its limit: sort, so that every run gives the same.
-        order = np.lexsort((xy[:, 1], xy[:, 0], -response))[:MAX_KEYPOINTS]
-        to_picture = np.array([rgb.shape[1] / gray.shape[1], rgb.shape[0] / gray.shape[0]])
+        """Return at most ``MAX_KEYPOINTS`` keypoints, the strongest first; none for a blank or tiny picture."""
+        gray = rgb.mean(axis=2, dtype=np.float32)
+        scale = np.clip(max(gray.shape), MIN_SIDE_PX, MAX_SIDE_PX) / max(gray.shape)
+        height, width = (int(side * scale) // _STEP_PX * _STEP_PX for side in gray.shape)
+        if not height or not width:
+            return LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, DIM), np.float32))
+        seen = cv2.resize(gray, (width, height), interpolation=cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR)
+        descriptors, heat, reliability = (out[0] for out in self._network.run(None, {"gray": seen[None, None]}))
+        heat = heat[0]
+        peak = (heat == cv2.dilate(heat, np.ones((_WINDOW_PX, _WINDOW_PX)))) & (heat > LEAST_HEAT)
+        y, x = np.nonzero(peak)
+        # Where a keypoint lies on the grid of cells, as the published code counts it.
+        cell_x = x / (width - 1) * (width // _CELL_PX) - 0.5
+        cell_y = y / (height - 1) * (height // _CELL_PX) - 0.5
+        score = heat[y, x] * _sampled(reliability, cell_x, cell_y, _linear)[:, 0]
+        order = np.lexsort((x, y, -score))[:MAX_KEYPOINTS]
+        found = _sampled(descriptors, cell_x[order], cell_y[order], _cubic)
+        found /= np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12)
+        to_picture = np.array([rgb.shape[1] / width, rgb.shape[0] / height])
         return LocalFeatures(
-            xy=((xy[order] + _PIXEL_CENTRE) * to_picture).astype(np.float32),
-            descriptors=root_normalised(histograms[order]),
+            xy=((np.stack([x, y], axis=1)[order] + 0.5) * to_picture).astype(np.float32),
+            descriptors=found.astype(np.float32),
+            score=np.clip(score[order], 0.0, 1.0).astype(np.float32),
         )
 
 
-def root_normalised(histograms: Float32[np.ndarray, "n d"]) -> Float32[np.ndarray, "n d"]:
-    """Return the square roots of the L1-normalised rows: unit vectors whose dot product is the Hellinger kernel."""
-    total = histograms.sum(axis=1, keepdims=True)
-    return np.sqrt(histograms / np.maximum(total, 1e-12)).astype(np.float32)
+def _linear(off: Float64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
+    return np.maximum(1.0 - np.abs(off), 0.0)
 
 
-def _no_features() -> LocalFeatures:
-    return LocalFeatures(
-        xy=np.zeros((0, 2), np.float32),
-        descriptors=np.zeros((0, DESCRIPTOR_DIM), np.float32),
-    )
+def _cubic(off: Float64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
+    """Return Keys' weight of a neighbour that lies ``off`` cells away."""
+    t = np.abs(off)
+    near = ((_CUBIC + 2.0) * t - (_CUBIC + 3.0)) * t**2 + 1.0
+    far = _CUBIC * (((t - 5.0) * t + 8.0) * t - 4.0)
+    return np.where(t <= 1.0, near, np.where(t < 2.0, far, 0.0))
+
+
+def _sampled(
+    cells: Float32[np.ndarray, "d h w"],
+    x: Float64[np.ndarray, " n"],
+    y: Float64[np.ndarray, " n"],
+    weight: Callable[[Float64[np.ndarray, " n"]], Float64[np.ndarray, " n"]],
+) -> Float32[np.ndarray, "n d"]:
+    """Return values between cells; beyond the border they are zero."""
+    padded = np.pad(np.moveaxis(cells, 0, -1), ((2, 2), (2, 2), (0, 0)))
+    column, row = np.floor(x).astype(int), np.floor(y).astype(int)
+    total = np.zeros((len(x), len(cells)), np.float32)
+    for i in range(-1, 3):
+        for j in range(-1, 3):
+            share = (weight(y - row - i) * weight(x - column - j)).astype(np.float32)
+            total += share[:, None] * padded[row + i + 2, column + j + 2]
+    return total
 
 
 WORDS = 64
@@ -80,8 +110,8 @@ class Vlad:
     drown the rest, and the whole is of unit length. Its dot product measures how alike two pictures are.
     """
 
-    def __init__(self, dim: int = DESCRIPTOR_DIM) -> None:
-        """Take how many numbers a descriptor has."""
+    def __init__(self, dim: int = 128) -> None:
+        """Take how many numbers a descriptor has: 128 of DISK's and ALIKED's."""
         constants = f"vlad-1 words={WORDS} dim={dim} learned_from={MAX_LEARNED_FROM} rounds={ROUNDS}"
         self._dim = dim
         self.card = ModelCard(
@@ -98,7 +128,7 @@ class Vlad:
         Returns:
             ``centres``: (``WORDS``, d) float32. Fewer descriptors than words leave words that are alike or zero.
         """
-        return {"centres": learned_words(_sampled(local, self._dim, rng), rng)}
+        return {"centres": learned_words(_drawn(local, self._dim, rng), rng)}
 
     def encode(
         self, rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
@@ -137,7 +167,7 @@ def learned_words(
     return centres
 
 
-def _sampled(local: Sequence[LocalFeatures], dim: int, rng: np.random.Generator) -> Float32[np.ndarray, "n d"]:
+def _drawn(local: Sequence[LocalFeatures], dim: int, rng: np.random.Generator) -> Float32[np.ndarray, "n d"]:
     count = np.array([len(features.descriptors) for features in local], np.int64)
     total = int(count.sum())
     if total == 0:
@@ -172,7 +202,7 @@ _ROUNDING = 1e-6
 class MutualRatio:
     """Selects pairs that are mutually nearest and pass Lowe's ratio test from the first picture to the second."""
 
-    def __init__(self, dim: int = DESCRIPTOR_DIM, ratio: float = RATIO) -> None:
+    def __init__(self, dim: int = 128, ratio: float = RATIO) -> None:
         """Take how many numbers a descriptor has, and the ratio below which a pair stays."""
         self._ratio = ratio
         self.card = ModelCard(
@@ -214,3 +244,13 @@ def match_mutual(
     _, first = np.unique(nearest[kept], return_index=True)  # equal likeness could take the same b twice
     kept = kept[np.sort(first)]
     return np.stack([kept, nearest[kept]], axis=1)
+
+
+def xfeat_places() -> Vlad:
+    """Return the encoder of places by these keypoints."""
+    return Vlad(DIM)
+
+
+def xfeat_matcher() -> MutualRatio:
+    """Return the matcher of these keypoints."""
+    return MutualRatio(DIM, _XFEAT_RATIO)

@@ -9,7 +9,7 @@ from jaxtyping import Float32
 
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
-from avlmaps.perception.cache import FeatureStore, key_of
+from avlmaps.perception.cache import FEATURES, FeatureStore, key_of
 from avlmaps.perception.models import cache_folder, precision_in_force
 from avlmaps.perception.protocols import ModelCard
 
@@ -29,13 +29,12 @@ class KeptWords:
 
     def get(self, phrase: str) -> Float32[np.ndarray, " d"] | None:
         """Return the unit vector of a phrase, None where it is not stored."""
-        row = self._store.get(Kind.WORDS, self._card, self._key(phrase))
-        fits = row is not None and row.dtype == np.float32 and row.shape == (self._card.dim,)
-        return row if fits else None
+        found = self._store.get(Kind.WORDS, self._card, self._key(phrase))
+        return None if found is None else found[FEATURES]
 
     def put(self, phrase: str, row: Float32[np.ndarray, " d"]) -> None:
         """Store the unit vector of a phrase."""
-        self._store.put(Kind.WORDS, self._card, self._key(phrase), row)
+        self._store.put(Kind.WORDS, self._card, self._key(phrase), {FEATURES: row})
 
     def _key(self, phrase: str) -> str:
         card = self._card
