@@ -24,7 +24,7 @@ from avlmaps.maps.store.manifest import Removed
 from avlmaps.query.contents import Contents
 from avlmaps.recordings import channels
 from avlmaps.recordings.channels import ChannelSound, write_channels
-from avlmaps.recordings.consistency.verdict import Grade, Reason
+from avlmaps.recordings.consistency.check import Grade, Reason
 from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.microphones import microphones_named
 from avlmaps.recordings.open import open_recording

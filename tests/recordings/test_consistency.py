@@ -21,12 +21,11 @@ from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.channels import level_faults
 from avlmaps.recordings.conformance import example_truth, see
 from avlmaps.recordings.consistency.agreement import NOTHING
-from avlmaps.recordings.consistency.check import check_recording
+from avlmaps.recordings.consistency.check import Grade, Reason, Verdict, check_recording
 from avlmaps.recordings.consistency.flats import Flats
 from avlmaps.recordings.consistency.readings import Reading, cause_of, rig_of
 from avlmaps.recordings.consistency.sample import Sample, choose_pairs, draw_sample
 from avlmaps.recordings.consistency.suspicions import examine_recording, find_edges
-from avlmaps.recordings.consistency.verdict import Grade, Reason, Verdict
 from avlmaps.recordings.corrections import Corrections, PoseKind, opencv_from_axes
 from avlmaps.recordings.memory import MemoryRecording, is_of_program
 from avlmaps.recordings.open import open_recording

@@ -11,8 +11,8 @@ import pytest
 import avlmaps
 from avlmaps.core.errors import RecordingError
 from avlmaps.maps.audio.segmentation import segment
+from avlmaps.recordings.consistency.check import Grade
 from avlmaps.recordings.consistency.suspicions import examine_recording
-from avlmaps.recordings.consistency.verdict import Grade
 from avlmaps.recordings.open import open_recording
 
 ROUND4 = Path(__file__).resolve().parents[3] / "shared/field/round4"

@@ -70,7 +70,7 @@ def build_map(
         settings: all that can be chosen.
         cache: whether features are stored, so that another build of the same frames encodes nothing again.
         workers: who maps the stretches; this process if None.
-        allow: names of reasons for which the recording is not refused (``recordings.consistency.verdict.Reason``).
+        allow: names of reasons for which the recording is not refused (``recordings.consistency.check.Reason``).
         resume: continue with what a stopped build had finished; otherwise begin again.
         overwrite: replace a finished map there that came from another recording, or with other settings.
         progress: show how far it is on standard error.

@@ -21,9 +21,8 @@ from avlmaps.maps.sources.wiring import check_wiring
 from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, SensorInfo, UpInfo
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import useless_channels
-from avlmaps.recordings.consistency.check import check_recording
+from avlmaps.recordings.consistency.check import Finding, Grade, Reason, Verdict, check_recording
 from avlmaps.recordings.consistency.suspicions import examine_recording
-from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.plausible import pace_fault, plausible_walk
 from avlmaps.recordings.types import Frame, Ground, Recording

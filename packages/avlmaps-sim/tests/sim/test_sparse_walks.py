@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.recordings.consistency.check import check_recording
-from avlmaps.recordings.consistency.verdict import Grade
+from avlmaps.recordings.consistency.check import Grade, check_recording
 from avlmaps.recordings.corrections import Corrections
 from avlmaps.recordings.open import open_recording
 from avlmaps_sim.recorder import RecordSettings, record_scene

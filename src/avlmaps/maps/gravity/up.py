@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.wording import option
-from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason
+from avlmaps.recordings.consistency.check import Finding, Grade, Reason
 from avlmaps.recordings.memory import is_of_program
 from avlmaps.recordings.types import Frame, Recording
 

@@ -11,7 +11,16 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.recordings.consistency import agreement as limits
 from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, compare
-from avlmaps.recordings.consistency.check import LENS, Evidence, door_verdict
+from avlmaps.recordings.consistency.check import (
+    LENS,
+    Evidence,
+    Reason,
+    Said,
+    Suspicion,
+    Verdict,
+    door_verdict,
+    findings_of,
+)
 from avlmaps.recordings.consistency.flats import Levels
 from avlmaps.recordings.consistency.readings import AS_IT_IS, Reading, is_closer
 from avlmaps.recordings.consistency.sample import (
@@ -25,7 +34,6 @@ from avlmaps.recordings.consistency.sample import (
     seams,
     steps_between_all,
 )
-from avlmaps.recordings.consistency.verdict import Reason, Said, Suspicion, Verdict, findings_of
 from avlmaps.recordings.corrections import Corrections
 from avlmaps.recordings.types import Recording
 

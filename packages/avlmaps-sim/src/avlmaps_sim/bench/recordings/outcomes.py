@@ -14,8 +14,8 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.core.poses import to_quaternion
+from avlmaps.recordings.consistency.check import Verdict
 from avlmaps.recordings.consistency.suspicions import examine_recording
-from avlmaps.recordings.consistency.verdict import Verdict
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
 from avlmaps_sim.bench.recordings.drafts import Draft, Picture, camera_numbers, write_lines, write_picture
