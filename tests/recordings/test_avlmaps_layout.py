@@ -110,12 +110,6 @@ def test_the_camera_sees_ninety_degrees_unless_told_otherwise(tmp_path: Path):
     assert np.allclose(open_recording(path).world_from_camera[0], WORLD_FROM_HABITAT @ _base_pose(0))
 
 
-def test_frames_are_metres_of_depth_and_their_own_colour(tmp_path: Path):
-    frame = open_recording(_write(tmp_path / "scene_1")).frame(2)
-    assert np.array_equal(frame.depth_m, metres(shot(2).depth_mm))
-    assert np.array_equal(frame.rgb, shot(2).rgb) and frame.name == "000002"
-
-
 def test_depth_may_be_png_in_millimetres(tmp_path: Path):
     path = _write(tmp_path / "scene_1")
     for index in range(4):

@@ -16,8 +16,7 @@ import pytest
 from recording_scenes import CAMERA, metres, pose_line, rig, save_depth, shot, shots, write_folder, write_seven_scenes
 
 import avlmaps
-from avlmaps.core import poses
-from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.camera import Rig
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.open import open_recording
@@ -282,21 +281,6 @@ def test_opening_five_thousand_frames_opens_few_pictures_and_takes_little_memory
     monkeypatch.undo()
     assert picture.exists()
     assert recording.frame(count - 1).world_from_camera[0, 3] == pytest.approx((count - 1) / 100)
-
-
-def test_two_cameras_of_different_size_are_read(tmp_path: Path):
-    path = write_folder(tmp_path / "walk")
-    small = Pinhole(30.0, 30.0, 16.0, 12.0, 32, 24)
-    described = json.loads((path / "recording.json").read_text())
-    described["intrinsics"]["depth"] = {"fx": 30, "fy": 30, "cx": 16, "cy": 12, "width": 32, "height": 24}
-    described["depth_units_per_m"] = 500
-    (path / "recording.json").write_text(json.dumps(described))
-    for index in range(5):
-        save_depth(path / f"depth/{index:06d}.png", np.full((24, 32), 1000))
-    frame = open_recording(path).frame(0)
-    assert frame.rig.depth == small and frame.depth_m.shape == (24, 32)
-    assert np.all(frame.depth_m == 2.0)
-    assert poses.rotation_angle_rad(frame.world_from_camera, shot(0).world_from_camera) < 1e-6
 
 
 def test_a_copy_takes_truth_along_but_not_the_events_of_another_track(tmp_path: Path):

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recording_scenes import CAMERA, save_depth, shots, write_folder, write_seven_scenes
+from test_kinds import write_tone
 
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.recordings import images
@@ -164,8 +165,7 @@ def test_the_notice_of_a_track_is_one_of_the_recording(tmp_path: Path) -> None:
     assert "cancel" in open_recording(path).notices[-1]
 
 
-@pytest.mark.parametrize("suffix", [".png", ".npy"])
-def test_halved_depth_of_the_same_size_is_another_recording(tmp_path: Path, suffix: str) -> None:
+def test_halved_depth_of_the_same_size_is_another_recording(tmp_path: Path) -> None:
     path = write_folder(tmp_path / "walk")
     first = open_recording(path).fingerprint
     file = path / "depth/000003.png"
@@ -224,7 +224,8 @@ def test_a_flac_with_far_more_bytes_than_its_samples_take_is_a_sentence(tmp_path
 @pytest.mark.parametrize("suffix", ["flac", "ogg", "mp3", "mka", "webm"])
 def test_a_sound_that_ends_in_zeros_is_a_sentence(tmp_path: Path, suffix: str) -> None:
     """Their decoders look for the next packet in whatever follows, in 20 GB for minutes."""
-    path = compressed(tmp_path / f"a.{suffix}")
+    path = tmp_path / f"a.{suffix}"
+    write_tone(path)
     assert AudioTrack.open(path).duration_s == pytest.approx(1.0, abs=0.1)
     os.truncate(path, 20_000_000_000)
     with pytest.raises(AudioError, match="its end holds zeros only"):
@@ -239,24 +240,7 @@ def test_a_sound_that_says_where_its_samples_lie_may_end_in_zeros(tmp_path: Path
 
 
 def test_a_sound_that_ends_in_a_few_zeros_is_read(tmp_path: Path) -> None:
-    path = compressed(tmp_path / "a.mp3")
+    path = tmp_path / "a.mp3"
+    write_tone(path)
     os.truncate(path, 8 << 20)
     assert AudioTrack.open(path).duration_s == pytest.approx(1.0, abs=0.1)
-
-
-def compressed(path: Path) -> Path:
-    """Write a tone of one second in a container without an index of its samples."""
-    import av
-    import soundfile
-
-    tone = (0.3 * np.sin(2 * np.pi * 500.0 * np.arange(48_000) / 48_000)).astype(np.float32)
-    if path.suffix not in (".mka", ".webm"):
-        soundfile.write(path, tone, 48_000)
-        return path
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("libopus", rate=48_000, layout="mono")
-        frame = av.AudioFrame.from_ndarray(tone[None], format="fltp", layout="mono")
-        frame.sample_rate = 48_000
-        container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
-    return path

@@ -12,7 +12,7 @@ from recording_scenes import CAMERA, metres, save_depth, save_rgb, shot
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.images import check_picture, check_whole, picture_size, read_colour, read_depth
+from avlmaps.recordings.images import check_picture, check_whole, read_colour, read_depth
 
 PNG = cv2.imencode(".png", shot(1).rgb)[1].tobytes()
 JPEG = cv2.imencode(".jpg", shot(1).rgb)[1].tobytes()
@@ -70,13 +70,6 @@ def test_a_thumbnails_end_does_not_stand_for_the_pictures_end():
     check_whole(Path("x"), inside)
     with pytest.raises(RecordingError, match="truncated"):
         check_whole(Path("x"), inside[:-10])
-
-
-@pytest.mark.parametrize("suffix", [".png", ".jpg", ".npy"])
-def test_the_size_is_read_from_the_header_alone(tmp_path: Path, suffix: str):
-    file = tmp_path / f"p{suffix}"
-    np.save(file, np.zeros((48, 64))) if suffix == ".npy" else save_rgb(file, shot(0).rgb)
-    assert picture_size(file) == (64, 48)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ import soundfile
 from PIL import Image
 from recording_scenes import CAMERA
 
-from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.conformance import check, example_truth
 from avlmaps.recordings.containers import self_contained_suffix
 from avlmaps.recordings.formats import file_recording, ros_messages, ros_sound
@@ -182,16 +181,6 @@ def test_samples_of_each_of_portaudios_formats_are_read(number: int) -> None:
     message = SimpleNamespace(audio=SimpleNamespace(audio_data=data, info=info))
     ((pcm, samples),) = ros_sound.sampled_pieces([message], "/audio")
     assert pcm.channels == 2 and np.allclose(samples, [[0.5, -0.5], [0.25, 0.0]], atol=0.01)
-
-
-@pytest.mark.parametrize("beginning", ros_sound._BEGINNINGS)
-def test_a_stream_is_known_by_how_it_begins(tmp_path: Path, beginning: bytes) -> None:
-    coding = ros_sound._BEGINNINGS[beginning]
-    write_tone(tmp_path / f"a.{coding}")
-    content = (tmp_path / f"a.{coding}").read_bytes()
-    assert content.startswith(beginning) or coding == "mp3"
-    (tmp_path / f"b.{coding}").write_bytes(content)
-    assert AudioTrack.open(tmp_path / f"b.{coding}").duration_s == pytest.approx(1.0, abs=0.2)
 
 
 @pytest.mark.parametrize("how", ["bz2", "lz4", "file", "message", "message, alone"])

@@ -206,15 +206,6 @@ def test_the_file_of_its_sound_goes_with_a_bag_and_warns_nobody(tmp_path: Path) 
     assert not file.exists() and left == []
 
 
-def test_a_second_thread_reads_the_same_frames(tmp_path: Path) -> None:
-    from concurrent.futures import ThreadPoolExecutor
-
-    recording = open_rosbag(write_bag(tmp_path, "ros2"))
-    here = [recording.frame(i).depth_m[0, 0] for i in range(5)]
-    with ThreadPoolExecutor(1) as pool:
-        assert list(pool.map(lambda i: recording.frame(i).depth_m[0, 0], range(5))) == here
-
-
 def test_a_topic_that_yaml_reads_as_a_number_is_a_sentence(tmp_path: Path) -> None:
     path = write_bag(tmp_path, "ros2")
     metadata = path / "metadata.yaml"

@@ -5,23 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording_scenes import CAMERA, metres, save_depth, save_rgb, shot, write_seven_scenes
+from recording_scenes import CAMERA, save_depth, save_rgb, shot, write_seven_scenes
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.open import open_recording
-
-
-def test_a_sequence_opens_in_place(tmp_path: Path):
-    recording = open_recording(write_seven_scenes(tmp_path / "seq-01"))
-    assert recording.format == "7scenes" and len(recording) == 5
-    assert recording.rig.rgb == recording.rig.depth == CAMERA
-    assert recording.up_in_world is None and recording.audio is None and recording.notices == ()
-    for index, frame in enumerate(recording.frames()):
-        taken = shot(index)
-        assert np.array_equal(frame.rgb, taken.rgb)
-        assert np.array_equal(frame.depth_m, metres(taken.depth_mm))
-        assert np.allclose(frame.world_from_camera, taken.world_from_camera, atol=1e-12)
 
 
 def test_stamps_follow_the_numbers_in_the_names(tmp_path: Path):
