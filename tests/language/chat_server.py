@@ -111,17 +111,6 @@ def trickle(status: int) -> Reply:
     return reply
 
 
-def without_body(first: bytes, again: bytes) -> Reply:
-    """An answer that never comes to its body: one line, and then another again and again."""
-
-    def reply(handler: BaseHTTPRequestHandler, over: Event) -> None:
-        handler.wfile.write(first)
-        while not over.wait(0.02):
-            handler.wfile.write(again)
-
-    return reply
-
-
 def endless(status: int) -> Reply:
     """An answer that never ends, as fast as it goes."""
 

@@ -1,17 +1,15 @@
 """A server of the OpenAI chat protocol, asked over HTTP: any that serves ``/chat/completions``, hosted or local.
 
-One deadline holds all attempts, nothing endless is read, no redirect is followed (it would carry the command
-elsewhere), no proxy stands before this very machine, and a key appears in no message. Answers are read strictly, since
-a garbled one must not become a program, and forgivingly, since servers differ in all that does not matter here.
+One deadline holds all attempts and each read, nothing endless is read, no redirect is followed (it would carry the
+command elsewhere), no proxy stands before this very machine, and a key appears in no message. Answers are read
+strictly, since a garbled one must not become a program, and forgivingly, since servers differ in all that does not
+matter here.
 """
 
 import re
-from concurrent.futures import Future
 from dataclasses import dataclass
-from email.utils import parsedate_to_datetime
 from http.client import HTTPException
-from threading import Thread
-from time import monotonic, sleep, time
+from time import monotonic, sleep
 from typing import Any, TypeVar
 from urllib.error import HTTPError, URLError
 from urllib.request import HTTPRedirectHandler, ProxyHandler, Request, build_opener
@@ -55,15 +53,13 @@ _SENTENCES = {
 
 @dataclass(slots=True, eq=False)
 class EndpointFault(Exception):  # noqa: N818 - never leaves this package: sentences are made of it
-    """Why no answer came.
+    """Why no answer came: a row of the sentences, or "status" for an HTTP status that is no success.
 
     Attributes:
-        kind: "status" (an HTTP status that is no success), "unreachable", "timeout", "broken" (the connection ended
-            in the middle), "huge", "garbled" (not the protocol) or "empty" (no choice in it).
+        kind: of the fault.
         status: the HTTP status, 0 where there is none.
-        message: what the server or the system says of it.
+        message: what the server or the system says of it; ``code`` is the server's word for it.
         param: the parameter that the server does not take, where it says so.
-        code: the server's own word for the fault, where it has one.
         retry_after_s: when to try again, where the server says so.
     """
 
@@ -181,26 +177,7 @@ class Endpoint:
         return {"model": request.model, "messages": request.messages, **kept}
 
     def _asked(self, path: str, deadline: float, parameters: dict[str, Any] | None = None) -> bytes:
-        """Return the body of one request's answer; raises EndpointFault where none came before the deadline.
-
-        The library bounds each read, but not all of them together (headers that trickle in have no end), nor the search
-        for the host's name. So a thread asks, and is left where it is late.
-        """
-        answer: Future[bytes] = Future()
-
-        def ask() -> None:
-            try:
-                answer.set_result(self._exchanged(path, parameters, deadline))
-            except BaseException as fault:  # noqa: BLE001 - raised below, where it is waited for
-                answer.set_exception(fault)
-
-        Thread(target=ask, name="avlmaps-chat", daemon=True).start()
-        try:
-            return answer.result(max(deadline - monotonic(), 0.01))
-        except TimeoutError:
-            raise EndpointFault("timeout") from None
-
-    def _exchanged(self, path: str, parameters: dict[str, Any] | None, deadline: float) -> bytes:
+        """Return the body of one request's answer; raises EndpointFault where none came before the deadline."""
         headers = {"Authorization": f"Bearer {self._settings.api_key or 'none'}", "Content-Type": "application/json"}
         body = None if parameters is None else msgspec.json.encode(parameters)
         request = Request(f"{self._settings.base_url.rstrip('/')}/{path}", body, headers)
@@ -346,14 +323,11 @@ def _decoded(raw: bytes, shape: type[Shape]) -> Shape:
 
 
 def _seconds(retry_after: str | None) -> float | None:
-    """Return the seconds of a Retry-After header, which holds a number of them or a date."""
+    """Return the seconds of a Retry-After header; None where it holds a date."""
     try:
         seconds = float(retry_after or "nan")
     except ValueError:
-        try:
-            seconds = parsedate_to_datetime(retry_after or "").timestamp() - time()
-        except (ValueError, OverflowError):
-            return None
+        return None
     return max(seconds, 0.0) if seconds < 1e9 else None  # not a number is no time to wait either
 
 
