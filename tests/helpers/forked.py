@@ -10,7 +10,7 @@ from typing import Any
 
 # Not the ROS client: the event loop that it makes when it is imported must not be shared.
 _IMPORTED = [
-    "avlmaps.cli.go", "avlmaps.cli.serve", "avlmaps.language.learned_translator", "avlmaps.navigate.instruct",
+    "avlmaps.cli.go", "avlmaps.cli.serve", "avlmaps.language.translator", "avlmaps.navigate.instruct",
     "avlmaps.query.avlmap", "avlmaps.serve.drive.app", "avlmaps.serve.service",
 ]  # fmt: skip
 

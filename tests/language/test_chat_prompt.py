@@ -94,7 +94,7 @@ def test_each_example_of_the_prompt_runs(example: Example) -> None:
 
 @pytest.mark.parametrize("example", PROGRAMS, ids=lambda each: each.command)
 def test_each_example_is_what_the_rules_say_where_they_understand_it(example: Example) -> None:
-    from avlmaps.language.learned_translator import command_to_program
+    from avlmaps.language.translator import command_to_program
 
     try:
         by_rules = command_to_program(example.command)

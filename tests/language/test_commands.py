@@ -13,12 +13,11 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import AvlmapsError, LanguageError
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import Clarify, Go, If, Pick, Refuse, Return, StopAt, Target, TargetKind, targets_of
-from avlmaps.language.learned_translator import LearnedTranslator, UnclearError, command_to_program
 from avlmaps.language.program import parse_program
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.questions import read_question
 from avlmaps.language.sentence import Attachments
-from avlmaps.language.translator import Translator
+from avlmaps.language.translator import LearnedTranslator, Translator, UnclearError, command_to_program
 from avlmaps.language.verbalise import verbalise
 from avlmaps_sim.bench.language import counts, judge, read_list
 

@@ -8,7 +8,7 @@ import pytest
 from avlmaps.language.chat import ChatSettings, ChatTranslator
 from avlmaps.language.commands import UnclearError, read_command
 from avlmaps.language.gate import no_order
-from avlmaps.language.learned_translator import LearnedTranslator
+from avlmaps.language.translator import LearnedTranslator
 
 LISTS = Path(__file__).parent / "commands"
 NO_ORDERS = {

@@ -25,7 +25,7 @@ def test_the_page_says_what_the_parser_says(command: str, plan: str) -> None:
 
 
 def test_the_code_of_the_page_prints_what_it_says(capsys: pytest.CaptureFixture[str]) -> None:
-    from avlmaps.language.learned_translator import LearnedTranslator
+    from avlmaps.language.translator import LearnedTranslator
 
     translation = LearnedTranslator().program_for("go to the table, then one metre behind it")
     for line in [translation.plan, *translation.program.splitlines()]:

@@ -50,8 +50,8 @@ from avlmaps.language.learned.linear import (
     intents_of,
 )  # fmt: skip
 from avlmaps.language.learned.reader import LearnedReader, ReadingLimits, learned_reader
-from avlmaps.language.learned_translator import LearnedTranslator, explanation
 from avlmaps.language.sentence import Attachments, Sentence
+from avlmaps.language.translator import LearnedTranslator, explanation
 from avlmaps.language.word_classes import load_word_classes
 from avlmaps_sim.bench.language import judge, judge_intents, judge_question, read_list
 

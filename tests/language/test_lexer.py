@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.lexer import SMALL, TENS, duration_at, in_figures, length_at, number_at, tokenise
+from avlmaps.language.translator import LearnedTranslator
 
 
 @pytest.mark.parametrize(

@@ -22,9 +22,9 @@ from avlmaps.language.intents import (
     VisitEach,
     Wait,
 )  # fmt: skip
-from avlmaps.language.learned_translator import command_to_program
 from avlmaps.language.questions import read_question
 from avlmaps.language.sentence import Attachments, Sentence
+from avlmaps.language.translator import command_to_program
 from avlmaps.language.verbalise import verbalise
 
 THINGS = ("chair", "sofa", "table", "window", "fridge", "bed", "lamp", "sink")

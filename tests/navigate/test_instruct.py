@@ -8,10 +8,9 @@ import pytest
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.core.motion import GroundPose
-from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget
 from avlmaps.language.sentence import Attachments
-from avlmaps.language.translator import Translation
+from avlmaps.language.translator import LearnedTranslator, Translation
 from avlmaps.maps.store.edits import Edit, EditedSpot, World
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.instruct import Outcome, instruct

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from query_fakes import FakeMap, furnished_map, sounds_of
 
 from avlmaps.core.question import HeardAt, Modality, Part, Role
-from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.sentence import Attachments
+from avlmaps.language.translator import LearnedTranslator
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.sources.candidates import Spread
 from avlmaps.maps.types import SourceEvidence

@@ -12,7 +12,7 @@ import pytest
 from avlmaps.core.errors import MapError
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.question import Modality
-from avlmaps.language.learned_translator import command_to_program
+from avlmaps.language.translator import command_to_program
 from avlmaps.navigate.instruct import Outcome
 from avlmaps.navigate.motion_log import LoggedMove
 from avlmaps.perception.embedded.scene_network import load_network

@@ -147,7 +147,7 @@ def go(verb: "Go") -> dict[str, Any]:
 def _read(verb: "Go", translator: "Translator") -> "Translation":
     """Return the program of the sentence, with a note for each option that has no effect on it."""
     if verb.explain:
-        from avlmaps.language.learned_translator import explanation
+        from avlmaps.language.translator import explanation
 
         for line in explanation(translator, verb.sentence):
             say(line)
@@ -284,8 +284,8 @@ def _choice(verb: "Go", asked: "Outcome") -> int:
 def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
     """Return the translator of the command."""
     if verb.language != "chat":
-        from avlmaps.language.learned_translator import LearnedTranslator
         from avlmaps.language.sentence import Attachments
+        from avlmaps.language.translator import LearnedTranslator
         from avlmaps.navigate.instruct import given_by
 
         image, clip = (None if file is None else str(file) for file in (verb.image, verb.sound_clip))

@@ -30,11 +30,11 @@ from avlmaps.language.intents import Intent, Pick, Refuse, Side, Target, TargetK
 from avlmaps.language.learned.decision import NameResolver, Weighed, is_same, weighed, which
 from avlmaps.language.learned.linear import amount, amount_end
 from avlmaps.language.learned.reader import Read
-from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.names import is_known
 from avlmaps.language.program.vocabulary import SKILLS, Skill, ValueType
 from avlmaps.language.sentence import Attachments, Sentence, stand_ins
+from avlmaps.language.translator import LearnedTranslator
 from avlmaps.perception.models import cache_folder
 
 _ALWAYS, _NEAREST = 6, 4  # examples: the first ones, whose state is kept, and the nearest ones

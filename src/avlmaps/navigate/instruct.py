@@ -14,10 +14,9 @@ from jaxtyping import Float
 from avlmaps.core.errors import LanguageError, ProgramError, SeveralFitError
 from avlmaps.core.motion import Action
 from avlmaps.core.poses import FRAME
-from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program
 from avlmaps.language.sentence import Attachments
-from avlmaps.language.translator import Translation, Translator
+from avlmaps.language.translator import LearnedTranslator, Translation, Translator
 from avlmaps.navigate.brake import Brake, EditBrake, braked
 from avlmaps.navigate.driver import Driver
 from avlmaps.navigate.file_access import Readable, offered_by

@@ -7,9 +7,8 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError, SeveralFitError
 from avlmaps.core.motion import Action, GroundPose, Moved
-from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget, Trace, parse_program, run_program
-from avlmaps.language.translator import Translation
+from avlmaps.language.translator import LearnedTranslator, Translation
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, BodyShape
 from avlmaps.navigate.driver import Arrival, MapDriver

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose
-from avlmaps.language.learned_translator import LearnedTranslator, explanation
+from avlmaps.language.translator import LearnedTranslator, explanation
 from avlmaps.navigate.bodies import BASE, BodyShape
 from avlmaps.navigate.costmap import costmap_of, obstacles_for
 from avlmaps.navigate.driver import MapDriver

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.motion import Action, GroundPose, Moved
-from avlmaps.language.learned_translator import command_to_program
 from avlmaps.language.program import parse_program
+from avlmaps.language.translator import command_to_program
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps_sim.bench.harness.evidence import Box, Event, Evidence, Photo
 from avlmaps_sim.bench.harness.settings import Recorded

@@ -10,8 +10,7 @@ import pytest
 
 from avlmaps.core.errors import LanguageError, QueryError
 from avlmaps.core.motion import Action, GroundPose
-from avlmaps.language.learned_translator import LearnedTranslator
-from avlmaps.language.translator import Translation
+from avlmaps.language.translator import LearnedTranslator, Translation
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.driver import Arrival
 from avlmaps.perception.encoders import Encoders

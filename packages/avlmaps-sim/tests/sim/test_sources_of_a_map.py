@@ -10,7 +10,7 @@ from avlmaps.core.errors import GoalNotFoundError, MapError, QueryError
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.core.timeline import Trajectory
-from avlmaps.language.learned_translator import LearnedTranslator
+from avlmaps.language.translator import LearnedTranslator
 from avlmaps.maps.build import build_map
 from avlmaps.maps.sources.find import find_sources
 from avlmaps.maps.store.folder import read

@@ -30,9 +30,8 @@ from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable, printable_json
 from avlmaps.language.commands import MOST_CHARACTERS
-from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget, parse_program
-from avlmaps.language.translator import Translation
+from avlmaps.language.translator import LearnedTranslator, Translation
 from avlmaps.navigate.brake import Brake
 from avlmaps.navigate.costmap import floor_of_walk
 from avlmaps.navigate.instruct import Outcome, given_by, instruct

@@ -83,7 +83,7 @@ def drive(
     asks: Sequence[Ask], avlmap: "AVLMap", scene: "Scene", out: Path, tell: Callable[[str], None]
 ) -> Drive | None:
     """Send a robot in the home to the goals with one command, and draw its path."""
-    from avlmaps.language.learned_translator import LearnedTranslator
+    from avlmaps.language.translator import LearnedTranslator
     from avlmaps.navigate.instruct import instruct
     from avlmaps.navigate.skills import RobotSettings
     from avlmaps.navigate.trace_plot import plot_path

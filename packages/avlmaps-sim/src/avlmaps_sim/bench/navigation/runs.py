@@ -202,6 +202,6 @@ def translator_named(language: str) -> Translator | None:
         from avlmaps.language.chat import ChatTranslator
 
         return ChatTranslator()
-    from avlmaps.language.learned_translator import LearnedTranslator
+    from avlmaps.language.translator import LearnedTranslator
 
     return LearnedTranslator()
