@@ -14,9 +14,8 @@ import numpy as np
 
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.factors import anchor_heat, object_heat
-from avlmaps.query.scores import feature_scores, margins
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import ClosestWords
+from avlmaps.query.words import ClosestWords, feature_scores, margins
 
 T = TypeVar("T")
 UP = np.array([0.0, 0.0, 1.0])

@@ -16,8 +16,6 @@ from avlmaps.maps.store.manifest import RecordingInfo, RigInfo, Visit
 from avlmaps.query.changes import (
     Days,
     changes_answer,
-    days_of,
-    is_meant,
     last_seen,
     last_seen_text,
     text_of,
@@ -26,6 +24,7 @@ from avlmaps.query.changes import (
     usual_place_text,
     usual_text,
 )
+from avlmaps.query.edits import means
 from avlmaps.query.goals import Goal
 from avlmaps.query.lists import lies
 
@@ -121,23 +120,23 @@ def test_the_answer_is_json_with_the_days_and_what_is_unknown() -> None:
 
 
 def test_where_a_thing_was_last_seen_is_where_its_last_stay_was() -> None:
-    answer = last_seen(days(), "bag", is_meant("bag"), lambda place: None)
+    answer = last_seen(days(), "bag", means("bag"), lambda place: None)
     (one,) = answer["seen"]
     assert one["position"] == [1.0, 0.0, 0.3]
     assert one["last_seen"] == {"visit": 2, "day": "2026-11-24", "stamp_s": 30.0}
     assert last_seen_text(answer).endswith("On 2026-11-26 it was gone from there.")
-    clock = last_seen(days(), "clock", is_meant("clock"), lambda place: None)
+    clock = last_seen(days(), "clock", means("clock"), lambda place: None)
     assert last_seen_text(clock).endswith("Nobody has looked at its place since.")
-    sofa = last_seen(days(), "sofa", is_meant("sofa"), lambda place: None)
+    sofa = last_seen(days(), "sofa", means("sofa"), lambda place: None)
     assert last_seen_text(sofa).startswith("The sofa was last seen on 2026-11-26") and "since" not in last_seen_text(
         sofa
     )
-    assert last_seen(days(), "piano", is_meant("piano"), lambda place: None)["seen"] == []
+    assert last_seen(days(), "piano", means("piano"), lambda place: None)["seen"] == []
 
 
 def test_what_a_map_of_colours_calls_red_is_the_red_thing() -> None:
-    assert is_meant("red thing")("red") and is_meant("red")("red")
-    assert not is_meant("red thing")("blue") and not is_meant("red chair")("red") and not is_meant("thing")("")
+    assert means("red thing")("red") and means("red")("red")
+    assert not means("red thing")("blue") and not means("red chair")("red") and not means("thing")("")
 
 
 @pytest.mark.parametrize(("names", "count"), [(None, 4), (["couch"], 1), (["sofa", "bag"], 2), (["piano"], 0)])
@@ -232,9 +231,8 @@ def test_what_is_usual_is_said_with_its_days() -> None:
     )
     assert usual_place_text(known, "ski", [], lambda _: None) == "No ski was seen on any day."
     with pytest.raises(QueryError, match="on one day alone, so that nobody knows what is usual"):
-        days_of(
-            SimpleNamespace(data=SimpleNamespace(info=SimpleNamespace(visits=())), path=Path("home.avlmap")),
-            lambda life: life,
+        Days.of(
+            SimpleNamespace(data=SimpleNamespace(life=None), path=Path("home.avlmap")), "nobody knows what is usual"
         )  # pyright: ignore[reportArgumentType]
 
 

@@ -43,7 +43,7 @@ def test_nothing_is_found_again(paths: tuple[Path, Path], monkeypatch: pytest.Mo
     def again(*_: object) -> None:
         raise AssertionError("found again")
 
-    monkeypatch.setattr("avlmaps.query.scores.two_closest", again)
+    monkeypatch.setattr("avlmaps.query.words.two_closest", again)
     monkeypatch.setattr(RoomRegions, "of", again)
     monkeypatch.setattr(Rooms, "field", again)
     found = AVLMap.open(paths[1])

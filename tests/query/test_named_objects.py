@@ -16,13 +16,13 @@ from avlmaps.query.factors import NearAnchors, NearThings
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.instances import FeatureVoxels
 from avlmaps.query.modalities.object import colour_in, object_factor
-from avlmaps.query.scores import feature_scores
 from avlmaps.query.settings import HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import (
     ClosestWords,
     EncodedWord,
     Vocabulary,
+    feature_scores,
     least_score_to_count,
     margins_of,
 )

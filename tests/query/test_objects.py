@@ -10,10 +10,9 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.query.instances import FeatureVoxels, margin_confidence
 from avlmaps.query.modalities.object import object_factor
-from avlmaps.query.scores import feature_scores
 from avlmaps.query.settings import HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import ClosestWords, margins_of
+from avlmaps.query.words import ClosestWords, feature_scores, margins_of
 
 
 def unit_rows(rng: np.random.Generator, n: int, d: int) -> np.ndarray:

@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from avlmaps.query import scores as of_voxels
-from avlmaps.query.scores import feature_scores, margins, two_closest
+from avlmaps.query import words as of_voxels
 from avlmaps.query.voxel_space import connected, linked
+from avlmaps.query.words import feature_scores, margins, two_closest
 
 
 @given(st.integers(0, 60), st.integers(0, 6), st.integers(0, 2**32 - 1))

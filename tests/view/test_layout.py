@@ -7,7 +7,7 @@ import pytest
 
 from avlmaps.maps.storeys import Storey, Storeys
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.naming import keyframes_that_saw
+from avlmaps.query.words import keyframes_that_saw
 from avlmaps.view.labels import Labels
 from avlmaps.view.layout import RECORD, Layout, as_bytes
 

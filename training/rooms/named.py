@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from training.rooms.furnished import Surfaces
 
-from avlmaps.query.naming import VoxelNamer
+from avlmaps.query.words import VoxelNamer
 from avlmaps_sim.bench.harness.workplace import Workplace, scene_jobs
 from avlmaps_sim.bench.indexing.runs import IndexingSettings
 from avlmaps_sim.free_space import STRUCTURE

@@ -21,8 +21,8 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.life import Life, Stay
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import STRUCTURE, Thing, thing_of
-from avlmaps.query.naming import VoxelNamer
 from avlmaps.query.voxel_space import linked
+from avlmaps.query.words import VoxelNamer
 
 # A thing is the one of an earlier day where this part of the smaller of the two lies in the other; with another name,
 # where the second part does, and the smaller is this part of the larger.

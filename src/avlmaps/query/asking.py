@@ -20,6 +20,7 @@ from avlmaps.core.errors import AskError
 from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
+from avlmaps.core.registry import Kind
 from avlmaps.core.wording import coordinates, option
 from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.answer import UNDERSTOOD_ONLY, Alternative, Answer, PartAnswer, absent_text, found_text, placed
@@ -371,7 +372,7 @@ def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
     if not asked.sentence.strip():
         return Question.of(asked.parts) if len(asked.parts) == 1 and asked.object is not None else None
     kinds = {entry.kind for entry in lexicon().senses(asked.sentence)}
-    if kinds != {EntryKind.THING} or "pixels" not in avlmap.data.info.models:
+    if kinds != {EntryKind.THING} or not avlmap.has(Kind.PIXELS):
         return None
     encoder = avlmap.encoders.pixels
     is_name = isinstance(encoder, NamedPixelEncoder) and asked.sentence in encoder.vocabulary

@@ -448,7 +448,7 @@ class AVLMap:
             from avlmaps.query.changes import Days, things_at
             from avlmaps.query.sound_sources import with_heard_then
 
-            days = Days.of(self, self.edited.life)
+            days = Days.of(self)
             found = things_at(self.space, days, at, names, least_confidence)
             every = found if names is None else things_at(self.space, days, at, None, least_confidence)
             return with_heard_then(self, days.visit_of(at), found, every)
@@ -536,11 +536,11 @@ class AVLMap:
 
         ``QueryError``: the map was not seen on such a day, or on one day alone.
         """
-        from avlmaps.query.changes import Days, changes_answer, room_namer
+        from avlmaps.query.changes import Days, changes_answer
 
-        days = Days.of(self, self.edited.life)
+        days = Days.of(self)
         since_visit = days.visit_of(since)
-        return changes_answer(days, self.path.name, since_visit, room_namer(self), first_seen=first_seen)
+        return changes_answer(days, self.path.name, since_visit, self.where.name_of, first_seen=first_seen)
 
     @checked(QueryError)
     def last_seen(self, name: str) -> "LastSeenAnswer":
@@ -548,9 +548,10 @@ class AVLMap:
 
         ``QueryError``: the map was seen on one day alone.
         """
-        from avlmaps.query.changes import Days, is_meant, last_seen, room_namer
+        from avlmaps.query.changes import Days, last_seen
+        from avlmaps.query.edits import means
 
-        return last_seen(Days.of(self, self.edited.life), name, is_meant(name), room_namer(self))
+        return last_seen(Days.of(self), name, means(name), self.where.name_of)
 
     @property
     def doubts_of_drives(self) -> tuple[str, ...]:

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from avlmaps.core.errors import QueryError
-from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import FRAME
-from avlmaps.core.registry import Kind
 from avlmaps.core.wording import place_text, the_room
 from avlmaps.core.words import plural_of
 from avlmaps.query.settings import FOUND_AT
@@ -39,15 +37,14 @@ class Days:
     life: "Life"  # of the things
 
     @classmethod
-    def of(cls, stored: "AVLMap", corrected: "Callable[[Life], Life] | None" = None) -> "Days":
-        """Return those of a map. ``QueryError``: it was seen on one day alone."""
-        life = stored.data.life
+    def of(cls, avlmap: "AVLMap", unknown: str = "nothing is known to have changed") -> "Days":
+        """Return those of a map, its things as people named them. ``QueryError``: it was seen on one day alone."""
+        life = avlmap.data.life
         if life is None:
             raise QueryError(
-                f"{stored.path.name} was seen on one day alone, so that nothing is known to have changed; add another "
-                "day with `avlmaps merge`."
+                f"{avlmap.path.name} was seen on one day alone, so that {unknown}; add another with `avlmaps merge`."
             )
-        return cls(stored.data.info.visits, life if corrected is None else corrected(life))
+        return cls(avlmap.data.info.visits, avlmap.edited.life(life))
 
     @property
     def last(self) -> int:
@@ -198,14 +195,15 @@ def things_at(
 ) -> "list[Thing]":
     """Return the things that were there on a day, most confident first; see ``AVLMap.things``."""
     from avlmaps.query.contents import Thing
+    from avlmaps.query.edits import means
 
     voxels: list[list[int]] = np.asarray(space.index).tolist()
     row_of = {(x, y, z): row for row, (x, y, z) in enumerate(voxels)}
-    meant = None if names is None else [is_meant(name) for name in names]
+    meant = None if names is None else [means(name) for name in names]
     found: list[Thing] = []
     for number in days.at(days.visit_of(at)):
         stay, index = days.life.stays[number], days.life.voxels(number)
-        if stay.confidence < least_confidence or not (meant is None or any(means(stay.name) for means in meant)):
+        if stay.confidence < least_confidence or not (meant is None or any(one(stay.name) for one in meant)):
             continue
         own: list[list[int]] = index.tolist()
         left = sorted(row for x, y, z in own if (row := row_of.get((x, y, z))) is not None)
@@ -213,18 +211,6 @@ def things_at(
         points = space.grid.centre_of(index)
         found.append(Thing(stay.name, stay.confidence, stay.position, stay.size, stay.color, rows, points))
     return sorted(found, key=lambda thing: -thing.confidence)
-
-
-def is_meant(name: str) -> Callable[[str], bool]:
-    """Return whether a thing's name is meant by a word: by itself, by another word for it, or by a wider one."""
-    entry = lexicon().find(name, EntryKind.THING)
-    own = name.removesuffix(" thing") if entry is None else entry.name  # "red thing", of a map of colours
-    return lambda other: other in (name, own) or lexicon().is_a(other, own, EntryKind.THING)
-
-
-def room_namer(avlmap: "AVLMap") -> RoomOf:
-    """Return what names the room of a place in a map; nothing where it has no model of views."""
-    return lambda place: avlmap.where.name_of(place) if avlmap.has(Kind.VIEWS) else None
 
 
 def text_of(answer: "ChangesAnswer", kinds: Iterable[ChangeKind] = ("new", "moved", "gone"), place: str = "") -> str:
@@ -301,16 +287,6 @@ class Usual:
     def to_json(self) -> "UsualAnswer":
         """Return the days as answers have them."""
         return {"there": self.there, "looked": self.looked}
-
-
-def days_of(stored: "AVLMap", corrected: "Callable[[Life], Life]") -> Days:
-    """Return the days of a map. ``QueryError``: it was seen on one day alone."""
-    if not getattr(stored.data.info, "visits", ()):
-        raise QueryError(
-            f"{stored.path.name} was seen on one day alone, so that nobody knows what is usual there; add other days "
-            "with `avlmaps merge`."
-        )
-    return Days.of(stored, corrected)
 
 
 def usual(days: Days, wanted: "Callable[[Stay], bool]") -> list[Usual]:

@@ -96,6 +96,8 @@ def plain_name(name: str) -> str:
 def means(asked: str) -> Callable[[str], bool]:
     """Return whether the name of a thing is meant by a word: it is the same, another word for it, or a narrower one."""
     known, word = lexicon(), plain_name(asked)
+    if known.find(word, EntryKind.THING) is None:
+        word = word.removesuffix(" thing")  # "red thing", of a map of colours
     entry = known.find(word, EntryKind.THING) or known.head(word, EntryKind.THING)
 
     def is_meant(name: str) -> bool:

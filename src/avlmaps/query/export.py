@@ -273,13 +273,6 @@ def to_open3d(points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"]
     return cloud
 
 
-def to_trimesh(points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"]) -> Any:
-    """Return a ``trimesh.PointCloud`` with colours."""
-    import trimesh
-
-    return trimesh.PointCloud(np.asarray(points, np.float64), colors=np.asarray(colors))
-
-
 @contextmanager
 def explain_write_errors(path: Path) -> Generator[None]:
     """Make the folder of a file that is written then; a fault of the disk is one sentence.

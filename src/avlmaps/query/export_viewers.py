@@ -18,6 +18,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import install_command
 from avlmaps.core.files import replacing
 from avlmaps.core.poses import FrameName, inverse, to_quaternion
+from avlmaps.core.registry import Kind
 from avlmaps.query.export import explain_write_errors, heat_colors
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def layers_of(
 
     qx, qy, qz, qw = (float(value) for value in to_quaternion(axes))
     boxes: list[ExportedBox] = []
-    known = "pixels" in stored.data.info.models  # else it names none, and shows the rest
+    known = stored.has(Kind.PIXELS)  # else it names none, and shows the rest
     for thing in opened.things(least_confidence=least_confidence) if known else []:
         corners = space.level(thing.points)
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0

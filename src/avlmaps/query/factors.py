@@ -14,8 +14,8 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.core.question import Part, Role
-from avlmaps.query.scores import share
 from avlmaps.query.voxel_space import Space, middle_of
+from avlmaps.query.words import share
 
 if TYPE_CHECKING:
     from avlmaps.maps.sources.candidates import Spread

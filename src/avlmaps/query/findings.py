@@ -26,10 +26,9 @@ from avlmaps.query.modalities.area import area_anchors, area_names, name_shares
 from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, rooms_of_cells, seen_twice, voting_rows
-from avlmaps.query.scores import Closest
 from avlmaps.query.settings import AreaSettings
 from avlmaps.query.storey_grid import StoreyGrid
-from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary, competes_whole
+from avlmaps.query.words import Closest, ClosestWords, EncodedWord, Vocabulary, competes_whole
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
@@ -294,7 +293,7 @@ class MapRooms:
 
     def _voting_voxels(self) -> NamedVoxels | None:
         # The voxels whose names vote on kinds of room; None where the map holds no probabilities of names.
-        from avlmaps.query.naming import VoxelNamer
+        from avlmaps.query.words import VoxelNamer
 
         try:
             namer = VoxelNamer(self._map)

@@ -15,6 +15,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Question
+from avlmaps.core.registry import Kind
 from avlmaps.core.wording import the_room
 from avlmaps.core.words import stem_of
 from avlmaps.language.list_questions import Listed, ListQuestion
@@ -57,10 +58,10 @@ class _Lists:
         self.avlmap, self.question, self.top, self.ask, self.at = avlmap, question, top, ask, at
 
     def days(self) -> Days:
-        return Days.of(self.avlmap, self.avlmap.edited.life)
+        return Days.of(self.avlmap)
 
     def things(self) -> "list[Thing]":
-        return self.avlmap.things() if "pixels" in self.avlmap.data.info.models else []
+        return self.avlmap.things() if self.avlmap.has(Kind.PIXELS) else []
 
     def answer(
         self, goals: Sequence[Goal], text: str, subject: Answer | None = None, count: int | None = None
@@ -183,7 +184,7 @@ def _heard(lists: _Lists) -> Answer:
         is_so = one < other if question.how == "before" else one > other
         text = f"{'Yes' if is_so else 'No'}: {question.name} at {one:.1f} s, {question.other} at {other:.1f} s."
         return lists.answer(goals, text)
-    room_of = changes.room_namer(lists.avlmap)
+    room_of = lists.avlmap.where.name_of
     rooms = [room_of(sound.position) for sound in found]
     times = [
         f"at {sound.onset_s:.1f} s{f' in the {room}' if room else ''}" for sound, room in zip(found, rooms, strict=True)
@@ -229,7 +230,7 @@ def _changes(lists: _Lists) -> Answer:
     # What is new, gone or moved, in a room or anywhere, and when it was noticed.
     question, days = lists.question, lists.days()
     since = days.visit_of(question.since) if question.since else 0
-    answer = changes.changes_answer(days, lists.avlmap.path.name, since, changes.room_namer(lists.avlmap))
+    answer = changes.changes_answer(days, lists.avlmap.path.name, since, lists.avlmap.where.name_of)
     every: tuple[ChangeKind, ...] = ("new", "moved", "gone")
     kinds: list[ChangeKind] = [kind for kind in every if question.change in ("", kind)]
     listed = [one for one in answer["changes"] if one["kind"] in kinds]
@@ -250,8 +251,7 @@ def _last_seen(lists: _Lists) -> Answer:
     entry = lexicon().head(name, EntryKind.THING)
     if entry is None:
         raise QueryError(f"{name!r} is no thing that is known; name a thing, such as: where was the bag last seen?")
-    is_meant, room_of = changes.is_meant(entry.name), changes.room_namer(lists.avlmap)
-    answer = changes.last_seen(lists.days(), name, is_meant, room_of)
+    answer = changes.last_seen(lists.days(), name, means(entry.name), lists.avlmap.where.name_of)
     goals = [_goal(one["position"], one["confidence"], one["name"]) for one in answer["seen"]]
     whole = lists.answer(goals, changes.last_seen_text(answer))
     return replace(whole, when=tuple(one["last_seen"] for one in answer["seen"]))
@@ -260,11 +260,11 @@ def _last_seen(lists: _Lists) -> Answer:
 def _usual(lists: _Lists) -> Answer:
     # What is usually somewhere, or where a thing usually is, by the days that looked.
     avlmap, name, how = lists.avlmap, lists.question.name, lists.question.how
-    days = changes.days_of(avlmap, avlmap.edited.life)
+    days = Days.of(avlmap, "nobody knows what is usual there")
     if not how:
         meant = means(name)
         found = changes.usual(days, lambda stay: meant(stay.name))
-        text = changes.usual_place_text(days, name, found, changes.room_namer(avlmap))
+        text = changes.usual_place_text(days, name, found, avlmap.where.name_of)
     elif how == "in":
         if not lists.avlmap.where.has(name):
             return lists.answer([], _no_room(name))
@@ -439,7 +439,7 @@ def answer_on_storey(
     if not numbers:
         return _no_such(storeys, word, notes, None if word.lists else ask(word.rest, top))
     if word.lists:
-        things = avlmap.things() if "pixels" in avlmap.data.info.models else []
+        things = avlmap.things() if avlmap.has(Kind.PIXELS) else []
         goals = [goal for goal in map(_thing_goal, things) if storeys is None or _storey(storeys, goal) in numbers]
         likely, text = goals[0].probability if goals else 0.0, _list(word, goals)
         return Answer(tuple(goals[:top]), bool(goals), (), 0.0, None, likely, len(goals), notes, text=text)

@@ -19,6 +19,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.numbers import unmasked
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.wording import option, place_text
+from avlmaps.maps.keyframes.album import local_features
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.pose import PoseSettings, agreement, estimate_pose, pose_deviation, refine_focal
@@ -340,11 +341,8 @@ class _Search:
         keyframes, size = self.stored.keyframes, (self.stored.rig.rgb.width, self.stored.rig.rgb.height)
         keypoint, keyframe, points = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros((0, 3), np.float32)]
         for reference in references:
-            rows = slice(keyframes.offsets[reference], keyframes.offsets[reference + 1])
-            descriptors, score = (one[rows].astype(np.float32) for one in (keyframes.descriptors, keyframes.score))
-            kept = LocalFeatures(xy=keyframes.xy[rows], descriptors=descriptors, score=score, size=size)
-            match = self.stored.encoders.matcher.match(self.local, kept)
-            points_world = keyframes.points_world[rows][match[:, 1]]
+            match = self.stored.encoders.matcher.match(self.local, local_features(keyframes, int(reference), size))
+            points_world = keyframes.points_world[keyframes.offsets[reference] + match[:, 1]]
             has_point = np.isfinite(points_world[:, 0])
             keypoint.append(match[has_point, 0])
             keyframe.append(np.full(int(has_point.sum()), reference))

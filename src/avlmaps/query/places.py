@@ -15,11 +15,12 @@ from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import AskError, QueryError
 from avlmaps.core.poses import FRAME, FrameName, apply
 from avlmaps.core.question import Modality, Part, Role
+from avlmaps.core.registry import Kind
 from avlmaps.core.wording import coordinates
 from avlmaps.query.factors import NearThings
 from avlmaps.query.modalities.area import area_names, pooled_name_shares
-from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
 from avlmaps.query.schema import Frame, Position
+from avlmaps.query.words import VoxelNamer, keyframes_that_saw
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
@@ -177,7 +178,7 @@ def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: fl
 
 
 def _names(avlmap: "AVLMap", rows: Int[np.ndarray, " m"]) -> list[NameScore]:
-    if not len(rows) or "pixels" not in avlmap.data.info.models:
+    if not len(rows) or not avlmap.has(Kind.PIXELS):
         return []
     namer, said = VoxelNamer(avlmap), avlmap.edited.named_at(rows)
     own: list[NameScore] = [] if said is None else [{"name": said, "confidence": 1.0}]
@@ -193,7 +194,7 @@ def _names(avlmap: "AVLMap", rows: Int[np.ndarray, " m"]) -> list[NameScore]:
 
 def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
     stored = avlmap
-    if "views" not in stored.data.info.models or not len(stored.data.keyframes):
+    if not stored.has(Kind.VIEWS) or not len(stored.data.keyframes):
         return []
     encoder = stored.encoders.views
     field = avlmap.room_field

@@ -12,6 +12,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AvlmapsError, QueryError
+from avlmaps.core.registry import Kind
 from avlmaps.core.wording import the_room
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Watch, listed_rooms, put_storeys, require_known
@@ -48,7 +49,7 @@ class MapLists:
         """
 
         def found() -> list[ThingAnswer]:
-            if "pixels" not in self.avlmap.data.info.models:
+            if not self.avlmap.has(Kind.PIXELS):
                 return []
             require_known(self.avlmap.knows, names)
             things = self.avlmap.things(tuple(names) or None, least, structure, watch=self.watch, at=at)
@@ -72,7 +73,7 @@ class MapLists:
         avlmap = self.avlmap
 
         def found() -> list[RoomAnswer]:
-            return listed_rooms(avlmap.rooms() if "views" in avlmap.data.info.models else [], avlmap.storeys)
+            return listed_rooms(avlmap.rooms() if avlmap.has(Kind.VIEWS) else [], avlmap.storeys)
 
         rooms: list[RoomAnswer] = self.once("rooms", found)
         return [room for room in rooms if room["confidence"] >= least]

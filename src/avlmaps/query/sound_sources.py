@@ -15,6 +15,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
 from avlmaps.maps.sources.candidates import CandidateGrid, Density, Spread, log_same_place
 from avlmaps.maps.sources.correlation import SourceSettings
@@ -127,7 +128,7 @@ class SourceMap:
             raise QueryError(unknown_sources(avlmap))
 
         def things(names: Sequence[str]) -> "Sequence[Thing]":
-            if "pixels" not in avlmap.data.info.models:
+            if not avlmap.has(Kind.PIXELS):
                 return ()
             known = [name for name in names if avlmap.knows(name)]
             return avlmap.things(known, 0.3) if known else ()
@@ -293,7 +294,7 @@ class _Places:
 
     @cached_property
     def _things(self) -> "list[Thing]":
-        return self._map.things() if "pixels" in self._map.data.info.models else []
+        return self._map.things() if self._map.has(Kind.PIXELS) else []
 
     def described(self, known: SourceMap, joined: Joined, kind: str, confidence: float) -> SoundSource:
         """Return a source with its region, rooms and things."""

@@ -16,6 +16,7 @@ from avlmaps.core.errors import AvlmapsError, QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.registry import Kind
 from avlmaps.query.contents import UNKNOWN, numbered
+from avlmaps.query.floor_plan import FloorPlan
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
@@ -41,11 +42,14 @@ class Whereabouts:
     """
 
     def __init__(self, avlmap: "AVLMap") -> None:
-        has_rooms, votes = avlmap.has(Kind.VIEWS), avlmap.room_votes
-        self._map, self._plan = avlmap, None if votes is None else votes.plan
+        self._map, has_rooms = avlmap, avlmap.has(Kind.VIEWS)
         self.rooms = tuple(avlmap.rooms()) if has_rooms else ()
         self.names = numbered([room.name for room in self.rooms])
         self.regions = avlmap.room_regions if has_rooms else None
+
+    @cached_property
+    def _plan(self) -> FloorPlan | None:
+        return None if (votes := self._map.room_votes) is None else votes.plan
 
     @property
     def floor_count(self) -> int:

@@ -1,4 +1,4 @@
-"""By how much a queried word wins each voxel, against a vocabulary and "other".
+"""By how much a queried word wins each voxel, against a vocabulary and "other"; what a voxel is taken for.
 
 As in the paper, the queried word competes with a vocabulary and with "other" for every voxel, and wins where it
 is the closest. The margin by which it wins ranks instances and decides absence. An encoder of an open vocabulary gives
@@ -7,21 +7,150 @@ its voxels. Words which name the wanted thing, or a kind of it by the lexicon, d
 """
 
 import hashlib
+import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool, Float16, Float32, Int
+from avlmaps.core.arrays import Bool, Float, Float16, Float32, Int
 from avlmaps.core.columns import take
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.lexicon import EntryKind, lexicon, noun_of
+from avlmaps.core.machine import usable_cores
+from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder, ViewEncoder
-from avlmaps.query import scores
 from avlmaps.query.settings import ObjectSettings
+
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
+
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.voxel_space import Space
+
+# What is computed of every voxel is NumPy, a few rows at a time: loading numba takes longer than one question to a map
+# of a home.
+
+# More threads than this gain little: the loops are bound by memory.
+_MAX_THREADS = 4
+
+
+@cache
+def _pool() -> "ThreadPoolExecutor":
+    from concurrent.futures import ThreadPoolExecutor
+
+    return ThreadPoolExecutor(_threads(), thread_name_prefix="avlmaps-query")
+
+
+@cache
+def _threads() -> int:
+    return max(1, min(_MAX_THREADS, usable_cores()))
+
+
+def share(work: Callable[[int, int], Any], count: int, least: int = 1) -> None:
+    """Call ``work(start, stop)`` for ranges that cover ``range(count)``, on every core when it is worth it."""
+    parts = max(1, min(_threads(), count // max(least, 1)))
+    edges = [count * k // parts for k in range(parts + 1)]
+    if parts == 1:
+        work(0, count)
+        return
+    for future in [_pool().submit(work, a, b) for a, b in itertools.pairwise(edges)]:
+        future.result()
+
+
+# Rows that are widened at once: they stay in the processor's cache.
+_WIDENED = 2_048
+# Fewer rows than this are not worth a thread.
+_LEAST_SHARED = 100_000
+# A float16's bits, moved to where a float32 has them, are the number times 2⁻¹¹²: the exponents' biases differ by that.
+_SIGN_EXPONENT_FRACTION = np.array(0x8FFFE000, np.uint32).view(np.int32)[()]
+_BIAS = np.float32(2.0**112)
+
+
+def feature_scores(
+    feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "k d"], rows: Int[np.ndarray, " m"] | None = None
+) -> Float32[np.ndarray, " m"]:
+    """Return the product of features with one word; of several words, the length of the products with them.
+
+    ``rows``: which features; None for all.
+    """
+    out = np.empty(len(feature) if rows is None else len(rows), np.float32)
+    scaled = np.asarray(words, np.float32) * _BIAS
+
+    def write(start: int, stop: int) -> None:
+        for a, wide in _widened(feature, rows, start, stop):
+            # Row by row: a matrix product sums rows at its edges in another order, and equal ones must stay equal.
+            products = [np.vecdot(wide, word) for word in scaled]
+            out[a : a + len(wide)] = products[0] if len(products) == 1 else np.sqrt(np.square(products).sum(axis=0))
+
+    share(write, len(out), _LEAST_SHARED)
+    return out
+
+
+def _widened(
+    feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"] | None, start: int, stop: int
+) -> Iterator[tuple[int, Float32[np.ndarray, "r d"]]]:
+    # Yield float16 rows as float32, times 2⁻¹¹², a few at a time; the next ones overwrite them. NumPy converts one
+    # number after the other, six times slower.
+    bits = np.asarray(feature, np.float16).view(np.int16)
+    room = np.empty((min(_WIDENED, stop - start), bits.shape[1]), np.int32)
+    for a in range(start, stop, _WIDENED):
+        b = min(a + _WIDENED, stop)
+        wide = room[: b - a]
+        wide[:] = bits[a:b] if rows is None else bits[rows[a:b]]
+        np.left_shift(wide, 13, out=wide)
+        np.bitwise_and(wide, _SIGN_EXPONENT_FRACTION, out=wide)  # the sign was copied to four places
+        yield a, wide.view(np.float32)
+
+
+Closest = tuple[
+    Float32[np.ndarray, " n"], Int[np.ndarray, " n"], Float32[np.ndarray, " n"], Int[np.ndarray, " n"]
+]  # the best score of each voxel and whose it is, and the second best
+
+
+def word_type(words: int) -> type[np.signedinteger]:
+    """Return the type of the number of a word: small, as there is one for each voxel."""
+    return np.int16 if words < 1 << 15 else np.int32
+
+
+def two_closest(feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "v d"]) -> Closest:
+    """Return the two words closest to each feature, of equals the first; −inf and −1 where there are none."""
+    n, kind = len(feature), word_type(len(words))
+    best, second = np.full(n, -np.inf, np.float32), np.full(n, -np.inf, np.float32)
+    best_word, second_word = np.full(n, -1, kind), np.full(n, -1, kind)
+    columns = np.ascontiguousarray(np.asarray(words, np.float32).T) * _BIAS
+
+    def write(start: int, stop: int) -> None:
+        for a, wide in _widened(feature, None, start, stop):
+            scores, rows, here = wide @ columns, np.arange(len(wide)), slice(a, a + len(wide))
+            first = scores.argmax(axis=1)
+            best[here], best_word[here] = scores[rows, first], first
+            if len(words) > 1:
+                scores[rows, first] = -np.inf
+                next_ = scores.argmax(axis=1)
+                second[here], second_word[here] = scores[rows, next_], next_
+
+    if len(words):
+        share(write, n, _LEAST_SHARED)
+    return best, best_word, second, second_word
+
+
+def margins(
+    score: Float32[np.ndarray, " n"], closest: Closest, silent: Bool[np.ndarray, " v"], least: float
+) -> tuple[Float32[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
+    """Return score minus the best competing rival's, and where a third word may be that rival.
+
+    ``least``: what the word must beat in any case.
+    """
+    best, best_word, second, second_word = closest
+    mute = np.append(silent, True)  # number −1 is no word
+    first_mute, second_mute = mute[best_word], mute[second_word]
+    rival = np.where(first_mute, np.where(second_mute, np.float32(-np.inf), second), best)
+    return score - np.maximum(rival, np.float32(least)), first_mute & second_mute & (second_word >= 0)
+
 
 _UNIT = 0.02  # by as much a length may differ from one, as in features of pixels
 
@@ -181,9 +310,9 @@ class Vocabulary:
 
     def closest(self, feature: Float16[np.ndarray, "n d"]) -> "ClosestWords":
         """Score features against the vocabulary."""
-        return self.with_closest(scores.two_closest(feature, self.word_feature))
+        return self.with_closest(two_closest(feature, self.word_feature))
 
-    def with_closest(self, closest: scores.Closest) -> "ClosestWords":
+    def with_closest(self, closest: Closest) -> "ClosestWords":
         """Return the vocabulary with the two words closest to each voxel."""
         return ClosestWords(self.words, self.word_feature, self.understood, self.has_other, *closest)
 
@@ -218,12 +347,12 @@ class ClosestWords(Vocabulary):
         """Return the score of a word at some voxels; that of a name which is one of the two closest is known."""
         own: Int[np.ndarray, " o"] = np.flatnonzero((self.word_feature @ encoded.rows.T > 1.0 - 1e-6).any(axis=1))
         if len(encoded.rows) != 1 or len(own) != 1:
-            return scores.feature_scores(feature, encoded.rows, rows)
+            return feature_scores(feature, encoded.rows, rows)
         first: Bool[np.ndarray, " m"] = self.best_word[rows] == own[0]
         second: Bool[np.ndarray, " m"] = self.second_word[rows] == own[0]
         score = np.where(first, self.best[rows], self.second[rows])
         others = np.flatnonzero(~(first | second))
-        score[others] = scores.feature_scores(feature, encoded.rows, rows[others])
+        score[others] = feature_scores(feature, encoded.rows, rows[others])
         return score
 
     def contenders(
@@ -290,7 +419,7 @@ def margins_of(
     """
     floor = float(np.float32(-np.inf if rivals.has_other else least_score))
     closest = rivals.best, rivals.best_word, rivals.second, rivals.second_word
-    out, unsure = scores.margins(score, closest, silent, floor)
+    out, unsure = margins(score, closest, silent, floor)
     thirds = np.flatnonzero(unsure)
     if len(thirds) and not silent.all():
         others = rivals.word_feature[~silent].T
@@ -321,7 +450,7 @@ def scorer_of(
 
     @cache
     def score_of_all() -> Float32[np.ndarray, " n"]:
-        return scores.feature_scores(feature, encoded.rows)
+        return feature_scores(feature, encoded.rows)
 
     @cache
     def at_least(share: float) -> Scored:
@@ -347,3 +476,105 @@ def least_score_to_count(names: int, share: float) -> float:
     word): the best of them has at least (1 − p / ``CLEARLY_MEANT``) / names. A tenth is ample for rounding to float16.
     """
     return 0.9 * share / math.sqrt(names + 1.0 / CLEARLY_MEANT)
+
+
+_NEAR_M, _FAR_M = 0.1, 8.0  # from how far a keyframe counts as having seen a voxel
+_OWN_VOXELS = 1.5  # a ray ends this far before the voxel itself, in voxels
+
+
+class VoxelNamer:
+    """Names voxels by the pixel encoder's vocabulary.
+
+    Attributes:
+        names: what it distinguishes.
+        calibrated: whether confidences are probabilities; else they are cosines.
+    """
+
+    def __init__(self, stored: "AVLMap", vocabulary: Sequence[str] | None = None) -> None:
+        """Take the encoder's names, or a vocabulary for one that has none of its own.
+
+        ``BackendError``: the map's profile has no pixel encoder. ``MapError``: the map was built with another encoder
+        than is installed.
+        """
+        self._voxels = stored.data.voxels
+        encoder = stored.encoders.pixels
+        stored.require_model(Kind.PIXELS)
+        self._named = isinstance(encoder, NamedPixelEncoder)
+        self._scale = float(encoder.logit_scale) if isinstance(encoder, ScaledEncoder) and not self._named else None
+        if isinstance(encoder, NamedPixelEncoder):
+            names, features = encoder.names, np.asarray(encoder.codes, np.float32)
+        else:
+            names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
+            features = encoded_words(encoder, names) if names else np.zeros((0, 0), np.float32)
+        known = np.any(features != 0.0, axis=1) if len(names) else np.zeros(0, bool)
+        self.names = tuple(name for name, is_known in zip(names, known, strict=True) if is_known)
+        self._columns = np.ascontiguousarray(features[known].T)
+        self.calibrated = self._named or self._scale is not None
+
+    def confidences(self, rows: Int[np.ndarray, " m"]) -> Float32[np.ndarray, "m k"]:
+        """Return how likely each voxel is each name; all zero where the map has no feature."""
+        feature = np.asarray(self._voxels.feature[rows], np.float32)
+        score = feature @ self._columns if len(self.names) else np.zeros((len(rows), 0), np.float32)
+        if self._named:
+            return np.square(np.clip(score, 0.0, 1.0))
+        if self._scale is None or not len(self.names):
+            return np.clip(score, 0.0, 1.0)
+        raised = np.exp(self._scale * (score - score.max(axis=1, keepdims=True)))
+        share = raised / raised.sum(axis=1, keepdims=True)
+        share[~feature.any(axis=1)] = 0.0
+        return share.astype(np.float32)
+
+    def likeliest(self, row: int, most: int = 5) -> list[tuple[str, float]]:
+        """Return the likeliest names of one voxel, best first, each with its confidence."""
+        confidence = self.confidences(np.array([row]))[0]
+        best = np.argsort(-confidence, kind="stable")[:most]
+        return [(self.names[k], float(confidence[k])) for k in best if confidence[k] > 0.0]
+
+    def best(
+        self, rows: Int[np.ndarray, " m"] | None = None, rivals: ClosestWords | None = None
+    ) -> tuple[Int[np.ndarray, " m"], Float32[np.ndarray, " m"]]:
+        """Return for each of some voxels the number of its likeliest name (-1 for none) and its confidence.
+
+        ``rows``: numbers of the voxels in the map; by default all.
+        """
+        rows = np.arange(len(self._voxels)) if rows is None else rows
+        if self._named and rivals is not None and set(rivals.words) == set(self.names):
+            number_of = np.array([*(self.names.index(word) for word in rivals.words), -1], np.int64)
+            confidence = np.square(np.clip(rivals.best[rows], 0.0, 1.0))
+            return np.where(confidence > 0.0, number_of[rivals.best_word[rows]], -1), confidence
+        number, confidence = np.full(len(rows), -1, np.int64), np.zeros(len(rows), np.float32)
+        for start in range(0, len(rows) if self.names else 0, _CHUNK):
+            some = slice(start, start + _CHUNK)
+            share = self.confidences(rows[some])
+            number[some] = share.argmax(axis=1)
+            confidence[some] = np.take_along_axis(share, number[some, None], axis=1)[:, 0]
+        number[confidence <= 0.0] = -1
+        return number, confidence
+
+
+def keyframes_that_saw(stored: "AVLMap", space: "Space", row: int) -> Int[np.ndarray, " k"]:
+    """Return the keyframes that had a voxel in view with nothing of the map in between, the nearest first."""
+    poses = np.asarray(stored.data.keyframes.world_from_camera, np.float64)
+    if not len(poses):
+        return np.zeros(0, np.int64)
+    point = space.centres[row]
+    away = point - poses[:, :3, 3]
+    at = np.einsum("kji,kj->ki", poses[:, :3, :3], away)
+    distance_m = np.linalg.norm(away, axis=1)
+    camera = stored.data.rig.depth
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pixel = camera.project(at)
+    inside = (at[:, 2] > _NEAR_M) & (distance_m < _FAR_M)
+    inside &= np.all((pixel >= 0) & (pixel <= [camera.width, camera.height]), axis=1)
+    candidates = np.flatnonzero(inside)
+    seen = [k for k in candidates if _is_free(space, poses[k, :3, 3], point)]
+    return np.array(sorted(seen, key=lambda k: float(distance_m[k])), np.int64)
+
+
+def _is_free(space: "Space", start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> bool:
+    voxel_m = space.grid.voxel_size_m
+    whole_m = float(np.linalg.norm(end - start))
+    if whole_m <= _OWN_VOXELS * voxel_m:
+        return True
+    along = np.arange(0.5 * voxel_m, whole_m - _OWN_VOXELS * voxel_m, 0.5 * voxel_m)[:, None] / whole_m
+    return not space.holds(np.floor((start + along * (end - start)) / voxel_m).astype(np.int64)).any()

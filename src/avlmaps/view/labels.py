@@ -14,7 +14,7 @@ from avlmaps.core.errors import AvlmapsError, QueryError
 from avlmaps.maps.sources.candidates import CELL_M
 from avlmaps.query.contents import listed_rooms, numbered
 from avlmaps.query.export import heat_colors, shades_of
-from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
+from avlmaps.query.words import VoxelNamer, keyframes_that_saw
 from avlmaps.view.layout import Layout, as_bytes
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from jaxtyping import Bool, Float, Int
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.progress import progress
-from avlmaps.query.naming import VoxelNamer
+from avlmaps.query.words import VoxelNamer
 from avlmaps_sim.bench.harness.figures import (
     chosen_on,
     in_words,
