@@ -96,18 +96,6 @@ def test_exactly_the_request_is_sent_and_nothing_of_the_environment(server: Chat
     assert "another-service" not in str(asked)
 
 
-def test_a_local_server_gets_a_placeholder_for_a_key(server: ChatServer) -> None:
-    server.answer("robot.turn(90)")
-    Endpoint(_settings(server)).complete(_request())
-    assert server.asked[0].headers["authorization"] == "Bearer none"
-
-
-def test_what_is_not_to_be_sent_is_not_sent(server: ChatServer) -> None:
-    server.answer("robot.turn(90)")
-    Endpoint(_settings(server)).complete(_request(temperature=None, seed=None))
-    assert set(server.asked[0].body) == {"model", "messages", "max_tokens"}
-
-
 def test_text_in_parts_and_missing_counts_are_read_all_the_same(server: ChatServer) -> None:
     choice = {"message": {"content": [{"type": "text", "text": "robot."}, {"type": "text", "text": "turn(90)"}]}}
     server.answer(sent(json.dumps({"choices": [choice], "usage": None}).encode()))
@@ -155,24 +143,6 @@ def test_garbage_is_named_and_never_becomes_a_program(server: ChatServer, raw: b
     server.answer(sent(raw))
     assert f"{server.url} does not speak the chat protocol" in _sentence(server)
     assert len(server.asked) == 1
-
-
-def test_a_page_tells_that_the_address_is_no_api(server: ChatServer) -> None:
-    server.answer(sent(b"<!DOCTYPE html><html><body>Welcome</body></html>", kind="text/html"))
-    assert "answered with an HTML page; its address must be that of the API, which mostly ends in /v1" in _sentence(
-        server
-    )
-
-
-def test_a_garbled_compression_is_garbage_too(server: ChatServer) -> None:
-    server.answer(sent(b"not gzip at all", Content_Encoding="gzip"))
-    assert "does not speak the chat protocol" in _sentence(server)
-
-
-@pytest.mark.parametrize("body", [{"choices": []}, {"choices": None}, {}])
-def test_an_answer_without_a_choice_is_named(server: ChatServer, body: dict[str, Any]) -> None:
-    server.answer(sent(json.dumps(body).encode()))
-    assert "answered without any choice" in _sentence(server)
 
 
 def test_an_error_in_the_clothes_of_a_success_is_told(server: ChatServer) -> None:
@@ -229,12 +199,6 @@ def test_a_wait_beyond_the_deadline_is_told_instead(server: ChatServer) -> None:
     server.answer(failed(429, "slow down", Retry_After="3600"))
     assert "too many requests (HTTP 429: “slow down”): try again in 3600 s" in _sentence(server)
     assert len(server.asked) == 1
-
-
-@pytest.mark.parametrize("date", ["Wed, 21 Oct 2015 07:28:00 GMT", "soon", "-5", "nan"])
-def test_odd_dates_to_try_again_do_no_harm(server: ChatServer, date: str) -> None:
-    server.answer(failed(429, Retry_After=date), "robot.turn(90)")
-    assert Endpoint(_settings(server)).complete(_request()).content == "robot.turn(90)"
 
 
 @pytest.mark.parametrize(

@@ -124,22 +124,6 @@ def test_a_command_never_leaves_its_line(command: str) -> None:
     assert said.split() == "".join(c for c in command if c.isprintable() or c.isspace()).split()
 
 
-def test_a_command_with_halves_of_letters_can_be_sent() -> None:
-    assert command_message("go to the caf\udce9") == 'Command: "go to the caf?"'
-
-
-@pytest.mark.parametrize("command", ["", " \n\t", "\x00\x1b"])
-def test_an_empty_command_is_not_sent(command: str) -> None:
-    with pytest.raises(LanguageError, match="The command is empty; say where"):
-        command_message(command)
-
-
-def test_a_command_that_is_too_long_is_not_sent() -> None:
-    command_message("x" * MOST_COMMAND_CHARACTERS)
-    with pytest.raises(LanguageError, match="has 501 characters, more than 500"):
-        command_message("x" * (MOST_COMMAND_CHARACTERS + 1))
-
-
 def test_corrections_are_short_however_long_the_fault_is() -> None:
     assert len(unusable_message("x" * 10_000)) < 1_000
     assert len(program_message("x" * 100_000)) < 5_000

@@ -43,12 +43,6 @@ def test_every_setting_can_come_from_the_environment() -> None:
     )
 
 
-def test_what_is_given_goes_before_the_environment_and_none_is_not_given() -> None:
-    environment = {"AVLMAPS_CHAT_MODEL": "a", "AVLMAPS_CHAT_SEED": "3"}
-    settings = ChatSettings.from_environment(environment, model="b", seed=None)
-    assert (settings.model, settings.seed) == ("b", 3)
-
-
 @pytest.mark.parametrize(
     ("environment", "given", "key"),
     [

@@ -11,7 +11,6 @@ from avlmaps.core.errors import LanguageError, ProgramError
 from avlmaps.language.chat import ChatSettings, ChatTranslator, system_prompt
 from avlmaps.language.chat.translator import check_files
 from avlmaps.language.program import parse_program
-from avlmaps.language.translator import Translator
 
 GO = 'robot.move_to_object("sofa")'
 KEY = "sk-test-8c1f0e77a2"
@@ -38,12 +37,6 @@ def _block(program: str) -> str:
     return f"Here it is:\n```python\n{program}\n```"
 
 
-def test_it_is_a_translator(server: ChatServer) -> None:
-    translator = _translator(server)
-    assert isinstance(translator, Translator)
-    assert translator.name == "chat"
-
-
 def test_a_command_becomes_a_program_with_a_note_of_its_maker(server: ChatServer) -> None:
     server.answer(_block(GO))
     translation = _translator(server).program_for(COMMAND)
@@ -53,12 +46,6 @@ def test_a_command_becomes_a_program_with_a_note_of_its_maker(server: ChatServer
         {"role": "system", "content": system_prompt()},
         {"role": "user", "content": 'Command: "go to the sofa"'},
     ]
-
-
-def test_the_only_model_of_a_server_is_taken(server: ChatServer) -> None:
-    server.answer(_block(GO))
-    assert _translator(server, model=None).program_for(COMMAND).program == GO
-    assert server.asked[0].body["model"] == "test-model"
 
 
 def test_a_program_that_does_not_parse_is_corrected(server: ChatServer) -> None:
@@ -140,13 +127,6 @@ def test_a_model_that_insists_on_asking_alone_is_sent_back_once(server: ChatServ
     assert len(server.asked) == 3
 
 
-def test_several_blocks_are_asked_for_as_one(server: ChatServer) -> None:
-    both = f"{GO}\nrobot.turn(90)"
-    server.answer(f"First:\n{_block(GO)}\nThen:\n{_block('robot.turn(90)')}", _block(both))
-    assert _translator(server).program_for("go to the sofa and turn right").program == both
-    assert "one block with all steps" in server.asked[1].messages[3]["content"]
-
-
 def test_without_rounds_the_first_fault_is_told(server: ChatServer) -> None:
     server.answer("I would go to the sofa.")
     with pytest.raises(
@@ -154,13 +134,6 @@ def test_without_rounds_the_first_fault_is_told(server: ChatServer) -> None:
     ):
         _translator(server, rounds=0).program_for(COMMAND)
     assert len(server.asked) == 1
-
-
-def test_a_tool_call_is_answered_with_what_is_wanted_instead(server: ChatServer) -> None:
-    call = {"id": "1", "type": "function", "function": {"name": "move_to", "arguments": "{}"}}
-    server.answer(said(None, finish="tool_calls", tool_calls=[call]), _block(GO))
-    assert _translator(server).program_for(COMMAND).program == GO
-    assert "There are no tools" in server.asked[1].messages[3]["content"]
 
 
 @pytest.mark.parametrize(

@@ -127,13 +127,6 @@ def test_no_amount_is_made_up(text: str) -> None:
 
 
 @given(text=salads)
-def test_the_same_sentence_is_read_the_same(text: str) -> None:
-    tokens = Sentence(text).tokens
-    reader = learned_reader()
-    assert reader.command(tokens) == reader.command(tokens)
-
-
-@given(text=salads)
 def test_every_line_is_written_well(text: str) -> None:
     tokens = Sentence(text).tokens
     for is_question in (False, True):

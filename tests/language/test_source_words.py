@@ -123,11 +123,6 @@ def test_what_does_something_else_is_none(question: str) -> None:
         read_question(question)
 
 
-@pytest.mark.parametrize("name", ["washing machine", "sewing machine", "running machine"])
-def test_a_machine_that_is_called_by_what_it_does_is_a_thing(name: str) -> None:
-    assert LearnedTranslator(WORDS).program_for(f"go to the {name}").program == f'robot.move_to_object("{name}")\n'
-
-
 @pytest.mark.parametrize("command", ["go back to where you came from", "go to the sofa", "go to the kitchen"])
 def test_a_command_without_a_sound_has_no_place_of_one(command: str) -> None:
     assert places(command) == []

@@ -365,15 +365,6 @@ def test_an_opening_is_a_way_through(way: str) -> None:
     assert read_command(f"go through the {way}").stops is None
 
 
-@pytest.mark.parametrize(
-    "command",
-    ["check the hall is empty, else go to the door", "go to the sofa, otherwise to the bed",
-     "assert you are in the hall, else go to the door"],
-)  # fmt: skip
-def test_a_second_choice_is_not_the_first(command: str) -> None:
-    assert isinstance(stops(command).stops, Refuse | Clarify)
-
-
 def test_told_otherwise_is_no_second_choice() -> None:
     assert read_command("go to the sofa").intents == read_command("I was told otherwise, go to the sofa").intents
 
