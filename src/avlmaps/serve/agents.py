@@ -29,7 +29,7 @@ from avlmaps.core.wording import Spelling, asked_as
 from avlmaps.serve.drawn import small_picture
 from avlmaps.serve.lanes import JSON_TYPE, Cancellation, Report, RequestError, streamed
 from avlmaps.serve.operations import OPERATIONS, Operation, tool_schema
-from avlmaps.serve.requests import NoQuery, PictureQuery, Uploads, file_of, read
+from avlmaps.serve.requests import NoQuery, PictureQuery, files_in, read
 from avlmaps.serve.service import Service, log
 from avlmaps.serve.work import WorkInput, describe_map, encoded, list_maps, picture
 
@@ -298,13 +298,12 @@ async def _content(
     values, most = dict(arguments), service.settings.limits.body_bytes
     name, drawn = values.pop("map", None), values.pop("picture", None)
     served = service.shelf.get(str(name) if name else None)
-    given = {file: values.pop(file, None) for file in one.files}
-    files = {file: file_of(str(text), file, most, reads_files) for file, text in given.items() if text}
-    query, uploads = read(values, one.query), Uploads(**files)
+    files = files_in(values, one.files, most, reads_files)
+    query = read(values, one.query)
     lane = service.slow if one.slow or files else service.quick
 
     def job(watch: Cancellation) -> tuple[Any, bytes | None]:
-        task = WorkInput(served, service.settings.limits, uploads, watch)
+        task = WorkInput(served, service.settings.limits, files, watch)
         answer = one.work(task, query)
         wants = drawn if isinstance(drawn, bool) else str(drawn).lower() in ("true", "1")
         return answer, _drawn(task, one, query, answer) if wants else None

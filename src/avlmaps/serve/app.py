@@ -22,7 +22,7 @@ from avlmaps.serve.agents import AgentServer, agent_endpoint, agent_server
 from avlmaps.serve.guard import AccessGuard, App
 from avlmaps.serve.lanes import JSON_TYPE, Cancellation, RequestError, streamed
 from avlmaps.serve.operations import CONTENT_POLICY, OPERATIONS, Operation, document, html_page
-from avlmaps.serve.requests import PHOTO, Uploads, file_of, lists_of, read
+from avlmaps.serve.requests import PHOTO, Files, files_in, lists_of, read
 from avlmaps.serve.service import Service, error_response
 from avlmaps.serve.work import File, WorkInput, encoded, list_maps
 
@@ -165,14 +165,14 @@ def _endpoint(service: Service, operation: Operation) -> Callable[[Request], Any
 
 async def _answered(service: Service, operation: Operation, request: Request) -> Response:
     served = service.shelf.get(request.path_params["map"])
-    values, uploads = await values_of(request, operation, service.settings.limits.body_bytes)
+    values, files = await values_of(request, operation, service.settings.limits.body_bytes)
     query = read(values, operation.query)
-    lane = service.slow if operation.slow or uploads != Uploads() else service.quick
+    lane = service.slow if operation.slow or files else service.quick
     numbers = {name: value for name, value in request.path_params.items() if name != "map"}
     tag = f'"{served.version}"'
 
     def job(watch: Cancellation) -> Any:
-        made = operation.work(WorkInput(served, service.settings.limits, uploads, watch, numbers), query)
+        made = operation.work(WorkInput(served, service.settings.limits, files, watch, numbers), query)
         return made if isinstance(made, File) else encoded(made)
 
     if isinstance(operation.answer, str):
@@ -202,19 +202,19 @@ def _event(name: str, data: bytes) -> bytes:
     return b"event: " + name.encode() + b"\ndata: " + data + b"\n\n"
 
 
-async def values_of(request: Request, operation: Operation, most_bytes: int) -> tuple[dict[str, Any], Uploads]:
+async def values_of(request: Request, operation: Operation, most_bytes: int) -> tuple[dict[str, Any], Files]:
     """Return the values and the files of a request, as they came; ``requests.read`` makes a request of them."""
     pairs: list[tuple[str, Any]] = request.query_params.multi_items()
     if request.method != "POST":
-        return _values(pairs, operation), Uploads()
+        return _values(pairs, operation), {}
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind in ("multipart/form-data", "application/x-www-form-urlencoded"):
         return await _form(request, operation, pairs)
     body = await request.body()
     if PHOTO in operation.needs and (kind.startswith("image/") or kind == "application/octet-stream"):
-        return _values(pairs, operation), Uploads(photo=body)
+        return _values(pairs, operation), {PHOTO: body}
     if not kind and not body:
-        return _values(pairs, operation), Uploads()
+        return _values(pairs, operation), {}
     if kind != JSON_TYPE:
         photo = "image/jpeg, image/png, " if PHOTO in operation.needs else ""
         forms = " or multipart/form-data" if operation.files else ""
@@ -222,8 +222,8 @@ async def values_of(request: Request, operation: Operation, most_bytes: int) -> 
     if pairs:
         raise RequestError("Values come in the address or in the body, not in both.")
     values = json_object(body)
-    given = {name: values.pop(name, None) for name in operation.files}
-    return values, Uploads(**{name: file_of(str(text), name, most_bytes) for name, text in given.items() if text})
+    files = files_in(values, operation.files, most_bytes)
+    return values, files
 
 
 def json_object(body: bytes) -> dict[str, Any]:
@@ -254,7 +254,7 @@ def _values(pairs: Sequence[tuple[str, Any]], operation: Operation) -> dict[str,
     return values
 
 
-async def _form(request: Request, operation: Operation, pairs: list[tuple[str, Any]]) -> tuple[dict[str, Any], Uploads]:
+async def _form(request: Request, operation: Operation, pairs: list[tuple[str, Any]]) -> tuple[dict[str, Any], Files]:
     files: dict[str, bytes] = {}
     try:
         form = await request.form(max_files=4, max_fields=100, max_part_size=1 << 20)
@@ -271,4 +271,4 @@ async def _form(request: Request, operation: Operation, pairs: list[tuple[str, A
                 where = f"send {wanted}, once" if wanted else "it takes no files"
                 raise RequestError(f"A file called {name[:80]!r} is not taken here, or came twice; {where}.")
             files[name] = await value.read()
-    return _values(pairs, operation), Uploads(**files)
+    return _values(pairs, operation), files

@@ -7,9 +7,8 @@ import base64
 import binascii
 import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -313,31 +312,33 @@ def _words_of(schema: dict[str, Any]) -> str:
     return f"{kind} {low:g} to {high:g}" if low is not None and high is not None else kind
 
 
-@dataclass(frozen=True, slots=True)
-class Uploads:
-    """The files of a request, not decoded yet: bytes of a PNG or JPEG, and of a sound."""
+Files = Mapping[str, bytes]
+"""The files of a request, photo and clip, by these names; not decoded yet."""
 
-    photo: bytes | None = None
-    clip: bytes | None = None
 
-    def attachments(self, limits: Limits) -> Mapping[str, Attachment]:
-        """Decode the files."""
-        found: dict[str, Attachment] = {}
-        if self.photo is not None:
-            found[PHOTO] = Photo(decode_photo(self.photo, limits), focal_35mm_of(self.photo))
-        if self.clip is not None:
-            found[CLIP] = decode_clip(self.clip, limits)
-        return found
+def attachments(files: Files, limits: Limits) -> dict[str, Attachment]:
+    """Decode the files."""
+    found: dict[str, Attachment] = {}
+    if (photo := files.get(PHOTO)) is not None:
+        found[PHOTO] = Photo(decode_photo(photo, limits), focal_35mm_of(photo))
+    if (clip := files.get(CLIP)) is not None:
+        found[CLIP] = decode_clip(clip, limits)
+    return found
 
-    def written(self, folder: Path) -> tuple[str | None, str | None]:
-        """Write the files, which are whole, into a folder; return their names, None for one that is not there."""
-        names: list[str | None] = []
-        for kind, content in ((PHOTO, self.photo), (CLIP, self.clip)):
-            suffix = ".png" if kind == PHOTO else self_contained_suffix(content or b"") or ""
-            names.append(None if content is None else f"{kind}{suffix}")
-            if content is not None:
-                (folder / f"{kind}{suffix}").write_bytes(content)
-        return names[0], names[1]
+
+def written(files: Files, folder: Path) -> dict[str, str]:
+    """Write the files, which are whole, into a folder, and return their names there."""
+    names: dict[str, str] = {}
+    for kind, content in files.items():
+        names[kind] = f"{kind}{'.png' if kind == PHOTO else self_contained_suffix(content) or ''}"
+        (folder / names[kind]).write_bytes(content)
+    return names
+
+
+def files_in(values: dict[str, Any], names: Sequence[str], most_bytes: int, reads_files: bool = False) -> Files:
+    """Take the files out of the values of a request; an empty one is none."""
+    given = {name: values.pop(name, None) for name in names}
+    return {name: file_of(str(text), name, most_bytes, reads_files) for name, text in given.items() if text}
 
 
 def file_of(text: str, what: str, most_bytes: int, reads_files: bool = False) -> bytes:

@@ -114,8 +114,9 @@ def listening_socket(settings: ServeSettings) -> socket.socket:
         ServeError: the port is taken, or the address is none of this machine's.
     """
     host, port = settings.host, settings.port
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+        return socket.create_server((host, port), family=family, dualstack_ipv6=host == "::")
     except OSError as error:
         free = f"{option('port', '0')} for any free one"
         said = {

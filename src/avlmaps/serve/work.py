@@ -54,7 +54,7 @@ from avlmaps.query.words import unknown_note
 from avlmaps.serve import requests
 from avlmaps.serve.drawn import Pyramid, TilesAnswer, full_picture, map_picture, small_picture
 from avlmaps.serve.lanes import Cancellation, RequestError, without_folders
-from avlmaps.serve.requests import AskQuery, NoQuery, RehearseQuery, Uploads, ViewQuery
+from avlmaps.serve.requests import AskQuery, Files, NoQuery, RehearseQuery, ViewQuery
 from avlmaps.serve.settings import Limits
 from avlmaps.serve.shelf import ServedMap, Shelf
 
@@ -65,7 +65,7 @@ class WorkInput:
 
     map: ServedMap
     limits: Limits
-    uploads: Uploads = field(default_factory=Uploads)
+    files: Files = field(default_factory=dict[str, bytes])
     watch: Cancellation = field(default_factory=Cancellation)
     path: dict[str, int] = field(default_factory=dict)
 
@@ -229,7 +229,7 @@ def sound_clip(task: WorkInput, query: requests.NoQuery) -> File:
 
 def ask_map(task: WorkInput, query: requests.AskQuery) -> Answer:
     """Answer a sentence or parts, with the files of the request."""
-    attachments = task.uploads.attachments(task.limits)
+    attachments = requests.attachments(task.files, task.limits)
     return task.map.avlmap.ask(
         query.sentence or "",
         min(query.top, task.limits.goals),
@@ -253,7 +253,7 @@ def ask(task: WorkInput, query: requests.AskQuery) -> QueryAnswer:
 
 def locate(task: WorkInput, query: requests.LocateQuery) -> LocateAnswer:
     """Return what ``avlmaps locate --json`` prints."""
-    photo = task.uploads.attachments(task.limits).get(requests.PHOTO)
+    photo = requests.attachments(task.files, task.limits).get(requests.PHOTO)
     if not isinstance(photo, Photo):
         raise RequestError("There is no photo; send one as the file 'photo' of a form, or as the body.")
     size = {"width": photo.rgb.shape[1], "height": photo.rgb.shape[0]}
@@ -284,7 +284,7 @@ def picture(task: WorkInput, query: requests.PictureQuery) -> File:
     """Return a PNG of an answer, or of the map."""
     values = {name: getattr(query, name) for name in requests.AskQuery.__struct_fields__}
     named = any(values[name] is not None for name in ("object", "sound", "area"))
-    asks = named or bool((query.sentence or "").strip()) or task.uploads != Uploads()
+    asks = named or bool((query.sentence or "").strip()) or task.files
     if not asks and query.intrinsics is None:
         content = map_picture(task.map) if query.size == "full" else small_picture(task.map)
         return File(content, "image/png")
@@ -523,11 +523,10 @@ def ask_in_view(task: WorkInput, query: AskQuery) -> File:
 def rehearse(task: WorkInput, query: RehearseQuery) -> dict[str, Any]:
     """Plan a command on the map; drive it where the server has the robot of a scene."""
     start = None if query.start is None else GroundPose(*(float(word) for word in query.start.split(",")))
-    _ = task.uploads.attachments(task.limits)  # what is no photo and no clip is refused here
+    _ = requests.attachments(task.files, task.limits)  # what is no photo and no clip is refused here
     with tempfile.TemporaryDirectory(prefix="avlmaps-serve-") as name:
         folder = Path(name)
-        photo, clip = task.uploads.written(folder)
-        told = task.map.guide.obey(query.command, start, folder=folder, photo=photo, clip=clip)
+        told = task.map.guide.obey(query.command, start, folder=folder, **requests.written(task.files, folder))
         return _without(told, f"{folder}/")
 
 
