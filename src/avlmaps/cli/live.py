@@ -4,6 +4,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -222,35 +223,30 @@ class LiveFeed:
     """Frames that come into a live map in a thread of their own, to the end of which the map is closed."""
 
     def __init__(self, live: "LiveMap", drive: Callable[[Callable[[], bool]], None]) -> None:
-        self._live, self._drive = live, drive
         self._over = threading.Event()
-        self._fault: BaseException | None = None
-        self._thread = threading.Thread(target=self._run, name="avlmaps-drive", daemon=True)
-        self._thread.start()
+        self._driven = ThreadPoolExecutor(1, "avlmaps-drive").submit(self._run, live, drive)
 
     @property
     def has_ended(self) -> bool:
         """Whether no frame comes any more."""
-        return not self._thread.is_alive()
+        return self._driven.done()
 
     def end(self) -> None:
         """Let it end after the frame that it has, wait until the map is closed, and raise what went wrong."""
         self._over.set()
-        self._thread.join()
-        if self._fault is not None:
-            raise self._fault
+        self._driven.result()
 
-    def _run(self) -> None:
+    def _run(self, live: "LiveMap", drive: Callable[[Callable[[], bool]], None]) -> None:
+        from avlmaps.live.replay import end_drive
+
         try:
-            self._drive(self._over.is_set)
-            from avlmaps.live.replay import end_drive
-
-            end_drive(self._live)
+            drive(self._over.is_set)
+            end_drive(live)
             say("The drive is over; its map is answered on until Ctrl-C.")
-        except BaseException as fault:  # noqa: BLE001 - raised where it is waited for
-            self._fault = fault
-            if self._live.generation:  # else the command ends with it at once
+        except BaseException as fault:
+            if live.generation:  # else the command ends with it at once
                 say(f"note: The drive ended, and no frame comes any more; stop with Ctrl-C. {fault}")
+            raise
 
 
 def serve_while(live: "LiveMap", drive: Callable[[Callable[[], bool]], None], port: int, *, browse: bool) -> None:
