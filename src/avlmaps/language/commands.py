@@ -272,11 +272,7 @@ def _lost_sides(intents: Sequence[Intent], sentence: Sentence) -> tuple[str, ...
 
 
 def _check_length(text: str) -> None:
-    """Refuse a command without a word, or one that is too long.
-
-    Raises:
-        LanguageError: it is.
-    """
+    """Refuse a command without a word, or one that is too long."""
     if not any(mark.isalnum() for mark in text):
         raise LanguageError(f"The command is empty; say it like: {EXAMPLE}.")
     if len(text) > MOST_CHARACTERS:

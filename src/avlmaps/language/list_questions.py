@@ -126,11 +126,7 @@ def _listed(of: Listed, said: dict[str, str | None]) -> ListQuestion | None:
 
 
 def _heard(said: Mapping[str, str | None]) -> ListQuestion | None:
-    """Return the question about a sound, or about the sounds of a room; None where it is about neither.
-
-    Raises:
-        QueryError: it asks for several sounds at once.
-    """
+    """Return the question about a sound, or about the sounds of a room; None where it is about neither."""
     room = said.get("room")
     if room:
         known = lexicon().find(mended(room) or room, EntryKind.ROOM) is not None

@@ -306,11 +306,7 @@ class LocalModel:
 
 
 def _served(file: Path) -> Any:
-    """Return a server of llama.cpp in this process.
-
-    Raises:
-        BackendError: the file is missing, no GGUF or cannot be loaded, or xllamacpp is not installed.
-    """
+    """Return a server of llama.cpp in this process."""
     try:
         with file.open("rb") as opened:
             is_gguf = opened.read(4) == b"GGUF"

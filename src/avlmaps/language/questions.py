@@ -146,11 +146,7 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> A
 
 
 def _likely(reads: Sequence[Read], sentence: Sentence, limits: ReadingLimits) -> Inquiry:
-    """Return the likeliest question.
-
-    Raises:
-        QueryError: it is not likely enough.
-    """
+    """Return the likeliest question."""
     best = reads[0].meaning
     assert isinstance(best, Inquiry)
     alike = sum(one.probability for one in reads if isinstance(one.meaning, Inquiry) and one.meaning.of == best.of)
@@ -200,11 +196,7 @@ def _names_nothing(read: Read) -> bool:
 
 
 def _for_use(sentence: Sentence, use: str, limits: ReadingLimits) -> Inquiry:
-    """Return the question for the things that serve a purpose: "where can I sit near the window?".
-
-    Raises:
-        QueryError: where they should be is not understood.
-    """
+    """Return the question for the things that serve a purpose: "where can I sit near the window?"."""
     names = [name.strip() for name in load_word_classes().lists["uses"][use].split(",")]
     rooms = [token.text for token in sentence.tokens if lexicon().find(token.text, EntryKind.ROOM) is not None]
     near = tuple(Target(TargetKind.AREA, room) for room in rooms if room not in use)
@@ -227,11 +219,7 @@ def _place_of_use(sentence: Sentence, use: str) -> str:
 
 
 def _near(name: str, place: str, sentence: Sentence, limits: ReadingLimits) -> tuple[Target, ...]:
-    """Return what a thing should be near.
-
-    Raises:
-        QueryError: it is not understood.
-    """
+    """Return what a thing should be near."""
     whole = Sentence(f"the {name} {place}", sentence.given)
     for read in learned_reader().question(whole.tokens)[:1]:
         if isinstance(read.meaning, Inquiry) and len(read.meaning.of) == 1 and read.probability >= limits.question:
@@ -247,11 +235,7 @@ def _not_near_itself(target: Target) -> Target:
 
 
 def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
-    """Return a question with names put right.
-
-    Raises:
-        QueryError: it asks for what a map cannot choose, or a name or a file is not known.
-    """
+    """Return a question with names put right."""
     resolver = NameResolver(sentence)
     targets = tuple(_not_near_itself(resolver.resolve(target)) for target in inquiry.of)
     if resolver.problem is not None:
