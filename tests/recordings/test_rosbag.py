@@ -379,7 +379,7 @@ REFUSED: list[tuple[dict[str, Any], dict[str, str], str]] = [
     ({"poses": "none"}, {}, "has no poses: no /tf that moves 'camera_optical', no odometry"),
     ({"poses": "odometry without mount"}, {}, "no static transform from there to the camera 'camera_optical'"),
     ({}, {"rgb": "/left/image"}, "has no image topic '/left/image'"),
-    ({}, {"pose": "/camera/color/image_raw"}, "is of the type sensor_msgs/msg/Image, which holds no poses; name a"),
+    ({}, {"pose": "/camera/color/image_raw"}, "is of the type sensor_msgs/msg/Image, which holds no poses; name one"),
     ({}, {"audio": "/ear"}, r"has no sound topic '/ear' \(it has: none\); name one of them\.$"),
     ({}, {"lidar": "/scan"}, "no 'lidar' among the topics that can be named: rgb, depth, pose"),
 ]

@@ -14,7 +14,7 @@ from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.numbers import as_number
 from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, Sound, require_rate, write_samples
 from avlmaps.recordings.containers import channel_power
-from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
+from avlmaps.recordings.microphones import Microphones
 
 _LOOKS, _LOOK_S = 24, 0.5
 _DEAD_DB = 40.0  # a channel this much below the loudest holds nothing of use
@@ -93,12 +93,6 @@ def with_microphones(track: AudioTrack, microphones: Microphones, files: tuple[P
         )
     heard = next((channel for channel in used if power[channel] > _QUIET * power[list(used)].max()), used[0])
     return replace(track, channel=heard, microphones=microphones, files=())
-
-
-def tracked(track: AudioTrack, given: MicrophoneNumbers, folder: Path) -> AudioTrack:
-    """Return the track of a recording's folder with the microphones that its description gives."""
-    files = tuple(folder / name for name in given.files or ())
-    return with_microphones(track, given.microphones(), files)
 
 
 def read_channels(track: AudioTrack, onset_s: float, offset_s: float) -> ChannelSound:

@@ -13,7 +13,7 @@ from avlmaps.core import poses, timeline
 from avlmaps.core.errors import NoAudioStreamError, RecordingError
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.channels import tracked
+from avlmaps.recordings.channels import with_microphones
 from avlmaps.recordings.corrections import corrected
 from avlmaps.recordings.directions import DIRECTIONS, read_directions
 from avlmaps.recordings.faults import note, report
@@ -128,16 +128,14 @@ def _check_clocks(folder: Path, description: Description, found: "_Pictures", kn
 def _open_audio(
     path: Path, start_s: float, video: VideoFrames | None, first_s: float, microphones: MicrophoneNumbers | None
 ) -> AudioTrack | None:
-    if microphones is not None and microphones.files:
-        track = AudioTrack.open(path / microphones.files[0], start_s=start_s)
-    else:
-        track = open_audio(path, start_s)
-    if track is not None:
-        return track if microphones is None else tracked(track, microphones, path)
-    if video is not None:
+    files = tuple(path / name for name in microphones.files or ()) if microphones is not None else ()
+    track = AudioTrack.open(files[0], start_s=start_s) if files else open_audio(path, start_s)
+    if track is not None and microphones is not None:
+        return with_microphones(track, microphones.microphones(), files)
+    if track is None and video is not None:
         with suppress(NoAudioStreamError):
             return AudioTrack.open(video.path, start_s=start_s or first_s - video.start_s)
-    return None
+    return track
 
 
 def _note_turn(video: VideoFrames | None) -> None:

@@ -268,13 +268,10 @@ def _add_tf(bag: Bag, topic: str, tree: TransformTree, static: bool) -> None:
 
 def _check_pose_topic(bag: Bag, topic: str) -> None:
     found = sorted({connection.msgtype for connection in bag.connections(topic)})
-    if not found:
-        raise RecordingError(f"{bag.path} has no topic {topic!r}; name one that it has (pose=TOPIC).")
     if not set(found) & {*_POSE_TYPES, *_TF_TYPES, _TRANSFORM_TYPE}:
         known = ", ".join(kind.rsplit("/", 1)[1] for kind in (*_POSE_TYPES, _TRANSFORM_TYPE, _TF_TYPES[0]))
-        raise RecordingError(
-            f"{topic!r} of {bag.path} is of the type {found[0]}, which holds no poses; name a topic of {known}."
-        )
+        what = f"is of the type {found[0]}, which holds no poses" if found else "is not there"
+        raise RecordingError(f"The topic {topic!r} of {bag.path} {what}; name one of {known} (pose=TOPIC).")
 
 
 @dataclass(frozen=True, slots=True)

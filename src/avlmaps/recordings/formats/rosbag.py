@@ -148,12 +148,12 @@ def _opened(bag: Bag, topics: RosTopics) -> StoredRecording:
             "nowhere; record /tf with one parent for each frame, or name odometry (pose=/odom)."
         )
     poses, known = tree.root_from(camera_frame, stamps_s)
-    if not known.any():
-        raise RecordingError(no_pose(bag.path, camera_frame, stamps_s, tree))
     camera_from_cloud = None
     if of_points:
         camera_from_cloud, seen = _clouds_in_cameras(bag, depth_topic, camera_frame, tree, depth_s[depth], poses)
         known &= seen
+    if not known.any():
+        raise RecordingError(no_pose(bag.path, camera_frame, stamps_s, tree))
     if not known.all():
         note(f"{int((~known).sum())} of {len(known)} frames lie outside of the known poses and are left out.")
     rows = np.flatnonzero(known)

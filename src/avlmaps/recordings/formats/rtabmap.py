@@ -12,7 +12,7 @@ import sqlite3
 import struct
 import threading
 import zlib
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -143,7 +143,13 @@ def open_rtabmap(path: Path) -> StoredRecording:
             f"{path} has {len(rows)} node(s), and none with colour, depth and calibration; record with "
             "Mem/BinDataKept true (and Mem/ImageKept), or export it again."
         )
-    note(_about_poses(optimised, len(whole)))
+    if optimised:
+        note(f"Poses are the optimised ones of {len(optimised)} of the graph's nodes.")
+    else:
+        note(
+            f"The database has no optimised poses, so that odometry is used for its {len(whole)} nodes, which drifts; "
+            "open it in rtabmap-databaseViewer (or reprocess it) and save to have them."
+        )
     used = [row for row in whole if row[0] in optimised] if optimised else whole
     if not used:
         raise RecordingError(f"{path} has optimised poses for none of its {len(whole)} nodes with pictures.")
@@ -170,15 +176,6 @@ def open_rtabmap(path: Path) -> StoredRecording:
         path=path, format="rtabmap", rig=rig, shots=shots, pictures=_Pictures(database),
         up_in_world=np.array([0.0, 0.0, 1.0]), stored_depth_unit_m=unit_m, begins_s=start_s,
     )  # fmt: skip
-
-
-def _about_poses(optimised: dict[int, np.ndarray], count: int) -> str:
-    if optimised:
-        return f"Poses are the optimised ones of {len(optimised)} of the graph's nodes."
-    return (
-        f"The database has no optimised poses, so that odometry is used for its {count} nodes, which drifts; open it "
-        "in rtabmap-databaseViewer (or reprocess it) and save to have them."
-    )
 
 
 def _version(database: _Database) -> tuple[int, ...]:
@@ -254,14 +251,9 @@ def _calibration(path: Path, node: int, blob: bytes, version: tuple[int, ...]) -
         fx, fy, cx, cy = projection[[0, 5, 2, 6]]
         distortion = distortion[:0]
     base_from_camera = _matrix(np.frombuffer(blob, "<f4", local, size - 4 * local)) if local else np.eye(4)
-    camera = _pinhole(path, node, (fx, fy, cx, cy), (width, height))
-    return _Calibration(camera, base_from_camera, bool(np.abs(distortion).max(initial=0.0) > 1e-9))
-
-
-def _pinhole(path: Path, node: int, numbers: Sequence[float], size: tuple[int, int]) -> Pinhole:
-    fx, fy, cx, cy = numbers
     # OpenCV counts pixel centres as whole numbers
-    return pinhole(path / f"node {node}, calibration", fx, fy, cx + 0.5, cy + 0.5, *size)
+    camera = pinhole(path / f"node {node}, calibration", fx, fy, cx + 0.5, cy + 0.5, width, height)
+    return _Calibration(camera, base_from_camera, bool(np.abs(distortion).max(initial=0.0) > 1e-9))
 
 
 def _rig(path: Path, database: _Database, shots: Shots, camera: Pinhole) -> tuple[Rig, float]:

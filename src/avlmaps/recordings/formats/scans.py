@@ -586,9 +586,8 @@ def open_record3d(path: Path) -> StoredRecording:
     if folder is not None:
         files.unpack_sound(folder)
     audio = open_audio(folder or path, float(given_s[0]))
-    audio = (
-        replace(audio, label=f"{path.name}/{audio.path.name}") if audio is not None and folder is not None else audio
-    )
+    if audio is not None and folder is not None:
+        audio = replace(audio, label=f"{path.name}/{audio.path.name}")
     recording = StoredRecording.settled(
         path, "record3d", rig, shots, lambda _: file, pictures=_Pictures(files),
         up_in_world=UP_IN_WORLD.copy(), audio=audio,
