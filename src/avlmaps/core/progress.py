@@ -89,10 +89,12 @@ def progress(
     )
     _open_bars.append(bar)
     try:
-        for item in items:
+        for number, item in enumerate(items):
             if note is not None:
                 bar.set_postfix_str(printable(note()), refresh=False)
             yield item
+            if not number:  # the first loads models and compiles; the estimate of what is left begins behind it
+                bar.unpause()
             bar.update(size(item))
     finally:
         bar.close()
