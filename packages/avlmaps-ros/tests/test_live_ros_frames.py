@@ -263,6 +263,8 @@ def test_every_channel_is_heard_where_its_microphones_are_described() -> None:
     heard, _ = RosSound("/audio", told.append, Pcm(16_000, 2), microphones=2).take(data, START_S, 10.0) or (None, 0.0)
     assert isinstance(heard, ChannelSound) and not told
     np.testing.assert_allclose(heard.samples, [[0.0, -0.5], [0.5, 0.0]])
+    second = RosSound("/audio", told.append, Pcm(16_000, 2), 1, used=(1,)).take(data, START_S, 10.0)
+    assert second is not None and np.array_equal(second[0].samples, heard.samples[1:])
     sound = RosSound("/audio", told.append, Pcm(16_000, 2), microphones=4)
     for _ in range(3):
         heard, _ = sound.take(data, START_S, 10.0) or (None, 0.0)

@@ -30,7 +30,12 @@ class RosSound:
     """
 
     def __init__(
-        self, topic: str, tell: Callable[[str], None], pcm: Pcm | None = None, microphones: int | None = None
+        self,
+        topic: str,
+        tell: Callable[[str], None],
+        pcm: Pcm | None = None,
+        microphones: int | None = None,
+        used: tuple[int, ...] = (),
     ) -> None:
         """Begin without sound.
 
@@ -39,7 +44,9 @@ class RosSound:
             tell: called with a sentence for each thing that makes sound useless, and when it is of use again.
             pcm: of plain samples; None waits for an AudioInfo.
             microphones: how many are described; None where none are.
+            used: the channels that have them, from 0, where others have none.
         """
+        self._used = list(used)
         self.unheard, self._microphones = 0, microphones
         self._topic, self._pcm, self._rest, self._end_s = topic, pcm, b"", float("-inf")
         self._tell, self._once = tell, Once(tell)
@@ -103,6 +110,8 @@ class RosSound:
             if abs(begin_s - self._end_s) < DRIFT_S:
                 begin_s = self._end_s
         self._end_s = begin_s + length_s
+        if self._used and max(self._used) < samples.shape[1]:
+            samples = samples[:, self._used]
         channels = samples.shape[1]
         if channels == self._microphones:
             return ChannelSound(samples.T.astype(np.float32), pcm.rate_hz), begin_s

@@ -222,8 +222,9 @@ class _Source:
     def _hear(self, kind: str, message: Any, now_s: float) -> None:
         if self._sound is None:
             placed = self._live.microphones
-            microphones = None if placed is None else len(placed)
-            self._sound = RosSound(self._inbox.chosen.get("audio", "sound"), self._tell, self._pcm, microphones)
+            microphones, used = (None, ()) if placed is None else (len(placed), placed.channels)
+            topic = self._inbox.chosen.get("audio", "sound")
+            self._sound = RosSound(topic, self._tell, self._pcm, microphones, used)
         if kind == "audio_info":
             self._sound.inform(message)
         elif (heard := self._sound.take(message, self._ahead_s, now_s)) is not None:
