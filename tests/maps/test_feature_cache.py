@@ -179,20 +179,6 @@ def test_what_was_used_longest_ago_goes_first(tmp_path: Path) -> None:
     assert left == {"new", "old2", "old3", "old1"}, "90 % of the limit is left, the least recently used are gone"
 
 
-@pytest.mark.nightly
-def test_a_build_that_is_larger_than_the_store_keeps_its_first_frames(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    store = FeatureStore(tmp_path, 1e6)
-    store._opened_s -= 10.0
-    for i in range(1200):
-        store.put(Kind.PIXELS, CARD, f"{i:04d}", {"features": np.zeros(420, np.float16)})
-    kept = sorted(file.stem for file in tmp_path.rglob("*.safetensors"))
-    assert kept == [f"{i:04d}" for i in range(len(kept))]
-    assert 800 < len(kept) < 1000
-    assert capsys.readouterr().err.count("cache is full") == 1
-
-
 def test_too_large_features_are_told_once_and_not_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     store = FeatureStore(tmp_path, 1e6)
     for key in "ab":
@@ -363,18 +349,6 @@ def test_a_map_is_the_same_with_the_cache_and_without(torch_like: Encoders, tmp_
         ("filled", CacheSettings(tmp_path / "store")),
     ):
         build_map(Walk(), tmp_path / name, torch_like, SETTINGS, cache=cache)
-    assert array_files(tmp_path / "none") == array_files(tmp_path / "filling") == array_files(tmp_path / "filled")
-
-
-@pytest.mark.nightly
-def test_the_same_holds_for_small_models_whose_features_are_not_rounded(tmp_path: Path, home: Path) -> None:
-    small = counted("counted")
-    build_map(Walk(), tmp_path / "none", small, SETTINGS)
-    assert not home.exists(), "off by default: they are quick"
-    for name in ("filling", "filled"):
-        COUNTS.clear()
-        build_map(Walk(), tmp_path / name, small, SETTINGS, cache=CacheSettings(tmp_path / "store"))
-    assert COUNTS == {}
     assert array_files(tmp_path / "none") == array_files(tmp_path / "filling") == array_files(tmp_path / "filled")
 
 

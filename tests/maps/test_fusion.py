@@ -71,16 +71,6 @@ def test_merging_is_the_same_as_going_on_adding(seed):
     assert_same_sums(resumed.sums(), fuse(pairs, 5).sums())
 
 
-def test_first_sighting_counts_once():
-    feature = np.array([[[3.0, 4.0]]], np.float32)
-    frame = frame_of([[2.0]])
-    sums = fuse([(frame, feature)], 2).sums()
-    weight = np.exp(-(2.0**2) / 1.2)
-    np.testing.assert_allclose(sums.weight, [weight], rtol=1e-12)
-    np.testing.assert_allclose(sums.feature_sum, weight * feature[0], rtol=1e-6)
-    np.testing.assert_array_equal(fuse([(frame, feature)], 2).voxels().feature, np.array([[0.6, 0.8]], np.float16))
-
-
 def test_two_sightings_make_the_weighted_mean():
     near, far = frame_of([[1.01]]), frame_of([[1.02]])
     sums = fuse([(near, np.float32([[[1, 0]]])), (far, np.float32([[[0, 1]]]))], 2).sums()
@@ -146,12 +136,6 @@ def test_depth_that_is_none_adds_nothing():
     assert len(accumulator) == 0
     assert accumulator.sums().feature_sum.shape == (0, 4)
     assert len(accumulator.voxels()) == 0
-
-
-def test_the_limits_of_depth_are_within():
-    depth = np.float32([[0.5, 0.75, 1.0, 1.25, 1.5]])
-    settings = FusionSettings(min_depth_m=0.75, max_depth_m=1.25)
-    assert VoxelAccumulator(GRID, 0, settings).add(frame_of(depth)) == 3
 
 
 def test_a_feature_of_zeros_adds_geometry_and_colour_but_no_feature():

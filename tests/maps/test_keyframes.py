@@ -21,7 +21,7 @@ from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.images import depth_in_colour
 from avlmaps.recordings.types import Frame
-from helpers.picture_room import CAMERA, RoomWalk, distance_to_surface_m, looking
+from helpers.picture_room import CAMERA, RoomWalk, distance_to_surface_m
 
 SETTINGS = KeyframeSettings(translation_m=0.2, rotation_deg=10.0, max_gap_s=2.0)
 APART = np.eye(4)
@@ -145,10 +145,6 @@ def test_holes_and_far_depths_are_not_lifted_and_a_few_lost_pixels_do_no_harm() 
     assert points[1, 2] == 1.5
 
 
-def test_no_keypoints_give_no_points() -> None:
-    assert lift_keypoints(np.zeros((0, 2), np.float32), RoomWalk().frame(0), 6.0).shape == (0, 3)
-
-
 def test_the_nearer_of_two_surfaces_hides_the_other_in_the_colour_camera() -> None:
     rgb_from_depth = np.eye(4)
     rgb_from_depth[0, 3] = -0.2  # so far to the side that the post hides another part of the wall
@@ -224,8 +220,3 @@ def test_no_keyframes_are_a_map_without_pictures() -> None:
     assert len(keyframes) == 0
     assert keyframes.world_from_camera.shape == (0, 4, 4)
     np.testing.assert_array_equal(keyframes.offsets, [0])
-
-
-def test_looking_makes_a_level_camera() -> None:
-    pose = looking((0.0, 0.0, 1.0), (1.0, 0.0, 1.0))
-    np.testing.assert_allclose(pose[:3, :3], [[0, 0, 1], [-1, 0, 0], [0, -1, 0]], atol=1e-12)

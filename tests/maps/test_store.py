@@ -28,7 +28,6 @@ from avlmaps.maps.store.edits import read_edits
 from avlmaps.maps.store.folder import damaged_files, has_unfinished_build, read, write
 from avlmaps.maps.store.map_data import encoders_of_map, require_model
 from avlmaps.maps.store.tables import EDITING, LOCK, is_locked, lock_folder, read_arrays, write_arrays
-from avlmaps.maps.types import Keyframes, Voxels
 
 PROFILE = register_fakes()
 OLD = Path(__file__).with_name("data") / "schema1"
@@ -277,9 +276,3 @@ def test_a_map_replaced_while_it_is_opened_is_opened_anew(copied: Path, monkeypa
 
     monkeypatch.setattr(folder, "_read", slow)
     assert read(copied).info.build_key == "another"
-
-
-def test_types_say_what_they_are() -> None:
-    none = np.zeros(0)
-    assert "0 with features" in repr(Voxels(np.zeros((0, 3), np.int32), np.zeros((0, 4), np.float16), *(none,) * 4))  # pyright: ignore[reportArgumentType]
-    assert len(Keyframes.RAGGED) == 2
