@@ -293,10 +293,12 @@ def shown(figure: Figure, found: Mapping[str, Any] | None) -> str:
 
 
 def is_there(figure: Figure, found: Mapping[str, Any]) -> bool:
-    """Return whether a result is in what a command printed; of a table some row will do."""
+    """Return whether a result is in what a command printed: of any size, and of a table in some row."""
     if shown(figure, found) != NOT_YET:
         return True
-    tables = found["answer"]["tables"] if figure.table else {}
+    if not figure.table:
+        return re.search(re.sub(r"\d[\d,]*", r"[\\d,]+", figure.row), found["text"]) is not None
+    tables = found["answer"]["tables"]
     wanted = {word.removeprefix("+") for word in re.findall(r"\{([^}]+)\}", figure.form)}
     return any(name.startswith(figure.table) and wanted <= set(one["columns"]) for name, one in tables.items())
 
