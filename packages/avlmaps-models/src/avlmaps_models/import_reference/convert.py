@@ -176,7 +176,7 @@ def _converted(source: ReferenceVoxels, walk: Walk, settings: ImportSettings, gr
         first, end = np.searchsorted(rows, (part.rows.start, part.rows.stop))
         local = rows[first:end] - part.rows.start
         kept = usable[local]
-        table.add(_sums(part, local[kept], index[first:end][kept]))
+        table.merge(_sums(part, local[kept], index[first:end][kept]))
     if left_out > settings.max_bad_share * len(source) or left_out == len(source):
         raise MapError(
             f"{source.path}: {left_out} of {len(source)} voxels hold NaN, infinity or a colour or weight that is none "
