@@ -155,7 +155,7 @@ def test_lseg_itself_is_taken_though_its_weights_are_not_known(dim: int, importe
         heat = stored.object("sofa", primary=True)
         assert heat.values.min() >= 0.0 and np.isfinite(heat.values).all()
     else:
-        with pytest.raises(MapError, match="have 512 numbers, those of demo_e200.ckpt 32"):
+        with pytest.raises(MapError, match=r"have 512 numbers, those of demo_e200\.ckpt 32"):
             stored.require_model(Kind.PIXELS)
     registry.forget_loaded()
 
