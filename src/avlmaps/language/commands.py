@@ -103,7 +103,7 @@ def _branched(text: str, given: Attachments | None) -> Command | None:
     said = " ".join(token.text for token in tokenise(text))
     found = next(filter(None, (says.fullmatch(said) for says, _ in forms("condition"))), None)
     parts = {} if found is None else found.groupdict()
-    what = parts.get("what") or ""
+    what = re.sub(r" (?:is|are|'s)(?: not| n't)? ", " ", parts.get("what") or "")
     thing = _thing(what, given) if what else None
     if found is None or (what and (thing is None or is_entry(f"{what} {parts['then'].split()[0]}"))):
         return None
@@ -132,7 +132,7 @@ def _thing(what: str, given: Attachments | None) -> Target | None:
     alive = claimed_words("persons") | claimed_words("living") | claimed_words("passing")
     thing = inquiry.of[0]
     is_thing = thing.kind in (TargetKind.OBJECT, TargetKind.AREA) and what.startswith(thing.name)
-    alone = inquiry.ask is Ask.EXISTS and len(inquiry.of) == 1 and alive.isdisjoint(what.split())
+    alone = inquiry.ask is Ask.EXISTS and len(inquiry.of) == 1 and thing.name.split()[-1] not in alive
     return thing if is_thing and alone else None
 
 
@@ -140,7 +140,7 @@ def _named(clause: str, what: str) -> str:
     """Return the steps of a condition with its thing in the place of "it", "one" and "there"."""
     if not what:
         return clause
-    named = re.sub(r"\b(?:it|them|one of them|that one|one)\b", f"a {what}", clause)
+    named = re.sub(r"\b(?:it|her|them|one of them|that one|one)\b", f"a {what}", clause)
     return re.sub(r"^((?:go|drive|move|head|run|come) (?:over |straight )?)(?:to )?there\b", rf"\1to a {what}", named)
 
 
