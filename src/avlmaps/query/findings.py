@@ -25,7 +25,7 @@ from avlmaps.query.instances import FeatureVoxels, Instances, Segmentation, conf
 from avlmaps.query.modalities.area import area_anchors, area_names, name_shares
 from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.room_regions import RoomRegions
-from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, rooms_of_cells, seen_twice, voting_rows
+from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, rooms_of_cells, voting_rows
 from avlmaps.query.settings import AreaSettings
 from avlmaps.query.storey_grid import StoreyGrid
 from avlmaps.query.words import Closest, ClosestWords, EncodedWord, Vocabulary, competes_whole
@@ -260,9 +260,7 @@ class MapRooms:
         if votes is None:
             return None
         known = regions_from(self._map.data.findings, votes.plan)
-        regions = self._seen_regions(votes) if known is None else known
-        field = self.known_field
-        return regions if field is None else regions.joined(seen_twice(field, regions))
+        return self._seen_regions(votes) if known is None else known
 
     def _seen_regions(self, votes: Rooms) -> RoomRegions:
         camera = self._map.data.rig.depth

@@ -362,14 +362,6 @@ class RoomRegions:
         """Of each room, the number of rooms that one can see into through its openings."""
         return np.bincount(self.beside.reshape(-1), minlength=self.count)
 
-    def joined(self, pairs: Int[np.ndarray, "p 2"]) -> "RoomRegions":
-        """Return the rooms where those of each pair are one."""
-        number = connected(self.count, pairs[:, 0], pairs[:, 1])
-        labels = tuple(np.where(label >= 0, number[label], NONE) for label in self.labels)
-        beside = np.unique(np.sort(number[self.beside], axis=1), axis=0)
-        beside = beside[beside[:, 0] != beside[:, 1]].reshape(-1, 2)
-        return RoomRegions(self.plan, self.grids, labels, int(number.max(initial=-1)) + 1, beside)
-
     @cached_property
     def areas_m2(self) -> Float[np.ndarray, " r"]:
         """Floor area of each room."""

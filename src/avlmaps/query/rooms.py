@@ -116,8 +116,6 @@ FEWEST_VIEWS = 2
 """A room is listed where at least this many keyframes show it."""
 LEAST_PART, _LEAST_PART_M2 = 0.2, 1.0  # of an open plan's floor
 _OPEN = ("kitchen", "living room", "dining room", "office", "reception")  # kinds that may be parts of an open plan
-# Two such rooms side by side are one, seen in two parts.
-_ONE_IF_BESIDE = ("kitchen", "living room", "dining room", *_PASSAGES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,16 +235,6 @@ class RoomField:
         share = self.share.copy()
         share[inside] = np.where(parts.any(axis=1, keepdims=True), in_parts, whole)
         return replace(self, share=share, rooms=(regions, room_of_cell))
-
-
-def seen_twice(field: RoomField, regions: RoomRegions) -> Int[np.ndarray, "p 2"]:
-    """Return the pairs of rooms beside each other that are surely of one kind of which homes have one: a kitchen."""
-    share = field.whole_rooms(regions)
-    is_single = _among(field.kinds, _ONE_IF_BESIDE)
-    one_kind = ~field.parts_of_rooms(regions).any(axis=1)
-    kind = np.where(one_kind & (share.max(axis=1, initial=0.0) >= FOUND_AT), share.argmax(axis=1), -1)
-    a, b = regions.beside.T
-    return regions.beside[(kind[a] == kind[b]) & (kind[a] >= 0) & is_single[kind[a]]]
 
 
 def rooms_of_cells(regions: RoomRegions, places: Float[np.ndarray, "k 3"]) -> Int[np.ndarray, " c"]:
