@@ -22,6 +22,7 @@ from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.channels import ChannelSound
 from avlmaps.recordings.formats.ros_messages import RosTopics
 from avlmaps.recordings.formats.ros_sound import Pcm
+from avlmaps.recordings.microphones import Microphones
 from avlmaps_ros.live.directions import HELD, RosDirections
 from avlmaps_ros.live.frames import PARTNER_WITHIN_S, POSE_WITHIN_S, RosFrames
 from avlmaps_ros.live.sound import RosSound
@@ -260,12 +261,14 @@ def test_every_channel_is_heard_where_its_microphones_are_described() -> None:
     samples = np.array([[0, 16384], [-16384, 0]], "<i2")
     data = SimpleNamespace(data=np.frombuffer(samples.tobytes(), np.uint8))
     told: list[str] = []
-    heard, _ = RosSound("/audio", told.append, Pcm(16_000, 2), microphones=2).take(data, START_S, 10.0) or (None, 0.0)
+    two, four = (Microphones(0.1 * np.eye(4, 3)[:count]) for count in (2, 4))
+    heard, _ = RosSound("/audio", told.append, Pcm(16_000, 2), two).take(data, START_S, 10.0) or (None, 0.0)
     assert isinstance(heard, ChannelSound) and not told
     np.testing.assert_allclose(heard.samples, [[0.0, -0.5], [0.5, 0.0]])
-    second = RosSound("/audio", told.append, Pcm(16_000, 2), 1, used=(1,)).take(data, START_S, 10.0)
+    one = Microphones(np.zeros((1, 3)), channels=(1,))
+    second = RosSound("/audio", told.append, Pcm(16_000, 2), one).take(data, START_S, 10.0)
     assert second is not None and np.array_equal(second[0].samples, heard.samples[1:])
-    sound = RosSound("/audio", told.append, Pcm(16_000, 2), microphones=4)
+    sound = RosSound("/audio", told.append, Pcm(16_000, 2), four)
     for _ in range(3):
         heard, _ = sound.take(data, START_S, 10.0) or (None, 0.0)
         assert isinstance(heard, Sound) and len(heard.samples) == 2

@@ -12,6 +12,7 @@ from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.channels import ChannelSound
 from avlmaps.recordings.formats.ros_messages import stamp_of
 from avlmaps.recordings.formats.ros_sound import Pcm, sampled_pieces
+from avlmaps.recordings.microphones import Microphones
 
 DRIFT_S = 0.1
 """Sound without stamps is given a place again where it is off by more than this, seconds."""
@@ -30,12 +31,7 @@ class RosSound:
     """
 
     def __init__(
-        self,
-        topic: str,
-        tell: Callable[[str], None],
-        pcm: Pcm | None = None,
-        microphones: int | None = None,
-        used: tuple[int, ...] = (),
+        self, topic: str, tell: Callable[[str], None], pcm: Pcm | None = None, microphones: Microphones | None = None
     ) -> None:
         """Begin without sound.
 
@@ -43,10 +39,8 @@ class RosSound:
             topic: name, for sentences.
             tell: called with a sentence for each thing that makes sound useless, and when it is of use again.
             pcm: of plain samples; None waits for an AudioInfo.
-            microphones: how many are described; None where none are.
-            used: the channels that have them, from 0, where others have none.
+            microphones: where they are, so that every channel is heard; None mixes them.
         """
-        self._used = list(used)
         self.unheard, self._microphones = 0, microphones
         self._topic, self._pcm, self._rest, self._end_s = topic, pcm, b"", float("-inf")
         self._tell, self._once = tell, Once(tell)
@@ -87,8 +81,6 @@ class RosSound:
     def take(self, message: Any, ahead_s: float | None, now_s: float) -> tuple[Sound | ChannelSound, float] | None:
         """Return a message's sound, and when it begins; None where it cannot be used, which is counted.
 
-        It has every channel where their microphones are described; else channels are mixed.
-
         Args:
             message: AudioStamped, AudioDataStamped or AudioData.
             ahead_s: by how much the pictures' stamps are ahead of this machine's clock; None before the first.
@@ -99,9 +91,9 @@ class RosSound:
         if pcm is None or not (is_stamped or ahead_s is not None):
             self.unheard += 1
             return None
-        length_s = len(samples) / pcm.rate_hz
         if not len(samples):
             return None
+        length_s = len(samples) / pcm.rate_hz
         if is_stamped:
             begin_s = stamp_of(message)
         else:
@@ -110,14 +102,13 @@ class RosSound:
             if abs(begin_s - self._end_s) < DRIFT_S:
                 begin_s = self._end_s
         self._end_s = begin_s + length_s
-        if self._used and max(self._used) < samples.shape[1]:
-            samples = samples[:, self._used]
-        channels = samples.shape[1]
-        if channels == self._microphones:
-            return ChannelSound(samples.T.astype(np.float32), pcm.rate_hz), begin_s
-        if self._microphones is not None:
+        if (placed := self._microphones) is not None:
+            if placed.channels and max(placed.channels) < samples.shape[1]:
+                samples = samples[:, list(placed.channels)]
+            if samples.shape[1] == len(placed):
+                return ChannelSound(samples.T.astype(np.float32), pcm.rate_hz), begin_s
             self._once(
-                f"The sound on {self._topic} has {channels} channel(s), but {self._microphones} microphone(s) are "
+                f"The sound on {self._topic} has {samples.shape[1]} channel(s), but {len(placed)} microphone(s) are "
                 "described, so that they are mixed into one and where sounds came from is not known; give one position "
                 f"for each channel ({option('microphones', 'FILE')})."
             )

@@ -221,10 +221,8 @@ class _Source:
 
     def _hear(self, kind: str, message: Any, now_s: float) -> None:
         if self._sound is None:
-            placed = self._live.microphones
-            microphones, used = (None, ()) if placed is None else (len(placed), placed.channels)
             topic = self._inbox.chosen.get("audio", "sound")
-            self._sound = RosSound(topic, self._tell, self._pcm, microphones, used)
+            self._sound = RosSound(topic, self._tell, self._pcm, self._live.microphones)
         if kind == "audio_info":
             self._sound.inform(message)
         elif (heard := self._sound.take(message, self._ahead_s, now_s)) is not None:
