@@ -172,10 +172,9 @@ def test_what_is_no_piece_of_the_track_is_refused_and_costs_nothing(
 def test_a_gap_of_half_a_minute_is_silence_on_every_channel(tmp_path: Path) -> None:
     track, piece = GrowingTrack(tmp_path / "track.f32"), ChannelSound(np.full((2, 100), 0.5, np.float32), RATE_HZ)
     track.add(piece, 0.0)
-    added = track.add(piece, 25.5)
+    track.add(piece, 25.5)
     whole = track.track
-    assert whole is not None and sum(len(one.samples) for one in added) == 25.5 * RATE_HZ
-    assert max(one.duration_s for one in added) <= 10.0 and (track.gaps, track.gap_s) == (1, pytest.approx(25.49375))
+    assert whole is not None and (track.gaps, track.gap_s) == (1, pytest.approx(25.49375))
     every = read_channels(whole, 0.0, whole.end_s).samples
     np.testing.assert_array_equal(np.flatnonzero(every[1]), [*range(100), *range(408_000, 408_100)])
 

@@ -49,8 +49,8 @@ def room_map(walk: Path) -> Path:
 
 
 def asked(word: str, encoder: object) -> Question | None:
-    data = SimpleNamespace(info=SimpleNamespace(models={"pixels": None}, doubts=()))
-    avlmap = SimpleNamespace(data=data, encoders=SimpleNamespace(pixels=encoder))
+    data = SimpleNamespace(info=SimpleNamespace(doubts=()))
+    avlmap = SimpleNamespace(data=data, encoders=SimpleNamespace(pixels=encoder), has=lambda kind: kind is Kind.PIXELS)
     return thing_alone(Asked(sentence=word), avlmap)  # pyright: ignore[reportArgumentType]
 
 
