@@ -176,6 +176,7 @@ def test_a_gap_of_half_a_minute_is_silence_on_every_channel(tmp_path: Path) -> N
     whole = track.track
     assert whole is not None and (track.gaps, track.gap_s) == (1, pytest.approx(25.49375))
     every = read_channels(whole, 0.0, whole.end_s).samples
+    assert every.shape == (2, 25.5 * RATE_HZ + 100)
     np.testing.assert_array_equal(np.flatnonzero(every[1]), [*range(100), *range(408_000, 408_100)])
 
 

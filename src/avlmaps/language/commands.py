@@ -140,7 +140,7 @@ def _named(clause: str, what: str) -> str:
     """Return the steps of a condition with its thing in the place of "it", "one" and "there"."""
     if not what:
         return clause
-    named = re.sub(r"\b(?:it|her|them|one of them|that one|one)\b", f"a {what}", clause)
+    named = re.sub(r"\b(?:it|her(?! [a-z])|them|one of them|that one|one)\b", f"a {what}", clause)
     return re.sub(r"^((?:go|drive|move|head|run|come) (?:over |straight )?)(?:to )?there\b", rf"\1to a {what}", named)
 
 
@@ -264,9 +264,8 @@ def _without_effect(sentence: Sentence) -> list[str]:
 def _lost_sides(intents: Sequence[Intent], sentence: Sentence) -> tuple[str, ...]:
     """Return a note for each side ("the chair left of the table") that only says which thing is meant."""
     steps = steps_of(intents)
-    if any(
-        isinstance(step, act.Beside | act.Face | act.StopAt) for step in steps
-    ):  # the side is where it drives or looks
+    # The side is where it drives or looks.
+    if any(isinstance(step, act.Beside | act.Face | act.StopAt) for step in steps):
         return ()
     return sentence.side_notes if any(target.near for intent in intents for target in targets_of(intent)) else ()
 

@@ -49,8 +49,8 @@ class Exported(nn.Module):
         self.places = nn.Parameter((words.position_embeddings.weight[:MOST_PIECES] + kind).detach())
         self.norm, self.layers, self.head = words.LayerNorm, judge.model.encoder.layer, judge.head
 
-    def forward(self, pieces: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the logit of a sentence of shape (1, n), and the states of its pieces (1, n, 384)."""
+    def forward(self, pieces: Tensor) -> Tensor:
+        """Return the logit of a sentence of shape (1, n)."""
         count = pieces.shape[1]
         states = self.norm(self.words(pieces) + self.places[:count])
 
@@ -64,7 +64,7 @@ class Exported(nn.Module):
             states = out.LayerNorm(states + out.dense(heeded.transpose(1, 2).reshape(1, count, 384)))
             wide = nn.functional.gelu(layer.intermediate.dense(states))
             states = layer.output.LayerNorm(states + layer.output.dense(wide))
-        return self.head(states.mean(1))[:, 0], states
+        return self.head(states.mean(1))[:, 0]
 
 
 def fitted(folder: str) -> Judge:
@@ -106,8 +106,7 @@ def main(folder: str) -> None:
         graph = f"{where}/gate.onnx"
         torch.onnx.export(
             Exported(judge, kept).eval(), (torch.zeros(1, 12, dtype=torch.long),), graph, input_names=["pieces"],
-            output_names=["logit", "states"], dynamic_axes={"pieces": {1: "n"}, "states": {1: "n"}},
-            opset_version=17, dynamo=False,
+            output_names=["logit"], dynamic_axes={"pieces": {1: "n"}}, opset_version=17, dynamo=False,
         )  # fmt: skip
         quantize_dynamic(graph, str(OUT / "gate.onnx"), weight_type=QuantType.QInt8, per_channel=True)
     facts = {"limit": LIMIT, "pieces": [entries[at] for at in kept]}
