@@ -11,14 +11,9 @@ NUMBER = st.floats(-3.0, 3.0, allow_nan=False)
 POSES = st.builds(GroundPose, NUMBER, NUMBER, NUMBER)
 
 
-def near(one: GroundPose, other: GroundPose) -> bool:
-    """Return whether two poses agree to a billionth."""
-    turn = np.angle(np.exp(1j * (one.heading_rad - other.heading_rad)))
-    return one.distance_m(other) < 1e-9 and abs(turn) < 1e-9
-
-
 @given(POSES)
 def test_left_undoes_right_and_stop_does_nothing(pose):
-    assert near(pose.after(Action.LEFT).after(Action.RIGHT), pose)
+    back = pose.after(Action.LEFT).after(Action.RIGHT)
+    assert back.distance_m(pose) < 1e-9 and abs(np.angle(np.exp(1j * (back.heading_rad - pose.heading_rad)))) < 1e-9
     assert pose.after(Action.STOP) == pose
     assert pose.after(Action.FORWARD).distance_m(pose) == pytest.approx(FORWARD_M)

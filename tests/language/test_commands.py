@@ -155,9 +155,9 @@ def test_a_command_may_depend_on_whether_there_is_a_thing(command: str, meant: I
 
 @pytest.mark.parametrize(
     "command",
-    ["if there is a person in the kitchen go to the sofa", "if it rains go to the sofa", "if the door is open go there",
-     "if there is a sofa drive through the wall", "go to the kitchen unless there is no fridge there",
-     "if the lamp is on go to the sofa",
+    ["if there is a person in the kitchen go to the sofa", "if it rains go to the sofa",
+     "if the door is open go there", "if there is a sofa drive through the wall",
+     "go to the kitchen unless there is no fridge there", "if the lamp is on go to the sofa",
      "if there is a sofa stop going to the kitchen", "if there is a sofa, and a chair, go to the sofa",
      "when you have been to the kitchen, no sofa"],
 )  # fmt: skip

@@ -22,6 +22,7 @@ from avlmaps.days.together import build_together
 from avlmaps.maps.build import build_map
 from avlmaps.maps.cluster import ClusterWorkers, RayPool
 from avlmaps.perception.encoders import encoders_of
+from avlmaps.query.avlmap import with_findings
 
 PROFILE = register_fakes()
 # It is not imported here: what it may listen on it asks once, when it is.
@@ -43,7 +44,7 @@ def audio(folder: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def alone(folder: Path, audio: Path) -> dict[str, bytes]:
-    build_map(open_walk(audio), folder / "alone", PROFILE, SETTINGS, progress=False)
+    build_map(open_walk(audio), folder / "alone", PROFILE, SETTINGS, progress=False, finds=with_findings)
     return content_of(folder / "alone")
 
 
@@ -57,7 +58,7 @@ def pool() -> Iterator[RayPool]:
 
 def build(path: Path, pool: RayPool, audio: Path, slow_s: float = 0.0) -> dict[str, bytes]:
     workers = ClusterWorkers(pool, partial(open_walk, audio, slow_s=slow_s))
-    build_map(open_walk(audio), path, PROFILE, SETTINGS, workers=workers, progress=False)
+    build_map(open_walk(audio), path, PROFILE, SETTINGS, workers=workers, progress=False, finds=with_findings)
     return content_of(path)
 
 

@@ -3,6 +3,7 @@
 ``ANSWERS`` has one function for each kind of list.
 """
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -124,12 +125,10 @@ def _rooms_by_size(lists: _Lists) -> Answer:
 
 def extreme_shares(areas_m2: Float[np.ndarray, " r"], *, smallest: bool) -> Float[np.ndarray, " r"]:
     """Return how likely each room is the smallest, or the largest, as well as areas are known; they add up to 1."""
-    from scipy.special import ndtr
-
     sigma, sign = _AREA_ERROR * areas_m2, 1.0 if smallest else -1.0
     low, high = float((sign * areas_m2 - 5.0 * sigma).min()), float((sign * areas_m2 + 5.0 * sigma).max())
     score = (np.linspace(low, high, 2001)[:, None] - sign * areas_m2) / sigma
-    larger = np.maximum(ndtr(-score), 1e-300)
+    larger = np.maximum(0.5 * np.vectorize(math.erfc)(score / math.sqrt(2.0)), 1e-300)
     density = np.exp(-0.5 * np.square(score)) / sigma * larger.prod(axis=1, keepdims=True) / larger
     return density.sum(axis=0) / density.sum()
 
