@@ -7,6 +7,7 @@ import json
 import logging
 import socket
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -21,12 +22,12 @@ from chat_server import (
     silent,
     trickle,
 )
+from hypothesis import given
+from hypothesis import strategies as st
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.chat import endpoint
-from avlmaps.language.chat.endpoint import Endpoint
-from avlmaps.language.chat.replay import ChatRequest, Message
-from avlmaps.language.chat.settings import ChatSettings
+from avlmaps.language.chat.endpoint import HOSTED_URL, ChatSettings, Endpoint, ModelReply, Replay, quoted
 
 KEY = "sk-test-8c1f0e77a2"
 
@@ -53,17 +54,17 @@ def _settings(server: ChatServer, **changes: Any) -> ChatSettings:
     return ChatSettings(**{"base_url": server.url, "timeout_s": 60.0, **changes})
 
 
-def _request(model: str = "test-model", **changes: Any) -> ChatRequest:
-    messages = (Message("system", "You write programs."), Message("user", "Command: “go”"))
-    return ChatRequest(
-        **{"model": model, "messages": messages, "temperature": 0.0, "seed": 7, "max_tokens": 99, **changes}
-    )
+MESSAGES = ({"role": "system", "content": "You write programs."}, {"role": "user", "content": "Command: “go”"})
+
+
+def _answered(server: ChatServer, **changes: Any) -> ModelReply:
+    return Endpoint(_settings(server, **changes)).complete("test-model", MESSAGES)
 
 
 def _sentence(server: ChatServer, **changes: Any) -> str:
     """Return the sentence of the fault that the server's answer is."""
     with pytest.raises(LanguageError) as told:
-        Endpoint(_settings(server, **changes)).complete(_request())
+        _answered(server, **changes)
     sentence = str(told.value)
     assert "\n" not in sentence and sentence.endswith(".") and len(sentence) < 500
     assert KEY not in sentence
@@ -72,22 +73,19 @@ def _sentence(server: ChatServer, **changes: Any) -> str:
 
 def test_an_answer_comes_back_with_its_counts(server: ChatServer) -> None:
     server.answer("robot.turn(90)")
-    answer = Endpoint(_settings(server)).complete(_request())
+    answer = _answered(server)
     assert (answer.content, answer.finish, answer.refusal) == ("robot.turn(90)", "stop", None)
     assert (answer.model, answer.tokens) == ("test-model-0101", (1200, 20))
 
 
 def test_exactly_the_request_is_sent_and_nothing_of_the_environment(server: ChatServer) -> None:
     server.answer("robot.turn(90)")
-    Endpoint(_settings(server, api_key=KEY)).complete(_request())
+    _answered(server, seed=7, max_tokens=99, api_key=KEY)
     (asked,) = server.asked
     assert asked.path == "/v1/chat/completions"
     assert asked.body == {
         "model": "test-model",
-        "messages": [
-            {"role": "system", "content": "You write programs."},
-            {"role": "user", "content": "Command: “go”"},
-        ],
+        "messages": list(MESSAGES),
         "temperature": 0,
         "seed": 7,
         "max_tokens": 99,
@@ -99,24 +97,17 @@ def test_exactly_the_request_is_sent_and_nothing_of_the_environment(server: Chat
 def test_text_in_parts_and_missing_counts_are_read_all_the_same(server: ChatServer) -> None:
     choice = {"message": {"content": [{"type": "text", "text": "robot."}, {"type": "text", "text": "turn(90)"}]}}
     server.answer(sent(json.dumps({"choices": [choice], "usage": None}).encode()))
-    answer = Endpoint(_settings(server)).complete(_request())
+    answer = _answered(server)
     assert (answer.content, answer.tokens, answer.finish) == ("robot.turn(90)", (0, 0), None)
 
 
 @pytest.mark.parametrize(
-    ("message", "refusal", "tools"),
-    [
-        ({"content": None, "refusal": "No."}, "No.", 0),
-        ({"content": [{"type": "refusal", "refusal": "No."}]}, "No.", 0),
-        ({"content": None, "tool_calls": [{"id": "1", "type": "function", "function": {"name": "go"}}]}, None, 1),
-    ],
+    "message", [{"content": None, "refusal": "No."}, {"content": [{"type": "refusal", "refusal": "No."}]}]
 )
-def test_refusals_and_tool_calls_are_told_apart_from_text(
-    server: ChatServer, message: dict[str, Any], refusal: str | None, tools: int
-) -> None:
+def test_refusals_are_told_apart_from_text(server: ChatServer, message: dict[str, Any]) -> None:
     server.answer(sent(json.dumps({"choices": [{"message": message}]}).encode()))
-    answer = Endpoint(_settings(server)).complete(_request())
-    assert (answer.content, answer.refusal, answer.tool_calls) == ("", refusal, tools)
+    answer = _answered(server)
+    assert (answer.content, answer.refusal) == ("", "No.")
 
 
 @pytest.mark.parametrize(
@@ -174,14 +165,14 @@ def test_the_deadline_holds_however_slow_the_answer_is(server: ChatServer, reply
 @pytest.mark.parametrize("reply", [half(b'{"choices": [{"message": {"content": "robot.tu', 400), hung_up])
 def test_a_broken_connection_is_tried_again_and_then_told(server: ChatServer, reply: Any) -> None:
     server.answer(reply)
-    assert "broke off in the middle 2 times" in _sentence(server, retries=1)
+    assert "broke off in the middle" in _sentence(server, retries=1)
     assert len(server.asked) == 2
 
 
 @pytest.mark.parametrize("status", [429, 500, 502, 503])
 def test_a_busy_server_is_asked_again(server: ChatServer, status: int) -> None:
     server.answer(failed(status, "loading model", Retry_After="0"), "robot.turn(90)")
-    assert Endpoint(_settings(server)).complete(_request()).content == "robot.turn(90)"
+    assert _answered(server).content == "robot.turn(90)"
     assert len(server.asked) == 2
 
 
@@ -191,7 +182,7 @@ def test_as_long_as_the_server_says_and_no_longer_is_waited(
     waited: list[float] = []
     monkeypatch.setattr(endpoint, "sleep", waited.append)
     server.answer(failed(429, Retry_After="0.3"), "robot.turn(90)")
-    Endpoint(_settings(server)).complete(_request())
+    _answered(server)
     assert waited == [0.3]
 
 
@@ -204,32 +195,25 @@ def test_a_wait_beyond_the_deadline_is_told_instead(server: ChatServer) -> None:
 @pytest.mark.parametrize(
     ("reply", "sentence"),
     [
-        (failed(401, f"Incorrect key: {KEY}"), "does not accept the key (HTTP 401: “Incorrect key: …”): set AVL"),
-        (failed(403), "does not accept the key (HTTP 403): set AVLMAPS_CHAT_API_KEY to one that may use 'test-model'"),
+        (failed(401, f"Incorrect key: {KEY}"), "key of its own (HTTP 401: “Incorrect key: …”): set AVL"),
+        (failed(403), "key of its own (HTTP 403): set AVLMAPS_CHAT_API_KEY to one that may use 'test-model'"),
         (failed(404, "no such model"), "no model 'test-model' (HTTP 404: “no such model”): set AVLMAPS_CHAT_MODEL to"),
-        (failed(500, "boom"), "failed once (HTTP 500: “boom”): try again later"),
-        (failed(400, "too long"), "does not take the request (HTTP 400: “too long”)"),
+        (failed(500, "boom"), "(HTTP 500: “boom”): look into the server's log"),
+        (failed(400, "too long"), "does not answer the request (HTTP 400: “too long”)"),
         (sent(b'{"object": "error", "message": "gone", "code": 418}', 418), "(HTTP 418: “gone”)"),
         (sent(b'{"error": "gone"}', 418), "(HTTP 418: “gone”)"),
         (sent(b'{"detail": "gone"}', 418), "(HTTP 418: “gone”)"),
         (sent(b"gone", 418), "(HTTP 418: “gone”)"),
         (sent(b"<html>gone</html>", 418), "(HTTP 418)"),
         (sent(b"\xff\x00\x1b[31mred", 418), "(HTTP 418: “"),
-        (sent(b"x" * 100_000, 418), "(HTTP 418)"),
         (failed(429, "nothing left"), "too many requests"),
-        (sent(b'{"error": {"message": "pay", "code": "insufficient_quota"}}', 429), "no credit left (HTTP 429: “pay”)"),
-        (sent(b"", 302, Location="http://192.0.2.1/v1"), "sends on to another address (HTTP 302: “http://192.0.2.1/v1”)"),
+        (sent(b"", 302, Location="http://192.0.2.1/v1"), "(HTTP 302: “http://192.0.2.1/v1”)"),
     ],
 )  # fmt: skip
 def test_each_status_has_its_sentence(server: ChatServer, reply: Any, sentence: str) -> None:
     server.answer(reply)
     assert sentence in _sentence(server, api_key=KEY, retries=0)
     assert len(server.asked) == 1
-
-
-def test_without_a_key_a_server_that_wants_one_asks_for_it(server: ChatServer) -> None:
-    server.answer(failed(401, "who are you"))
-    assert "asks for a key (HTTP 401: “who are you”): set AVLMAPS_CHAT_API_KEY" in _sentence(server)
 
 
 def test_a_missing_model_names_those_that_are_there(server: ChatServer) -> None:
@@ -254,14 +238,14 @@ def test_what_a_server_does_not_take_is_left_out_from_then_on(
     server.answer(sent(json.dumps({"error": told}).encode(), 400), "robot.turn(90)")
     endpoint = Endpoint(_settings(server))
     for _ in range(2):
-        assert endpoint.complete(_request()).content == "robot.turn(90)"
+        assert endpoint.complete("test-model", MESSAGES).content == "robot.turn(90)"
     assert [set(asked.body) - {"model", "messages"} for asked in server.asked[1:]] == [sent_then] * 2
     assert endpoint.left_out == left_out
 
 
 def test_a_server_that_takes_nothing_is_not_asked_for_ever(server: ChatServer) -> None:
     server.answer(sent(b'{"error": {"message": "temperature, seed, max_tokens: all wrong"}}', 400))
-    assert "does not take the request" in _sentence(server)
+    assert "does not answer the request" in _sentence(server)
     assert len(server.asked) <= 4
 
 
@@ -270,7 +254,7 @@ def test_where_nothing_listens_the_sentence_says_so() -> None:
         taken.bind(("127.0.0.1", 0))
         url = f"http://127.0.0.1:{taken.getsockname()[1]}/v1"
         with pytest.raises(LanguageError, match=r"cannot be reached \(.*refused.*\): start the server there"):
-            Endpoint(ChatSettings(base_url=url, timeout_s=5.0)).complete(_request())
+            Endpoint(ChatSettings(base_url=url, timeout_s=5.0)).complete("test-model", MESSAGES)
 
 
 def test_the_only_model_of_a_server_needs_no_name(server: ChatServer) -> None:
@@ -295,8 +279,152 @@ def test_the_key_is_neither_logged_nor_shown(server: ChatServer, caplog: pytest.
     server.answer(f"robot.turn(90)  # {KEY}", failed(401, f"bad key {KEY}"))
     with caplog.at_level(logging.DEBUG):
         endpoint = Endpoint(settings)
-        assert endpoint.complete(_request()).content == "robot.turn(90)  # …"
+        assert endpoint.complete("test-model", MESSAGES).content == "robot.turn(90)  # …"
         with pytest.raises(LanguageError, match="bad key …"):
-            endpoint.complete(_request())
+            endpoint.complete("test-model", MESSAGES)
     assert all(KEY not in f"{record.getMessage()} {record.args}" for record in caplog.records)
     assert server.asked[0].headers["authorization"] == f"Bearer {KEY}"
+
+
+# ---- settings
+
+
+def test_the_defaults_are_the_hosted_service_and_choices_that_repeat() -> None:
+    settings = ChatSettings.from_environment({})
+    assert settings == ChatSettings()
+    assert (settings.base_url, settings.temperature, settings.seed, settings.api_key) == (HOSTED_URL, 0.0, 0, None)
+    assert settings.hosted and not settings.on_this_machine
+
+
+def test_every_setting_can_come_from_the_environment() -> None:
+    environment = {
+        "AVLMAPS_CHAT_MODEL": " qwen ",
+        "AVLMAPS_CHAT_BASE_URL": "http://localhost:11434/v1",
+        "AVLMAPS_CHAT_API_KEY": "key",
+        "AVLMAPS_CHAT_TIMEOUT_S": "7.5",
+        "AVLMAPS_CHAT_RETRIES": "1",
+        "AVLMAPS_CHAT_ROUNDS": "0",
+        "AVLMAPS_CHAT_TEMPERATURE": "None",
+        "AVLMAPS_CHAT_MAX_TOKENS": "64",
+        "AVLMAPS_CHAT_SEED": "none",
+        "AVLMAPS_CHAT_REPLAY": "chat.jsonl",
+    }
+    assert ChatSettings.from_environment(environment) == ChatSettings(
+        model="qwen",
+        base_url="http://localhost:11434/v1",
+        api_key="key",
+        timeout_s=7.5,
+        retries=1,
+        rounds=0,
+        temperature=None,
+        max_tokens=64,
+        seed=None,
+        replay=Path("chat.jsonl"),
+    )
+
+
+@pytest.mark.parametrize(
+    ("environment", "given", "key"),
+    [
+        ({"OPENAI_API_KEY": "k"}, {}, "k"),
+        ({"OPENAI_API_KEY": "k", "OPENAI_BASE_URL": "http://lab:8000/v1/"}, {}, "k"),
+        ({"OPENAI_API_KEY": "k", "OPENAI_BASE_URL": "http://lab:8000/v1/"}, {"base_url": "http://lab:8000/v1"}, "k"),
+        ({"OPENAI_API_KEY": "k"}, {"base_url": "http://lab:8000/v1"}, None),
+        ({"OPENAI_API_KEY": "k", "OPENAI_BASE_URL": "http://lab:8000/v1"}, {"base_url": HOSTED_URL}, None),
+        ({"OPENAI_API_KEY": "k", "AVLMAPS_CHAT_BASE_URL": "http://lab:8000/v1"}, {}, None),
+        ({"OPENAI_API_KEY": "k", "AVLMAPS_CHAT_API_KEY": "c"}, {"base_url": "http://lab:8000/v1"}, "c"),
+        ({"OPENAI_API_KEY": "k", "AVLMAPS_CHAT_API_KEY": "c"}, {}, "c"),
+        ({"OPENAI_API_KEY": "  "}, {}, None),
+    ],
+)
+def test_a_key_goes_to_its_own_address_and_to_no_other(
+    environment: dict[str, str], given: dict[str, str], key: str | None
+) -> None:
+    assert ChatSettings.from_environment(environment, **given).api_key == key
+
+
+@pytest.mark.parametrize(
+    ("url", "is_here"),
+    [
+        ("http://localhost:11434/v1", True),
+        ("http://127.0.0.1/v1", True),
+        ("http://127.8.9.1:1/v1", True),
+        ("http://[::1]:8000/v1", True),
+        ("http://ollama.localhost/v1", True),
+        ("http://192.168.0.2/v1", False),
+        ("http://localhost.example.org/v1", False),
+        ("https://127.0.0.1.example.org/v1", False),
+        (HOSTED_URL, False),
+    ],
+)
+def test_which_addresses_are_of_this_machine(url: str, is_here: bool) -> None:
+    assert ChatSettings(base_url=url).on_this_machine == is_here
+
+
+def test_a_password_in_an_address_is_not_shown() -> None:
+    settings = ChatSettings(base_url="https://me:secret@lab.example:8443/v1/?token=secret")
+    assert settings.shown_url == "https://lab.example:8443/v1"
+    assert ChatSettings(base_url="http://[::1]:8/v1").shown_url == "http://[::1]:8/v1"
+
+
+@pytest.mark.parametrize(
+    "url", ["", "localhost:11434", "ftp://x/v1", "http://", "http://x:port/v1", "http://[::1/v1", "http://a b/", "h\n"]
+)
+def test_what_is_no_address_is_refused(url: str) -> None:
+    with pytest.raises(LanguageError, match="no address of a chat server; give one like"):
+        ChatSettings(base_url=url)
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        ({"base_url": "http://api.openai.com/v1"}, "sent the key in clear; give https://api.openai.com/v1"),
+        ({"base_url": "http://API.openai.com:443"}, "sent the key in clear"),
+        ({"api_key": "sk-\nx"}, "key for the chat model holds characters"),
+        ({"api_key": "schlüssel"}, "key for the chat model holds characters"),
+    ],
+)
+def test_what_no_setting_can_be_is_refused(given: dict[str, Any], why: str) -> None:
+    with pytest.raises(LanguageError, match=why) as told:
+        ChatSettings(**given)
+    assert "schlüssel" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("TIMEOUT_S", "soon"), ("TIMEOUT_S", "0"), ("SEED", "1.5"), ("ROUNDS", "11"), ("TEMPERATURE", "2.5")],
+)
+def test_a_variable_that_holds_something_else_is_named(name: str, text: str) -> None:
+    with pytest.raises(LanguageError, match=f"The variable AVLMAPS_CHAT_{name} is {text!r}"):
+        ChatSettings.from_environment({f"AVLMAPS_CHAT_{name}": text})
+
+
+# ---- a file of exchanges
+
+
+def test_a_file_answers_what_was_asked_in_its_order_and_nothing_else(tmp_path: Path) -> None:
+    path, other = tmp_path / "chat.jsonl", ({"role": "user", "content": "Küche\n"},)
+    recording = Replay(path)
+    for messages, said in ((MESSAGES, "a"), (other, "b"), (MESSAGES, "c")):
+        recording.add(messages, ModelReply(said))
+    path.write_bytes(path.read_bytes() + b'{"torn')
+    replay = Replay(path)
+    assert recording.recording and not replay.recording
+    assert [replay.answer(each).content for each in (other, MESSAGES, MESSAGES, MESSAGES, other)] == list("baccb")
+    with pytest.raises(LanguageError, match="holds no answer to “go”; delete the file"):
+        replay.answer(({"role": "user", "content": "go"},))
+
+
+@pytest.mark.parametrize("line", [b"{}", b"robot.turn(90)", b"\xff\xfe", b"[" * 100_000])
+def test_a_file_of_anything_else_is_refused(tmp_path: Path, line: bytes) -> None:
+    path = tmp_path / "chat.jsonl"
+    path.write_bytes(line + b"\n")
+    with pytest.raises(LanguageError, match=r"The replay file .* cannot be read"):
+        Replay(path)
+    with pytest.raises(LanguageError, match=r"The replay file .* cannot be written"):
+        Replay(tmp_path / "missing" / "chat.jsonl").add(MESSAGES, ModelReply(""))
+
+
+@given(st.text(max_size=300))
+def test_a_text_of_somebody_elses_is_one_short_line_without_control_characters(text: str) -> None:
+    assert quoted(text, 50).isprintable() and len(quoted(text, 50)) <= 52

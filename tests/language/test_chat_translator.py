@@ -1,16 +1,33 @@
 """From a command to a program through a real HTTP server: corrections, hostility, and runs that are repeated."""
 
+import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from chat_server import ChatServer, chat_server, failed, said, sent
+from hypothesis import given
+from hypothesis import strategies as st
+from program_equality import same_program
 
 from avlmaps.core.errors import LanguageError, ProgramError
 from avlmaps.language.chat import ChatSettings, ChatTranslator, system_prompt
-from avlmaps.language.chat.translator import check_files
-from avlmaps.language.program import parse_program
+from avlmaps.language.chat.endpoint import ModelReply
+from avlmaps.language.chat.translator import (
+    MOST_COMMAND_CHARACTERS,
+    UnusableAnswerError,
+    check_files,
+    command_message,
+    failed_message,
+    program_message,
+    program_text,
+    unusable_message,
+    without_thoughts,
+)
+from avlmaps.language.program import SKILLS, parse_program, run_program
+from helpers.recording_robot import RecordingRobot
 
 GO = 'robot.move_to_object("sofa")'
 KEY = "sk-test-8c1f0e77a2"
@@ -143,7 +160,7 @@ def test_without_rounds_the_first_fault_is_told(server: ChatServer) -> None:
         (said("I'm sorry, but I can't help with that."), "refuses the command"),
         (said("```python\n# cannot: it has no arms\n```"), "cannot be done: “it has no arms”"),
         (said(_block(GO), finish="length"), "cut off after 20 tokens; raise AVLMAPS_CHAT_MAX_TOKENS"),
-        (failed(401, "no"), "asks for a key"),
+        (failed(401, "no"), "without a key of its own"),
     ],
 )
 def test_what_no_correction_mends_is_told_at_once(server: ChatServer, reply: Any, why: str) -> None:
@@ -272,7 +289,7 @@ def test_a_recorded_run_is_repeated_without_server_or_key(server: ChatServer, tm
     repaired = replaying.repair(COMMAND, GO, "no sofa", done=["turn(angle_deg=5)"])
     assert repaired is not None and repaired.program == second.program
     assert len(server.asked) == asked
-    with pytest.raises(LanguageError, match='nothing like “Command: "go to the bed"” was requested'):
+    with pytest.raises(LanguageError, match='no answer to “Command: "go to the bed"”'):
         replaying.program_for("go to the bed")
 
 
@@ -311,3 +328,195 @@ def test_what_the_server_does_not_take_is_noted(server: ChatServer) -> None:
 def test_every_program_that_is_handed_on_parses(server: ChatServer) -> None:
     server.answer(_block(f"{GO}\nrobot.turn(90)  # to the right"))
     assert parse_program(_translator(server).program_for(COMMAND).program).skills == ("move_to_object", "turn")
+
+
+# ---- the program in an answer
+
+TURN = "robot.turn(90)"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        f"```python\n{GO}\n```",
+        f"```\n{GO}\n```",
+        f"```py\n{GO}\n```\n",
+        f"~~~python\n{GO}\n~~~",
+        f"````python\n{GO}\n````",
+        f"``` python \n{GO}\n```",
+        f"Here is the program:\n\n```python\n{GO}\n```\nIt drives to the sofa.",
+        f"1. So:\n   ```python\n   {GO}\n   ```",
+        f"```python\n{GO}\n```\nOnce more:\n```python\n{GO}\n```",
+        f"```python\n{GO}\n```\n```python\n\n```",
+        f"```\n{GO}\n```\n```",
+        f"```python\n{GO}\n```\nIt prints\n```text\nnothing\n```",
+        f"```python\n{GO}\n```\nIt prints\n```text\nnothing",
+        f"```python\r\n{GO}\r\n```",
+        GO,
+        f"\n\n{GO}\n",
+        f"`{GO}`",
+        f"```{GO}```",
+        f"<think>I could ```python\n{TURN}\n```</think>\n```python\n{GO}\n```",
+        f"the robot should ```python\n{TURN}\n``` or so</think>{GO}",
+        f"[THINK]hm[/THINK]```python\n{GO}\n```",
+        f"<thinking>\nhm\n</thinking>\n{GO}",
+    ],
+)
+def test_the_program_is_found_in_whatever_stands_around_it(content: str) -> None:
+    assert program_text(ModelReply(content)) == GO
+
+
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [
+        (ModelReply(""), "empty"),
+        (ModelReply(" \n "), "empty"),
+        (ModelReply("<think>I go on and on"), "empty"),
+        (ModelReply("", finish="tool_calls"), "There are no tools"),
+        (ModelReply(f"```python\n{GO}"), "never closed"),
+        (ModelReply(f"```python\n{GO}\n```\nand, cut off:\n```python\nrobot.mo"), "never closed"),
+        (
+            ModelReply(f"First:\n```python\n{GO}\n```\nThen:\n```python\n{TURN}\n```"),
+            "2 code blocks that differ; write one",
+        ),
+        (ModelReply(f"First idea:\n```\n{TURN}\n```\nBetter:\n```py\n{GO}\n```"), "2 code blocks that differ"),
+        (ModelReply(f"```text\n{GO}\n```\n```text\n{TURN}\n```"), "2 code blocks that differ"),
+        (ModelReply("```python\n\n```"), "block is empty"),
+        (ModelReply("```python\n```"), "block is empty"),
+    ],
+)
+def test_an_answer_without_a_program_may_be_corrected(answer: ModelReply, why: str) -> None:
+    with pytest.raises(UnusableAnswerError, match=why):
+        program_text(answer)
+
+
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [
+        (ModelReply("", refusal="I can't help with that."), "refuses the command: “I can't help with that.”"),
+        (ModelReply("half of", finish="content_filter"), "refuses the command"),
+        (ModelReply("I'm sorry, but I can't assist with that request."), "refuses the command: “I'm sorry"),
+        (ModelReply("I’m sorry, I cannot do this."), "refuses the command"),
+        (ModelReply("<think>bad</think>I cannot write this."), "refuses the command: “I cannot write this.”"),
+        (ModelReply("Unfortunately, that is against my rules."), "refuses"),
+        (ModelReply("```python\n# cannot: the robot has no arms\n```"), "cannot be done: “the robot has no arms”"),
+        (ModelReply("# cannot: the robot has no arms"), "cannot be done: “the robot has no arms”"),
+        (ModelReply("Cannot: it has no arms"), "cannot be done"),
+        (
+            ModelReply(f"```python\n{GO}\n```", finish="length", tokens=(9, 77)),
+            "cut off after 77 tokens; raise AVLMAPS_CHAT_MAX",
+        ),
+    ],
+)
+def test_a_refusal_and_a_cut_answer_end_it(answer: ModelReply, why: str) -> None:
+    with pytest.raises(LanguageError, match=why) as told:
+        program_text(answer)
+    assert not isinstance(told.value, UnusableAnswerError)
+
+
+def test_a_phrase_that_looks_like_a_refusal_inside_a_program_is_a_phrase() -> None:
+    program = 'robot.face("sorry sign")\n# cannot: be moved'
+    assert program_text(ModelReply(f"```python\n{program}\n```")) == program
+
+
+@given(st.text(alphabet="ab<>/think`\n []THINK", max_size=60))
+def test_what_comes_after_the_last_thought_is_all_that_is_left(text: str) -> None:
+    assert without_thoughts(f"<think>{text}</think>{GO}") == GO
+    assert "</think>" not in without_thoughts(text)
+
+
+@given(st.text(alphabet="`~ \npython(ab)", max_size=80))
+def test_no_answer_is_read_into_anything_but_a_program_or_a_sentence(text: str) -> None:
+    try:
+        program = program_text(ModelReply(text))
+    except LanguageError as fault:
+        assert str(fault)
+    else:
+        assert program.strip()
+
+
+def test_a_block_is_read_back_as_it_was_written() -> None:
+    program = 'for i in range(3):\n    robot.turn(10)\n    if i == 1:\n        robot.face("~~~")'
+    assert program_text(ModelReply(f"Text\n```python\n{program}\n```\nmore text")) == program
+
+
+# ---- the prompt
+
+
+class Example(NamedTuple):
+    command: str
+    program: str
+
+
+_SHOWN = re.findall(r"^Command: ([^\n]*)\n```python\n(.*?)\n```$", system_prompt(), re.MULTILINE | re.DOTALL)
+EXAMPLES = [Example(json.loads(command), program) for command, program in _SHOWN]
+PROGRAMS = [each for each in EXAMPLES if not each.program.startswith("# cannot:")]
+
+
+def test_every_skill_is_in_the_prompt_as_the_table_has_it() -> None:
+    for skill in SKILLS.values():
+        assert f"- robot.{skill.signature}: {skill.doc}\n" in system_prompt()
+
+
+def test_the_prompt_speaks_of_no_skill_that_is_not_in_the_table() -> None:
+    named = set(re.findall(r"robot\.(\w+)\(", system_prompt())) - {"NAME"}
+    assert named == set(SKILLS)
+
+
+def test_the_prompt_leaves_room_in_a_small_context() -> None:
+    """Local servers start with 4096 tokens, an answer and two corrections included; a token is 3 letters or more."""
+    assert len(system_prompt()) < 9_500
+
+
+@pytest.mark.parametrize("example", PROGRAMS, ids=lambda each: each.command)
+def test_each_example_of_the_prompt_runs(example: Example) -> None:
+    program = parse_program(example.program)
+    check_files(program, example.command)
+    robot: Any = RecordingRobot()
+    assert run_program(program, robot).error is None
+    assert any(SKILLS[skill].moves for skill in program.skills)
+
+
+@pytest.mark.parametrize("example", PROGRAMS, ids=lambda each: each.command)
+def test_each_example_is_what_the_rules_say_where_they_understand_it(example: Example) -> None:
+    from avlmaps.language.translator import command_to_program
+
+    try:
+        by_rules = command_to_program(example.command)
+    except LanguageError:
+        pytest.skip("the rules do not understand this one, which is what a chat model is for")
+    assert same_program(example.program, by_rules)
+
+
+def test_the_examples_of_what_cannot_be_done_are_read_as_such() -> None:
+    without = [each for each in EXAMPLES if each not in PROGRAMS]
+    assert without
+    for each in without:
+        with pytest.raises(LanguageError, match="cannot be done"):
+            program_text(ModelReply(program_message(each.program)))
+
+
+@given(st.text(min_size=1, max_size=MOST_COMMAND_CHARACTERS))
+def test_a_command_never_leaves_its_line(command: str) -> None:
+    try:
+        message = command_message(command)
+    except LanguageError:
+        assert not any(letter.isprintable() and not letter.isspace() for letter in command)
+        return
+    assert "\n" not in message
+    assert len(message.splitlines()) == 1
+    said = json.loads(message.removeprefix("Command: "))
+    assert said.split() == "".join(c for c in command if c.isprintable() or c.isspace()).split()
+
+
+def test_corrections_are_short_however_long_the_fault_is() -> None:
+    assert len(unusable_message("x" * 10_000)) < 1_000
+    assert len(program_message("x" * 100_000)) < 5_000
+    assert len(failed_message("x" * 10_000, ["y" * 10_000] * 1_000)) < 10_000
+
+
+def test_a_failure_tells_what_was_done_and_not_to_do_it_again() -> None:
+    told = failed_message("no sofa", ['move_to_object(name="door")', "turn(angle_deg=90)"])
+    assert '- move_to_object(name="door")\n- turn(angle_deg=90)\n' in told
+    assert "no sofa" in told and "Do not repeat movements that were done" in told
+    assert "What stands before the step that failed was done" in failed_message("no sofa", [])

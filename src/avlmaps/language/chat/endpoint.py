@@ -1,73 +1,244 @@
-"""A server of the OpenAI chat protocol, asked over HTTP: any that serves ``/chat/completions``, hosted or local.
+"""A server of the OpenAI chat protocol, hosted or on this machine: its settings, its answers, a file that repeats them.
 
 One deadline holds all attempts and each read, nothing endless is read, no redirect is followed (it would carry the
-command elsewhere), no proxy stands before this very machine, and a key appears in no message. Answers are read
-strictly, since a garbled one must not become a program, and forgivingly, since servers differ in all that does not
-matter here.
+command elsewhere), no proxy stands before this very machine, and a key appears in no message.
 """
 
+import os
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from hashlib import sha256
 from http.client import HTTPException
+from pathlib import Path
 from time import monotonic, sleep
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_type_hints
 from urllib.error import HTTPError, URLError
+from urllib.parse import urlsplit
 from urllib.request import HTTPRedirectHandler, ProxyHandler, Request, build_opener
 
 import msgspec
+from msgspec import Meta
 
 from avlmaps.core.errors import LanguageError
-from avlmaps.language.chat.answer import ModelReply, quoted
-from avlmaps.language.chat.replay import ChatRequest
-from avlmaps.language.chat.settings import ChatSettings
+from avlmaps.core.machine import is_loopback
 
+HOSTED_URL = "https://api.openai.com/v1"
 MOST_BYTES = 1 << 20
-_MOST_ERROR_BYTES = 1 << 16
-_MOST_MODELS_WAIT_S = 10.0
+_PREFIX = "AVLMAPS_CHAT_"
+_MODELS_WAIT_S = 10.0
 _SHORTEST_KEY = 8
-_LONGEST_NAME = 100
 _BUSY = frozenset({408, 425, 429, 500, 502, 503, 504, 529})
-Shape = TypeVar("Shape")
+_STATUSES = {401: "key", 403: "key", 404: "model", 429: "busy"}
 _SENTENCES = {
-    "unreachable": "The chat server {url} cannot be reached ({message}): {start}, or correct its address.",
-    "timeout": (
-        "{model!r} at {url} gave no answer within {timeout_s:g} s: raise AVLMAPS_CHAT_TIMEOUT_S, or take a smaller "
-        "model."
-    ),
-    "broken": "{url} broke off in the middle {times} ({message}): look into the server's log.",
-    "huge": "{url} answered with more than {message}, which no program needs: ask another model.",
-    "garbled": (
-        "{url} does not speak the chat protocol: it answered with {message}; its address must be that of the API, "
-        "which mostly ends in /v1."
-    ),
-    "empty": "{url} answered without any choice: look into the server's log, or ask another model than {model!r}.",
-    "key": "{url} {held} ({told}): set {key} to one that may use {model!r}.",
-    "model": "{url} has no model {model!r} ({told}): set AVLMAPS_CHAT_MODEL to one of {offered}.",
-    "quota": "The account at {url} has no credit left ({told}): add some, or ask a server of your own.",
+    "unreachable": "The chat server {url} cannot be reached ({told}): {start}, or correct its address.",
+    "timeout": "{model!r} at {url} gave no answer within {timeout_s:g} s: raise AVLMAPS_CHAT_TIMEOUT_S, or take a "
+               "smaller model.",
+    "broken": "{url} broke off in the middle ({told}): look into the server's log.",
+    "garbled": "{url} does not speak the chat protocol: it answered with {told}; its address must be that of the API, "
+               "which mostly ends in /v1.",
+    "key": "{url} takes no request without a key of its own ({told}): set {key} to one that may use {model!r}.",
+    "model": "{url} has no model {model!r} ({told}): set AVLMAPS_CHAT_MODEL to {offered}.",
     "busy": "{url} has had too many requests ({told}): try again {wait}.",
-    "redirect": "{url} sends on to another address ({told}): give that one, if it is meant.",
-    "failed": "{url} failed {times} ({told}): try again later, or look into the server's log.",
-    "other": "{url} does not take the request ({told}): ask another model than {model!r}, or change the settings.",
-}
+    "other": "{url} does not answer the request ({told}): look into the server's log, or change model or settings.",
+}  # fmt: skip
+Shape = TypeVar("Shape")
+Messages = Sequence[Mapping[str, str]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChatSettings:
+    """Which chat model writes programs, where it is served, and within which limits.
+
+    ``from_environment`` fills what is not given from ``AVLMAPS_CHAT_MODEL``, ``AVLMAPS_CHAT_TIMEOUT_S`` and so on.
+    """
+
+    model: str | None = None
+    """Name of the model; without one, the only model that a server offers."""
+    base_url: str = HOSTED_URL
+    """Address of the API; that of a server on the same machine ends in /v1 mostly."""
+    api_key: str | None = field(default=None, repr=False)
+    """The key; servers on the same machine mostly need none. Better set in the environment than on a command line."""
+    timeout_s: Annotated[float, Meta(gt=0, le=86400)] = 120.0
+    """Seconds to wait for the program of one command, with all attempts and corrections."""
+    retries: Annotated[int, Meta(ge=0, le=10)] = 2
+    """How often a request is sent again where the server is busy, fails, or breaks off."""
+    rounds: Annotated[int, Meta(ge=0, le=10)] = 2
+    """How often the model may correct a program that cannot be used or that failed while it ran."""
+    temperature: Annotated[float, Meta(ge=0, le=2)] | None = 0.0
+    """How freely the model chooses its words; none: as the server likes."""
+    max_tokens: Annotated[int, Meta(ge=1)] = 2048
+    """Most tokens of an answer, with what a reasoning model thinks."""
+    seed: int | None = 0
+    """Seed of the model's choices; none: as the server likes."""
+    replay: Path | None = None
+    """A JSONL file: written with every exchange where it is missing, else read instead of calling the model."""
+
+    def __post_init__(self) -> None:
+        if not self._is_address():
+            shown = "What was given" if "@" in self.base_url else repr(self.base_url)  # a password is not repeated
+            raise LanguageError(
+                f"{shown} is no address of a chat server; give one like {HOSTED_URL} or http://localhost:11434/v1."
+            )
+        if self.hosted and not self.base_url.startswith("https:"):
+            raise LanguageError(f"{self.shown_url} would be sent the key in clear; give {HOSTED_URL}.")
+        if self.api_key is not None and not (self.api_key.isascii() and self.api_key.isprintable()):
+            raise LanguageError("The key for the chat model holds characters that no key has; copy it again.")
+
+    @classmethod
+    def from_environment(cls, environment: Mapping[str, str] = os.environ, **given: Any) -> "ChatSettings":
+        """Return the settings that are given, and for what is not given (or None) those of the environment.
+
+        ``OPENAI_BASE_URL`` and ``OPENAI_API_KEY`` are a pair: the key goes to that address (or the hosted one where
+        none is set) and to no other; for another address there is ``AVLMAPS_CHAT_API_KEY``.
+
+        Args:
+            environment: variables by name.
+            given: fields of the settings.
+
+        Raises:
+            LanguageError: a variable does not hold what its setting needs.
+        """
+        chosen = {name: value for name, value in given.items() if value is not None}
+        for name, kind in get_type_hints(cls, include_extras=True).items():
+            text = environment.get(_PREFIX + name.upper(), "").strip()
+            if text and name not in chosen:
+                chosen[name] = _converted(name, text, kind)
+        openai_url = environment.get("OPENAI_BASE_URL", "").strip() or HOSTED_URL
+        chosen.setdefault("base_url", openai_url)
+        if "api_key" not in chosen and chosen["base_url"].rstrip("/") == openai_url.rstrip("/"):
+            chosen["api_key"] = environment.get("OPENAI_API_KEY", "").strip() or None
+        return cls(**chosen)
+
+    def _is_address(self) -> bool:
+        try:
+            split = urlsplit(self.base_url)
+            _ = split.port
+        except ValueError:
+            return False
+        plain = self.base_url.isprintable() and " " not in self.base_url
+        return plain and split.scheme in ("http", "https") and bool(split.hostname)
+
+    @property
+    def hosted(self) -> bool:
+        """Whether the address is OpenAI's own."""
+        return urlsplit(self.base_url).hostname == urlsplit(HOSTED_URL).hostname
+
+    @property
+    def on_this_machine(self) -> bool:
+        """Whether the address is of the same machine, to which no proxy leads."""
+        host = urlsplit(self.base_url).hostname or ""
+        return is_loopback(host) or host.endswith(".localhost")
+
+    @property
+    def shown_url(self) -> str:
+        """The address without a user, a password or a query, as errors may show it."""
+        split = urlsplit(self.base_url)
+        return f"{split.scheme}://{split.netloc.rpartition('@')[2]}{split.path.rstrip('/')}"
+
+
+def _converted(name: str, text: str, kind: Any) -> Any:
+    if kind == Path | None:
+        return Path(text)
+    try:
+        return msgspec.convert(None if text.lower() == "none" else text, kind, strict=False)
+    except msgspec.ValidationError as fault:
+        raise LanguageError(f"The variable {_PREFIX}{name.upper()} is {text!r} ({fault}); give another.") from None
+
+
+class ModelReply(msgspec.Struct, frozen=True):
+    """The answer of a model.
+
+    Attributes:
+        content: its text, empty where it gave none.
+        refusal: the sentence with which it refused, where the server marks refusals.
+        finish: why it ended: "stop", "length", "content_filter", "tool_calls", or what else the server says.
+        model: the model that answered, as the server names it.
+        tokens: how many tokens were read and written, 0 where the server does not say.
+    """
+
+    content: str
+    refusal: str | None = None
+    finish: str | None = "stop"
+    model: str = ""
+    tokens: tuple[int, int] = (0, 0)
+
+
+class _Exchange(msgspec.Struct):
+    request: str
+    asked: str
+    answer: ModelReply
+
+
+class Replay:
+    """The exchanges of a file. A request is known by its messages; what was asked often is answered in that order.
+
+    Attributes:
+        path: the file; each line is one exchange. Neither a key nor the address of the server is in it.
+        recording: whether exchanges are added to it instead of read from it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open a file that is there, or begin one that is not.
+
+        Raises:
+            LanguageError: it cannot be read, or is no file of exchanges.
+        """
+        self.path, self.recording = path, not path.exists()
+        self._answers: dict[str, list[ModelReply]] = {}
+        try:
+            raw = b"" if self.recording else path.read_bytes()
+            for line in raw[: raw.rfind(b"\n") + 1].splitlines():  # a kill tears the last line
+                known = msgspec.json.decode(line, type=_Exchange)
+                self._answers.setdefault(known.request, []).append(known.answer)
+        except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as fault:
+            raise LanguageError(f"The replay file {path} cannot be read ({fault}); give another.") from None
+
+    def answer(self, messages: Messages) -> ModelReply:
+        """Return the recorded answer to these very messages.
+
+        Raises:
+            LanguageError: they were never sent.
+        """
+        answers = self._answers.get(_fingerprint(messages), [])
+        if not answers:
+            raise LanguageError(
+                f"The replay file {self.path} holds no answer to {quoted(messages[-1]['content'], 120)}; delete the "
+                "file to record it again."
+            )
+        return answers.pop(0) if len(answers) > 1 else answers[0]
+
+    def add(self, messages: Messages, answer: ModelReply) -> None:
+        """Write one exchange at the end of the file.
+
+        Raises:
+            LanguageError: it cannot be written.
+        """
+        line = msgspec.json.encode(_Exchange(_fingerprint(messages), messages[-1]["content"], answer))
+        try:
+            with self.path.open("ab") as file:
+                file.write(line + b"\n")
+        except OSError as fault:
+            raise LanguageError(f"The replay file {self.path} cannot be written ({fault.strerror}).") from None
+
+
+def _fingerprint(messages: Messages) -> str:
+    return sha256(msgspec.json.encode(messages, order="sorted")).hexdigest()
+
+
+def quoted(text: str, most: int = 200) -> str:
+    """Return a text of somebody else's as one quoted line that a terminal can show, cut where it is long."""
+    plain = " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+    return f"“{plain if len(plain) <= most else plain[: most - 1] + '…'}”"
 
 
 @dataclass(slots=True, eq=False)
-class EndpointFault(Exception):  # noqa: N818 - never leaves this package: sentences are made of it
-    """Why no answer came: a row of the sentences, or "status" for an HTTP status that is no success.
-
-    Attributes:
-        kind: of the fault.
-        status: the HTTP status, 0 where there is none.
-        message: what the server or the system says of it; ``code`` is the server's word for it.
-        param: the parameter that the server does not take, where it says so.
-        retry_after_s: when to try again, where the server says so.
-    """
+class _Fault(Exception):  # noqa: N818 - sentences are made of it
+    """Why no answer came: a row of the sentences, what the server says of it, and when to try again."""
 
     kind: str
+    told: str = ""
     status: int = 0
-    message: str = ""
-    param: str = ""
-    code: str = ""
     retry_after_s: float | None = None
 
 
@@ -79,7 +250,6 @@ class _Part(msgspec.Struct):
 class _Message(msgspec.Struct):
     content: str | list[_Part] | None = None
     refusal: str | None = None
-    tool_calls: list[Any] | None = None
 
 
 class _Choice(msgspec.Struct):
@@ -125,24 +295,32 @@ class Endpoint:
         self._most_tokens_word = "max_completion_tokens" if settings.hosted else "max_tokens"
         self._opener = build_opener(_NoRedirect(), *([ProxyHandler({})] if settings.on_this_machine else []))
 
-    def complete(self, request: ChatRequest, deadline: float | None = None) -> ModelReply:
-        """Return the server's answer to a request, before a deadline of the monotonic clock.
+    def complete(self, model: str, messages: Messages, deadline: float | None = None) -> ModelReply:
+        """Return the model's answer to some messages, before a deadline of the monotonic clock.
 
         Raises:
             LanguageError: none came; one sentence says why and what to do.
         """
-        deadline = monotonic() + self._settings.timeout_s if deadline is None else deadline
+        settings = self._settings
+        deadline = monotonic() + settings.timeout_s if deadline is None else deadline
         attempt = 0
         while True:
+            optional = {
+                "temperature": settings.temperature, "seed": settings.seed, self._most_tokens_word: settings.max_tokens
+            }  # fmt: skip
+            kept = {name: each for name, each in optional.items() if each is not None and name not in self.left_out}
             try:
-                answer = _read_answer(self._asked("chat/completions", deadline, self._parameters(request)))
+                answer = _reply(
+                    self._asked("chat/completions", deadline, {"model": model, "messages": messages, **kept})
+                )
                 return msgspec.structs.replace(answer, content=self._without_key(answer.content))
-            except EndpointFault as fault:
+            except _Fault as fault:
                 if self._adapted(fault):
                     continue
-                wait_s = self._wait_s(fault, attempt, deadline)
-                if wait_s is None:
-                    raise LanguageError(self._sentence(fault, request.model, attempt + 1)) from None
+                wait_s = min(0.5 * 2**attempt, 8.0) if fault.retry_after_s is None else fault.retry_after_s
+                passes = fault.kind == "broken" or fault.status in _BUSY
+                if not passes or attempt >= settings.retries or monotonic() + wait_s > deadline:
+                    raise LanguageError(self._sentence(fault, model)) from None
             sleep(wait_s)
             attempt += 1
 
@@ -155,86 +333,61 @@ class Endpoint:
         offered = () if self._settings.hosted else self._models()
         if len(offered) == 1:
             return offered[0]
-        choice = f" to one of {_listed(offered)}" if offered else ", such as the name that the server was started with"
-        raise LanguageError(f"No chat model is named for {self._settings.shown_url}: set AVLMAPS_CHAT_MODEL{choice}.")
+        choice = _listed(offered) or "the name that the server was started with"
+        raise LanguageError(
+            f"No chat model is named for {self._settings.shown_url}: set AVLMAPS_CHAT_MODEL to {choice}."
+        )
 
     def _models(self) -> tuple[str, ...]:
         try:
-            raw = self._asked("models", monotonic() + min(self._settings.timeout_s, _MOST_MODELS_WAIT_S))
+            raw = self._asked("models", monotonic() + min(self._settings.timeout_s, _MODELS_WAIT_S))
             return tuple(model.id for model in _decoded(raw, _Models).data)
-        except EndpointFault as fault:
+        except _Fault as fault:
             if fault.kind == "unreachable":
-                raise LanguageError(self._sentence(fault, "", 1)) from None
+                raise LanguageError(self._sentence(fault, "")) from None
             return ()
 
-    def _parameters(self, request: ChatRequest) -> dict[str, Any]:
-        optional = {
-            "temperature": request.temperature,
-            "seed": request.seed,
-            self._most_tokens_word: request.max_tokens,
-        }
-        kept = {name: value for name, value in optional.items() if value is not None and name not in self.left_out}
-        return {"model": request.model, "messages": request.messages, **kept}
-
-    def _asked(self, path: str, deadline: float, parameters: dict[str, Any] | None = None) -> bytes:
-        """Return the body of one request's answer; raises EndpointFault where none came before the deadline."""
+    def _asked(self, path: str, deadline: float, parameters: Mapping[str, Any] | None = None) -> bytes:
+        """Return the body of one request's answer; raises _Fault where none came before the deadline."""
         headers = {"Authorization": f"Bearer {self._settings.api_key or 'none'}", "Content-Type": "application/json"}
         body = None if parameters is None else msgspec.json.encode(parameters)
         request = Request(f"{self._settings.base_url.rstrip('/')}/{path}", body, headers)
         try:
             with self._opener.open(request, timeout=max(deadline - monotonic(), 0.01)) as response:
-                return _read(response, MOST_BYTES, deadline)
+                return _read(response, deadline)
         except HTTPError as fault:
-            try:
-                raw = _read(fault, _MOST_ERROR_BYTES, deadline)
-            except (EndpointFault, OSError, HTTPException):
-                raw = b""
-            raise _read_error(fault.code, raw, fault.headers) from None
-        except TimeoutError:
-            raise EndpointFault("timeout") from None
-        except URLError as fault:
-            if isinstance(fault.reason, TimeoutError):
-                raise EndpointFault("timeout") from None
-            raise EndpointFault("unreachable", message=str(fault.reason)) from None
+            raise _of_status(fault, deadline) from None
         except (OSError, HTTPException) as fault:
-            raise EndpointFault("broken", message=str(fault) or type(fault).__name__) from None
+            reason = fault.reason if isinstance(fault, URLError) else fault
+            if isinstance(reason, TimeoutError):
+                raise _Fault("timeout") from None
+            kind = "unreachable" if isinstance(fault, URLError) else "broken"
+            raise _Fault(kind, str(reason) or type(reason).__name__) from None
 
-    def _adapted(self, fault: EndpointFault) -> bool:
+    def _adapted(self, fault: _Fault) -> bool:
         """Leave out, or name otherwise, the parameter that the server does not take; return whether there was one."""
-
-        def named(parameter: str) -> bool:
-            said = not fault.param and re.search(rf"\b{parameter}\b", fault.message) is not None
-            return fault.status in (400, 422) and (fault.param == parameter or said)
-
-        if self._most_tokens_word == "max_tokens" and named("max_tokens"):
+        optional = ("max_tokens", "temperature", "seed")
+        wrong = next((name for name in optional if re.search(rf"\b{name}\b", fault.told)), None)
+        if fault.status not in (400, 422) or wrong is None or wrong in self.left_out:
+            return False
+        if wrong == "max_tokens":
+            is_new = self._most_tokens_word == "max_tokens"
             self._most_tokens_word = "max_completion_tokens"
-            return True
-        wrong = [name for name in ("temperature", "seed") if name not in self.left_out and named(name)]
-        self.left_out += wrong[:1]
-        return bool(wrong)
+            return is_new
+        self.left_out.append(wrong)
+        return True
 
-    def _wait_s(self, fault: EndpointFault, attempt: int, deadline: float) -> float | None:
-        """Return how long to wait before another attempt, None where there is to be none."""
-        passes = fault.kind == "broken" or (fault.status in _BUSY and fault.code != "insufficient_quota")
-        if not passes or attempt >= self._settings.retries:
-            return None
-        wait_s = min(0.5 * 2**attempt, 8.0) if fault.retry_after_s is None else fault.retry_after_s
-        return wait_s if monotonic() + wait_s < deadline else None
-
-    def _sentence(self, fault: EndpointFault, model: str, attempts: int) -> str:
+    def _sentence(self, fault: _Fault, model: str) -> str:
         settings = self._settings
-        offered = self._models() if fault.status == 404 and not settings.hosted else ()
-        sentence = _SENTENCES[_kind_of(fault)].format(
+        status = f"HTTP {fault.status}: {quoted(fault.told)}" if fault.told else f"HTTP {fault.status}"
+        sentence = _SENTENCES[fault.kind].format(
             url=settings.shown_url,
             model=model,
-            message=fault.message,
             timeout_s=settings.timeout_s,
-            times="once" if attempts == 1 else f"{attempts} times",
-            told=f"HTTP {fault.status}" + (f": {quoted(fault.message)}" if fault.message.strip() else ""),
+            told=status if fault.status else fault.told,
             start="start the server there (Ollama: ollama serve)" if settings.on_this_machine else "check the network",
             key="OPENAI_API_KEY" if settings.hosted else "AVLMAPS_CHAT_API_KEY",
-            held="does not accept the key" if settings.api_key else "asks for a key",
-            offered=_listed(offered) or "those that the server has",
+            offered=(_listed(self._models()) if fault.kind == "model" else "") or "one that the server has",
             wait=f"in {fault.retry_after_s:.0f} s" if fault.retry_after_s else "later",
         )
         return self._without_key(sentence)
@@ -245,72 +398,58 @@ class Endpoint:
         return text.replace(key, "…") if len(key) >= _SHORTEST_KEY else text
 
 
-def _kind_of(fault: EndpointFault) -> str:
-    if fault.kind != "status":
-        return fault.kind
-    if fault.code == "insufficient_quota":
-        return "quota"
-    rows = {401: "key", 403: "key", 404: "model", 429: "busy"}
-    return rows.get(
-        fault.status, "redirect" if 300 <= fault.status < 400 else "failed" if fault.status >= 500 else "other"
-    )
-
-
-def _read(response: Any, most: int, deadline: float) -> bytes:
-    """Return a body; one that is too long, torn, or slower than the deadline raises EndpointFault."""
+def _read(response: Any, deadline: float) -> bytes:
+    """Return a body; one that is too long, torn, or slower than the deadline raises _Fault."""
     body = bytearray()
     while chunk := response.read1(1 << 16):
         body += chunk
-        if len(body) > most:
-            raise EndpointFault("huge", message=f"{most >> 10} KiB")
+        if len(body) > MOST_BYTES:
+            raise _Fault("garbled", f"more than {MOST_BYTES >> 10} KiB")
         if monotonic() > deadline:
-            raise EndpointFault("timeout")
+            raise _Fault("timeout")
     if getattr(response, "length", None):
-        raise EndpointFault("broken", message="less came than was promised")
+        raise _Fault("broken", "less came than was promised")
     return bytes(body)
 
 
-def _read_answer(raw: bytes) -> ModelReply:
-    """Return the first choice of a completion; raises EndpointFault where it has none, or is an error after all."""
+def _reply(raw: bytes) -> ModelReply:
+    """Return the first choice of a completion; raises _Fault where it has none, or is an error after all."""
     completion = _decoded(raw, _Completion)
-    if completion.error and not completion.choices:
-        raise _read_error(200, raw, {})
     if not completion.choices:
-        raise EndpointFault("empty")
-    choice = completion.choices[0]
-    parts = choice.message.content if isinstance(choice.message.content, list) else []
-    content = choice.message.content if isinstance(choice.message.content, str) else ""
-    usage = completion.usage if isinstance(completion.usage, dict) else {}
+        raise _Fault("other", _message(completion.error), 200)
+    choice, usage = completion.choices[0], completion.usage if isinstance(completion.usage, dict) else {}
+    content = choice.message.content or ""
+    parts = [] if isinstance(content, str) else content
     read, written = (usage.get(f"{name}_tokens") for name in ("prompt", "completion"))
     return ModelReply(
-        content=content or "".join(part.text or "" for part in parts),
+        content=content if isinstance(content, str) else "".join(part.text or "" for part in parts),
         refusal=choice.message.refusal or next((part.refusal for part in parts if part.refusal), None),
         finish=choice.finish_reason,
-        tool_calls=len(choice.message.tool_calls or ()),
-        model="".join(letter for letter in completion.model or "" if letter.isprintable())[:_LONGEST_NAME],
+        model=quoted(completion.model or "", 100).strip("“”"),
         tokens=(read if isinstance(read, int) else 0, written if isinstance(written, int) else 0),
     )
 
 
-def _read_error(status: int, raw: bytes, headers: Any) -> EndpointFault:
-    """Return the fault in a body of an HTTP error, in any of the usual shapes."""
-    fault = EndpointFault("status", status, retry_after_s=_seconds(headers.get("retry-after")))
-    if 300 <= status < 400:
-        fault.message = headers.get("location") or ""
-        return fault
+def _of_status(fault: HTTPError, deadline: float) -> _Fault:
+    """Return the fault that an HTTP error is; its message in any of the usual shapes."""
     try:
-        body = msgspec.json.decode(raw)
+        raw = _read(fault, deadline)
+    except (_Fault, OSError, HTTPException):
+        raw = b""
+    try:
+        told = fault.headers.get("location") or _message(msgspec.json.decode(raw))
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
-        text = raw.decode("utf-8", "replace").strip()
-        fault.message = "" if text.startswith("<") else text
-        return fault
+        told = "" if raw.lstrip()[:1] == b"<" else raw.decode("utf-8", "replace").strip()
+    wait = fault.headers.get("retry-after") or ""
+    seconds = float(wait) if re.fullmatch(r"\d{1,9}(\.\d+)?", wait) else None  # it may be a date
+    return _Fault(_STATUSES.get(fault.code, "other"), told, fault.code, seconds)
+
+
+def _message(body: Any) -> str:
     told = body.get("error", body) if isinstance(body, dict) else body
     if isinstance(told, dict):
-        fault.message = str(told.get("message") or told.get("detail") or told.get("error") or "")
-        fault.param, fault.code = str(told.get("param") or ""), str(told.get("code") or told.get("type") or "")
-    else:
-        fault.message = told if isinstance(told, str) else ""
-    return fault
+        told = " ".join(str(told[name]) for name in ("param", "message", "detail", "error") if told.get(name))
+    return told if isinstance(told, str) else ""
 
 
 def _decoded(raw: bytes, shape: type[Shape]) -> Shape:
@@ -318,18 +457,9 @@ def _decoded(raw: bytes, shape: type[Shape]) -> Shape:
         return msgspec.json.decode(raw, type=shape)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as fault:
         is_page = raw.lstrip()[:1] == b"<"
-        odd = "an HTML page" if is_page else f"something that is not what it should be ({quoted(str(fault))})"
-        raise EndpointFault("garbled", message=odd) from None
+        raise _Fault("garbled", "an HTML page" if is_page else f"something else ({quoted(str(fault))})") from None
 
 
-def _seconds(retry_after: str | None) -> float | None:
-    """Return the seconds of a Retry-After header; None where it holds a date."""
-    try:
-        seconds = float(retry_after or "nan")
-    except ValueError:
-        return None
-    return max(seconds, 0.0) if seconds < 1e9 else None  # not a number is no time to wait either
-
-
-def _listed(models: tuple[str, ...], most: int = 8) -> str:
-    return ", ".join(models[:most]) + (f" and {len(models) - most} more" if len(models) > most else "")
+def _listed(models: Sequence[str], most: int = 8) -> str:
+    more = f" and {len(models) - most} more" if len(models) > most else ""
+    return f"one of {', '.join(models[:most])}{more}" if models else ""

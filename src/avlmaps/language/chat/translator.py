@@ -11,13 +11,11 @@ import re
 from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
+from textwrap import dedent
 from time import monotonic
 
 from avlmaps.core.errors import LanguageError, ProgramError
-from avlmaps.language.chat.answer import ModelReply, UnusableAnswerError, program_text, quoted, without_thoughts
-from avlmaps.language.chat.endpoint import Endpoint
-from avlmaps.language.chat.replay import ChatRequest, Message, Replay
-from avlmaps.language.chat.settings import ChatSettings
+from avlmaps.language.chat.endpoint import ChatSettings, Endpoint, ModelReply, Replay, quoted
 from avlmaps.language.commands import check_order
 from avlmaps.language.program import SKILLS, Program, parse_program, skill_lines
 from avlmaps.language.program.parser import called
@@ -31,6 +29,26 @@ _MOVES_NOTHING = (
     "or `# cannot: ` and the reason."
 )
 _LOADERS = frozenset({"load_image", "load_sound"})
+_TAGS = "think|thinking|thought|reasoning"
+# Some servers cut off the tag that begins the thoughts: all before the last tag that ends them is thought.
+_THOUGHTS = re.compile(rf".*(?:</(?:{_TAGS})>|\[/THINK\])", re.IGNORECASE | re.DOTALL)
+_ENDLESS_THOUGHT = re.compile(rf"\s*(?:<(?:{_TAGS})>|\[THINK\])", re.IGNORECASE)
+_ONE_LINE = re.compile(r"^(`+)(?:python[ \t]+)?([^`\n]+)\1$")
+_FENCE = r"^[ \t]*(`{3,}|~{3,})[ \t]*(\w*)[^\n`]*$\n?"
+_BLOCK = re.compile(rf"{_FENCE}(.*?)^[ \t]*\1[`~]*[ \t]*$", re.MULTILINE | re.DOTALL)
+_OPEN_BLOCK = re.compile(rf"{_FENCE}(.*)", re.MULTILINE | re.DOTALL)
+_PYTHON = frozenset({"", "python", "py", "python3", "robot"})
+_CANNOT = re.compile(r"(?:#[ \t]*)?cannot[ \t]*:(.*)", re.IGNORECASE)
+_REFUSAL = re.compile(
+    r"^\W*(?:(?:i['’]?m|i am|we are|we['’]re) (?:very |so |really |afraid )?(?:sorry|unable|not able|i can)"
+    r"|sorry\b|i (?:can['’]?t|cannot|won['’]?t|will not|must decline|must refuse)|unfortunately\b|as an ai\b)",
+    re.IGNORECASE,
+)
+Message = dict[str, str]
+
+
+class UnusableAnswerError(LanguageError):
+    """An answer holds no program; the model may try once more."""
 
 
 class ChatTranslator:
@@ -42,6 +60,8 @@ class ChatTranslator:
     something again is taken the second time, for the model may know that nothing more was said.
     """
 
+    name = "chat"
+
     def __init__(self, settings: ChatSettings | None = None) -> None:
         self._settings = settings or ChatSettings.from_environment()
         self._replay = Replay(self._settings.replay) if self._settings.replay else None
@@ -49,11 +69,6 @@ class ChatTranslator:
         self._model = self._settings.model
         self._command = ""
         self._rounds_used = 0
-
-    @property
-    def name(self) -> str:
-        """The word by which a user chooses this translator."""
-        return "chat"
 
     def program_for(self, command: str) -> Translation:
         """Return the program that the model writes for a command; it parses, but has not run.
@@ -87,7 +102,7 @@ class ChatTranslator:
         if self._rounds_used >= self._settings.rounds:
             return None
         self._rounds_used += 1
-        failed = (Message("assistant", program_message(program)), Message("user", failed_message(error, done)))
+        failed = (_message("assistant", program_message(program)), _message("user", failed_message(error, done)))
         return self._translated(command, (*_opening(command), *failed))
 
     def _translated(self, command: str, messages: tuple[Message, ...]) -> Translation:
@@ -98,67 +113,112 @@ class ChatTranslator:
         while True:
             answer = self._asked(messages, deadline)
             read, written = read + answer.tokens[0], written + answer.tokens[1]
+            is_last = self._rounds_used >= self._settings.rounds
             try:
                 program = program_text(answer)
                 parsed = _parsed(program, answer)
                 check_files(parsed, plain_command(command))
-                check_moves(parsed, insisted=_MOVES_NOTHING in corrected or self._rounds_used >= self._settings.rounds)
+                if not any(SKILLS[skill].moves for skill in parsed.skills):
+                    insists = is_last or _MOVES_NOTHING in corrected
+                    if not (insists and parsed.skills):
+                        raise UnusableAnswerError(_MOVES_NOTHING)
                 return Translation(program, self._notes(answer.model, corrected, read, written))
             except (ProgramError, UnusableAnswerError) as fault:
-                if self._rounds_used >= self._settings.rounds:
+                why = quoted(str(fault), 300).strip("“”")  # it may quote what a model wrote
+                if is_last:
+                    attempts = f"{self._rounds_used + 1} attempt{'s' * (self._rounds_used > 0)}"
                     raise LanguageError(
-                        f"The chat model {answer.model or self._model!r} wrote no usable program in "
-                        f"{_attempts(self._rounds_used + 1)}, the last time because: {_one_sentence(fault)} Say it in "
-                        "other words, or ask another model."
+                        f"The chat model {answer.model or self._model!r} wrote no usable program in {attempts}, the "
+                        f"last time because: {why} Say it in other words, or ask another model."
                     ) from None
                 said = without_thoughts(answer.content).strip()[:_MOST_SAID_CHARACTERS] or "(nothing)"
-                messages = (*messages, Message("assistant", said), Message("user", unusable_message(str(fault))))
-                corrected.append(_one_sentence(fault))
+                messages = (*messages, _message("assistant", said), _message("user", unusable_message(str(fault))))
+                corrected.append(why)
             self._rounds_used += 1
 
     def _asked(self, messages: tuple[Message, ...], deadline: float) -> ModelReply:
-        settings, replay = self._settings, self._replay
-        replayed = replay if replay and not replay.recording else None
-        if self._model is None:
-            self._model = (replayed.model or "") if replayed else self._server().model()
-        request = ChatRequest(self._model, messages, settings.temperature, settings.seed, settings.max_tokens)
-        if replayed:
-            return replayed.answer(request)
-        answer = self._server().complete(request, deadline)
-        if replay:
-            replay.add(request, answer)
-        return answer
-
-    def _server(self) -> Endpoint:
+        replay = self._replay
+        if replay and not replay.recording:
+            return replay.answer(messages)
         if self._endpoint is None:
             self._endpoint = Endpoint(self._settings)
-        return self._endpoint
+        self._model = self._model or self._endpoint.model()
+        answer = self._endpoint.complete(self._model, messages, deadline)
+        if replay:
+            replay.add(messages, answer)
+        return answer
 
     def _notes(self, model: str, corrected: Sequence[str], read: int, written: int) -> tuple[str, ...]:
-        replay = self._replay
-        replayed = replay is not None and not replay.recording
-        where = f"replayed from {replay.path}" if replay and replayed else f"at {self._settings.shown_url}"
+        replayed = self._replay is not None and not self._replay.recording
+        where = f"replayed from {self._settings.replay}" if replayed else f"at {self._settings.shown_url}"
         tokens = f", {read} tokens read and {written} written" if read or written else ""
-        notes = [f"Written by {model or self._model} {where}{tokens}."]
-        notes += [f"Corrected, because: {fault}" for fault in corrected]
-        for name in self._endpoint.left_out if self._endpoint else ():
-            notes.append(f"The server does not take a {name}, so the next answer may be another.")
-        return tuple(notes)
+        left_out = self._endpoint.left_out if self._endpoint else ()
+        return (
+            f"Written by {model or self._model} {where}{tokens}.",
+            *(f"Corrected, because: {fault}" for fault in corrected),
+            *(f"The server does not take a {name}, so the next answer may be another." for name in left_out),
+        )
 
 
-def check_moves(program: Program, *, insisted: bool = False) -> None:
-    """Refuse a program that moves nothing: it would be reported as done, with nothing done.
-
-    Args:
-        program: what a model wrote.
-        insisted: whether the model had this refusal before, or cannot have it; then a program that asks is taken.
+def program_text(answer: ModelReply) -> str:
+    """Return the program that an answer holds: its one code block, or all of it where it has no block.
 
     Raises:
-        UnusableAnswerError: it moves nothing.
+        UnusableAnswerError: it holds none, or several that differ (each may be one step of the whole); why is said so
+            that the model can do better.
+        LanguageError: the model refused, says that the command cannot be done, or was cut off.
     """
-    if any(SKILLS[skill].moves for skill in program.skills) or (insisted and program.skills):
-        return
-    raise UnusableAnswerError(_MOVES_NOTHING)
+    if answer.refusal or answer.finish == "content_filter":
+        raise LanguageError(_refused(answer.refusal or answer.content or "its provider's filter stopped the answer"))
+    if answer.finish == "length":
+        raise LanguageError(
+            f"The answer of the chat model was cut off after {answer.tokens[1] or 'too many'} tokens; "
+            "raise AVLMAPS_CHAT_MAX_TOKENS, or the length of context that the server allows."
+        )
+    said = without_thoughts(answer.content).strip()
+    if not said:
+        raise UnusableAnswerError(
+            "The answer is empty. There are no tools: write the program as text in one code block."
+        )
+    program = _only_block(said)
+    written = said if program is None else program
+    cannot = _CANNOT.fullmatch(written.strip())
+    if cannot:
+        why = quoted(cannot[1]) if cannot[1].strip() else "it does not say why"
+        raise LanguageError(f"The chat model says that the command cannot be done: {why}; say it in other words.")
+    if program is None and _REFUSAL.match(written):
+        raise LanguageError(_refused(written))
+    if not written.strip():
+        raise UnusableAnswerError("The code block is empty.")
+    return written
+
+
+def without_thoughts(content: str) -> str:
+    """Return an answer without what a reasoning model thought aloud before it; of endless thoughts nothing is left."""
+    said = _THOUGHTS.sub("", content, count=1)
+    return "" if _ENDLESS_THOUGHT.match(said) else said
+
+
+def _refused(text: str) -> str:
+    return f"The chat model refuses the command: {quoted(text)}; say it in other words, or ask another model."
+
+
+def _only_block(said: str) -> str | None:
+    """Return the one code block that can be Python, None where there is no block at all."""
+    if one_line := _ONE_LINE.match(said):
+        return one_line[2].strip()
+    plain = said.replace("\r\n", "\n")
+    blocks = [(language.lower(), dedent(text).strip("\n")) for _, language, text in _BLOCK.findall(plain)]
+    begun = _OPEN_BLOCK.search(_BLOCK.sub("", plain))
+    if begun and (not blocks or (begun[2].lower() in _PYTHON and begun[3].strip())):
+        raise UnusableAnswerError("The code block is never closed, so it may be half a program.")
+    fitting = [text for language, text in blocks if language in _PYTHON] or [text for _, text in blocks]
+    different = list(dict.fromkeys(text for text in fitting if text.strip()))
+    if len(different) > 1:
+        raise UnusableAnswerError(
+            f"There are {len(different)} code blocks that differ; write one block with all steps in it."
+        )
+    return next(iter([*different, *fitting]), None)
 
 
 def check_files(program: Program, command: str) -> None:
@@ -174,17 +234,17 @@ def check_files(program: Program, command: str) -> None:
         name = path.value if isinstance(path, ast.Constant) else None
         if not isinstance(name, str) or not name.strip():
             raise ProgramError(f"Line {call.lineno}: `{called(call)}` takes the file's name written out in quotes.")
-        if not _names_file(command, name.removeprefix("./")):
+        plain = re.escape(name.removeprefix("./"))  # as a whole, and not as a part of another name
+        if re.search(rf"(?<![\w/.-])(?:\./)?{plain}(?![\w/-]|\.\w)", command) is None:
             raise ProgramError(f"Line {call.lineno}: the file {name!r} is not named in the command.")
 
 
-def _names_file(command: str, name: str) -> bool:
-    """Return whether a file's name stands in a command as a whole, and not as a part of another."""
-    return re.search(rf"(?<![\w/.-])(?:\./)?{re.escape(name)}(?![\w/-]|\.\w)", command) is not None
+def _message(role: str, content: str) -> Message:
+    return {"role": role, "content": content}
 
 
 def _opening(command: str) -> tuple[Message, ...]:
-    return (Message("system", system_prompt()), Message("user", command_message(command)))
+    return (_message("system", system_prompt()), _message("user", command_message(command)))
 
 
 def _parsed(program: str, answer: ModelReply) -> Program:
@@ -197,15 +257,6 @@ def _parsed(program: str, answer: ModelReply) -> Program:
                 f"The answer has no code block, and by itself it is no program: {fault}"
             ) from None
         raise
-
-
-def _one_sentence(fault: Exception) -> str:
-    """Return a fault's sentence as a terminal can show it: it may quote what a model wrote."""
-    return quoted(str(fault), 300).strip("“”")
-
-
-def _attempts(count: int) -> str:
-    return "1 attempt" if count == 1 else f"{count} attempts"
 
 
 @cache
