@@ -6,7 +6,6 @@ import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import sleep
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -173,8 +172,13 @@ def test_a_signal_after_the_program_does_not_say_that_no_goal_was_sent(
         raise Interrupted(signal.SIGTERM)
 
     unseen = Halt(False, "no goal was active, but the robot is not seen to stand")
-    usual = {"halt": lambda: unseen, "close": lambda: None, "owes": lambda: False, "contacts": lambda: None}
-    robot: Any = SimpleNamespace(**usual | {when: stop}, driver=None, start=None)
+
+    class Robot:
+        pose, halt = None, staticmethod(lambda: unseen)
+        close = staticmethod(stop if when == "close" else lambda: None)
+        owes = property(lambda _: stop()) if when == "owes" else False
+
+    robot: Any = Robot()
     monkeypatch.setattr("avlmaps.navigate.instruct.instruct", lambda *_, **__: None)
     monkeypatch.setattr("avlmaps.navigate.rehearsal.unfound", lambda *_, **__: None)
     nothing: Any = None

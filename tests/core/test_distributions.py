@@ -13,7 +13,7 @@ from avlmaps.core.errors import BackendError, NavigationError
 from avlmaps.core.extras import MODELS, OTHERS, SIMULATOR, Distribution, how_to_get, install_command
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
-from avlmaps.navigate import scenes
+from avlmaps.navigate import robots
 from avlmaps.perception import encoders as profiles
 from avlmaps_models import entries
 
@@ -27,7 +27,7 @@ def project(distribution: Distribution) -> dict:
 @pytest.fixture
 def alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """As where `avlmaps` is installed and nothing else."""
-    for module in (registry, verbs, scenes, profiles):
+    for module in (registry, verbs, robots, profiles):
         monkeypatch.setattr(module, "entry_points", lambda group: EntryPoints(()))
     monkeypatch.setattr(verbs, "installed", verbs.installed.__wrapped__)
 
@@ -68,7 +68,7 @@ def test_a_verb_that_is_not_installed_says_how_to_get_it(verb: str, alone: None,
 
 def test_a_scene_a_profile_and_a_backend_that_are_not_installed_say_how_to_get_them(alone: None) -> None:
     with pytest.raises(NavigationError) as fault:
-        scenes.open_robot_scene("house:7")
+        robots.open_robot_scene("house:7")
     assert str(fault.value).endswith(f"get it with: {install_command(distribution='avlmaps-sim')}")
     get = install_command(distribution="avlmaps-models")
     with pytest.raises(BackendError, match="profile 'paper' is not installed") as fault:

@@ -3,21 +3,23 @@
 import threading
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE
-from avlmaps.navigate.brake import Brake, BrakedDriver
 from avlmaps.navigate.costmap import obstacles_for
-from avlmaps.navigate.driver import Arrival, Driver
+from avlmaps.navigate.driver import Arrival
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.drive.app import DriveService
 from avlmaps.serve.drive.orders import Dispatcher, OrderLog
 from avlmaps.serve.service import Service
 from helpers.kinematic import KinematicDriver
+
+if TYPE_CHECKING:
+    from avlmaps.serve.drive.robots import Machine
 
 START = GroundPose(4.4, 3.2, 0.0)
 
@@ -27,6 +29,10 @@ class HeldDriver(KinematicDriver):
 
     let_go: threading.Event
     halted: threading.Event
+    broken: str = ""
+
+    def fault(self) -> str:
+        return self.broken
 
     def turn(self, angle_rad: float) -> Arrival:
         while not self.let_go.wait(0.01):
@@ -45,7 +51,7 @@ class CountingMachine:
     shape: Any = BASE
     guess: bool = False
     start: GroundPose = START
-    broken: str = ""
+    pace_s: float = 0.0
     stands: bool = True
     prepared: list[str] = field(default_factory=list)
     stops: int = 0
@@ -68,15 +74,10 @@ class CountingMachine:
             self.body.level_from_world = np.asarray(self._obstacles.level_from_world)
         return self._obstacles
 
-    def pose(self) -> GroundPose:
-        return self.body.pose
-
-    def fault(self) -> str:
-        return self.broken
-
-    def driver(self, brake: Brake) -> Driver:
+    @property
+    def driver(self) -> HeldDriver:
         self.body.halted.clear()
-        return BrakedDriver(self.body, brake)
+        return self.body
 
     def stop(self) -> tuple[bool, str]:
         self.stops += 1
@@ -115,5 +116,5 @@ class Driven:
 def driven(maps: Service, log: Path, machine: CountingMachine | None = None) -> Driven:
     """Return a driving server beside a server of maps."""
     machine, now_s = machine or CountingMachine(), [0.0]
-    dispatcher = Dispatcher(machine, maps.shelf.get, OrderLog(log), clock=lambda: now_s[0])
+    dispatcher = Dispatcher(cast("Machine", machine), maps.shelf.get, OrderLog(log), clock=lambda: now_s[0])
     return Driven(machine, dispatcher, DriveService(dispatcher, maps), log, now_s)

@@ -210,24 +210,20 @@ def test_one_order_at_a_time_and_a_stop_at_any_time(client: TestClient, drive: D
 
 
 def test_an_area_that_is_forbidden_while_it_drives_stops_the_robot(
-    client: TestClient, drive: Driven, service: Service, monkeypatch: pytest.MonkeyPatch
+    client: TestClient, drive: Driven, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    known: dict[str, str] = {}
-    monkeypatch.setattr("avlmaps.serve.drive.orders._WATCH_S", 0.01)
-    monkeypatch.setattr("avlmaps.serve.drive.orders._forbidden", lambda now: dict(known))
+    areas = [""]
+    monkeypatch.setattr("avlmaps.navigate.brake.stamp", lambda path: areas[-1])
+    monkeypatch.setattr("avlmaps.navigate.brake.Brake._forbidden", lambda brake: areas[-1])
     token = plan(client, "wait 500 seconds, then turn left")["token"]
     assert client.post("/drive/confirm", json={"token": token}).status_code == 202
-    from avlmaps.serve.shelf import ServedMap
-
-    monkeypatch.setattr(ServedMap, "version", property(lambda self: "renamed"))
     sleep(0.1)
     assert client.get("/drive/status").json()["state"] == "driving", "another edit stops nothing"
-    known["7f"] = "the wet floor"
-    monkeypatch.setattr(ServedMap, "version", property(lambda self: "forbidden"))
+    areas.append("the wet floor")
     last = idle(client)["last"]
     assert last["stopped"] is True and last["outcome"]["ok"] is False
     assert drive.machine.motions == 0 and drive.machine.stops == 1 and "stop" in drive.events
-    assert last["note"] == "the wet floor was forbidden while the robot drove; plan again."
+    assert last["note"] == "the wet floor was forbidden meanwhile, so that the robot was stopped (plan again)"
 
 
 def test_a_robot_that_is_not_seen_to_stand_takes_no_order_until_it_is(client: TestClient, drive: Driven) -> None:
@@ -259,7 +255,7 @@ def test_an_order_that_fails_while_the_robot_may_move_leaves_it_unstopped(
 
 def test_a_robot_that_cannot_be_driven_is_not(client: TestClient, drive: Driven) -> None:
     token = plan(client, "turn left")["token"]
-    drive.machine.broken = "its pose is not known"
+    drive.machine.body.broken = "its pose is not known"
     refused = client.post("/drive/confirm", json={"token": token})
     assert refused.status_code == 503 and "its pose is not known" in refused.json()["error"]["message"]
     assert client.post("/drive/plan", json={"words": "turn left"}).status_code == 503
@@ -276,7 +272,7 @@ def test_without_a_log_nothing_moves_and_a_stop_is_accepted(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("avlmaps.serve.drive.orders.os.write", full)
+        patch.setattr("avlmaps.serve.drive.orders.os.fsync", full)
         refused = client.post("/drive/confirm", json={"token": token})
         assert refused.status_code == 503 and "No space left" in refused.json()["error"]["message"]
         assert client.post("/drive/stop").status_code == 200
@@ -430,7 +426,7 @@ def test_a_stop_voids_plans_that_are_still_computed(
     for thread in asking:
         thread.start()
     assert computing.wait(30.0)
-    until(lambda: drive.service.waiting == 3)
+    until(lambda: drive.service.orders.taken == 3)
     assert client.post("/drive/stop").status_code == 200
     stopped.set()
     for thread in asking:

@@ -47,7 +47,7 @@ def test_it_drives_in_its_scene_stays_where_it_stops_and_is_stopped(
         assert idle()["pose"]["heading_deg"] == pytest.approx(180.0, abs=5.1)
         drive("turn right")
         assert idle()["pose"]["heading_deg"] == pytest.approx(90.0, abs=5.1)
-        driving.dispatcher._machine._read.action_s = 5.0  # pyright: ignore[reportAttributeAccessIssue]
+        driving.dispatcher.machine.pace_s = 5.0
         drive("turn around")
         assert client.post("/drive/stop").json()["stopped"] is True
         status = idle()

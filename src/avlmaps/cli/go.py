@@ -15,17 +15,10 @@ from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import numpy as np
-    from jaxtyping import Float
-
     from avlmaps.core.motion import GroundPose
     from avlmaps.language.translator import Translation, Translator
-    from avlmaps.maps.obstacles import Obstacles
-    from avlmaps.navigate.driver import Driver
     from avlmaps.navigate.instruct import Outcome
-    from avlmaps.navigate.interrupts import Halt
+    from avlmaps.navigate.robots import RobotDriver
     from avlmaps.navigate.skills import RobotSettings
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.heatmap import Heatmap
@@ -113,19 +106,6 @@ class Go(Asking, MapVerb):
             raise AnsweredError(failed["message"], UNCONFIRMED_STATUS if answer.get("robot_stopped") is False else 1)
 
 
-@dataclass(frozen=True, slots=True)
-class Ready:
-    """A robot that is ready for a program."""
-
-    driver: "Driver"
-    start: "GroundPose"
-    obstacles: "Obstacles"
-    contacts: "Callable[[], Float[np.ndarray, 'm 2'] | None]"  # where it touched what the map does not know
-    halt: "Callable[[], Halt]"  # how it stands after an interrupt
-    owes: "Callable[[], bool]"  # whether a goal was sent whose end is not confirmed
-    close: "Callable[[], None]"  # ends the connection; a real robot stops where it is
-
-
 def go(verb: "Go") -> dict[str, Any]:
     """Do what the sentence says, and return the report."""
     start = read_start(verb.start)
@@ -207,12 +187,11 @@ def _driven(verb: "Go", start: "GroundPose | None", settings: "QuerySettings") -
     # A sentence that is not understood fails here, before a scene is made.
     translation = _read(verb, translator)
     verb = numbers_left(verb, translation)
-    robot = simulated_robot(verb, avlmap, start) if verb.robot == "simulated" else _real(verb, avlmap)
-    return drive(verb, avlmap, robot, translator, translation)
+    return drive(verb, avlmap, robot_of(verb, avlmap, start), translator, translation)
 
 
 def drive(
-    verb: "Go", avlmap: "AVLMap", robot: Ready, translator: "Translator", translation: "Translation"
+    verb: "Go", avlmap: "AVLMap", robot: "RobotDriver", translator: "Translator", translation: "Translation"
 ) -> dict[str, Any]:
     """Run the program of a command on a robot, and close the robot's connection after it.
 
@@ -222,22 +201,26 @@ def drive(
     from avlmaps.navigate.interrupts import Interrupted
 
     try:
+        start = robot.pose
         outcome = _obeyed(verb, avlmap, robot, translator, translation)
-        unconfirmed = {"robot_stopped": False} if robot.owes() else {}
+        unconfirmed = {"robot_stopped": False} if robot.owes else {}
+        answer = {**outcome.to_json(), **unconfirmed}
         if verb.plot is None:
-            return {**outcome.to_json(), **unconfirmed}
+            return answer
+        from avlmaps.navigate.bodies import SHAPES
+        from avlmaps.navigate.costmap import obstacles_for
         from avlmaps.navigate.trace_plot import plot_path
 
-        title = f"“{verb.sentence}”"
-        plot_path(verb.plot, avlmap.space, robot.start, outcome.moves, robot.obstacles, robot.contacts(), title)
-        return {**outcome.to_json(), **unconfirmed, "plot": str(verb.plot)}
+        obstacles, touched = obstacles_for(avlmap, SHAPES[verb.body]), getattr(robot, "touched", None)
+        plot_path(verb.plot, avlmap.space, start, outcome.moves, obstacles, touched, f"“{verb.sentence}”")
+        return {**answer, "plot": str(verb.plot)}
     except Interrupted as stop:  # also after the program: goals were sent, and the robot is not watched any more
         stop.halt = stop.halt or robot.halt()
         raise
 
 
 def _obeyed(
-    verb: "Go", avlmap: "AVLMap", robot: Ready, translator: "Translator", translation: "Translation"
+    verb: "Go", avlmap: "AVLMap", robot: "RobotDriver", translator: "Translator", translation: "Translation"
 ) -> "Outcome":
     from avlmaps.navigate.instruct import instruct
     from avlmaps.navigate.interrupts import Interrupted
@@ -246,15 +229,15 @@ def _obeyed(
     settings, heats = robot_settings(verb), dict[tuple[object, ...], "Heatmap"]()
     try:
         if verb.language != "chat":  # a chat model's program may decide while it drives
-            missing = unfound(verb.sentence, translation, avlmap, robot.start, heats, settings)
+            missing = unfound(verb.sentence, translation, avlmap, robot.pose, heats, settings)
             while missing is not None and missing.choices and (number := _choice(verb, missing)):
                 settings = replace(settings, choose=(*settings.choose, number))
-                missing = unfound(verb.sentence, translation, avlmap, robot.start, heats, settings)
+                missing = unfound(verb.sentence, translation, avlmap, robot.pose, heats, settings)
             if missing is not None:
                 say(translation.plan)
                 return missing
         return instruct(
-            verb.sentence, avlmap, robot.driver, translator, settings=settings, translation=translation, tell=say,
+            verb.sentence, avlmap, robot, translator, settings=settings, translation=translation, tell=say,
             heats=heats,
         )  # fmt: skip
     except Interrupted as stop:
@@ -322,28 +305,15 @@ def read_start(words: str | None) -> "GroundPose | None":
         raise UsageError(f"--start takes x,y,heading in metres and degrees, such as 1.5,2,90; not {words!r}.") from None
 
 
-def simulated_robot(verb: "Go", avlmap: "AVLMap", start: "GroundPose | None") -> Ready:
-    """Put a simulated robot into the scene that was mapped."""
-    from avlmaps.navigate.bodies import SHAPES
-    from avlmaps.navigate.interrupts import Halt
-    from avlmaps.navigate.scenes import open_robot_scene
-
-    robot = open_robot_scene(verb.scene or "").robot(avlmap, SHAPES[verb.body], start)
-    halt = Halt(True, "the simulated robot moves only while the command runs")
-    return Ready(
-        robot.driver, robot.start, robot.obstacles, lambda: robot.contacts, lambda: halt, lambda: False, lambda: None
-    )
-
-
-def _real(verb: "Go", avlmap: "AVLMap") -> Ready:
+def robot_of(verb: "Go", avlmap: "AVLMap", start: "GroundPose | None") -> "RobotDriver":
+    """Connect to a real robot, or put a simulated one into the scene that was mapped."""
     from avlmaps.navigate.bodies import SHAPES
     from avlmaps.navigate.costmap import obstacles_for
-    from avlmaps.navigate.real_robots import find_robot
+    from avlmaps.navigate.robots import find_robot, open_robot_scene
 
-    robot = find_robot(verb.robot, verb.ros, verb.ros_frames)
-    obstacles = obstacles_for(avlmap, SHAPES[verb.body])
-    driver = robot(obstacles)
-    return Ready(driver, driver.pose, obstacles, lambda: None, driver.halt, lambda: driver.owes, driver.close)
+    if verb.robot == "simulated":
+        return open_robot_scene(verb.scene or "").robot(avlmap, SHAPES[verb.body], start)
+    return find_robot(verb.robot, verb.ros, verb.ros_frames)(obstacles_for(avlmap, SHAPES[verb.body]))
 
 
 def failure(answer: dict[str, Any]) -> dict[str, Any] | None:

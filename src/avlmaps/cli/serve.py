@@ -107,7 +107,7 @@ def serve(verb: "Serve") -> None:
                 say("note: the token goes over the network unencrypted; give --tls-cert and --tls-key for https.")
             answer = {"url": url, "mcp": f"{url}/mcp", "maps": names, "token": settings.token is not None}
             if driving is not None:
-                robot, log = driving.dispatcher.robot, driving.dispatcher.log_file
+                robot, log = driving.dispatcher.machine.name, driving.dispatcher.log.path
                 lines.append(f"driving {robot} at {url}/drive (agents: {url}/drive/mcp, log: {log})")
                 answer |= {"drive": f"{url}/drive", "robot": robot, "log": str(log)}
             emit(answer, lines, verb.json)

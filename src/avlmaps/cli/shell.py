@@ -29,6 +29,7 @@ from avlmaps.core.progress import end_bars, say
 
 if TYPE_CHECKING:
     from avlmaps.core.motion import GroundPose
+    from avlmaps.navigate.robots import RobotDriver
     from avlmaps.query.avlmap import AVLMap
 
 _HELP = """\
@@ -123,7 +124,7 @@ class ShellSession:
             MapError: the map cannot be opened.
         """
         self.given, self._start = given, start
-        self._robot: going.Ready | None = None
+        self._robot: RobotDriver | None = None
         self._last: Query | None = None
         self._names: tuple[str, ...] | None = None
         self._unchosen: tuple[str, str, tuple[int, ...]] | None = None
@@ -246,9 +247,8 @@ class ShellSession:
 
         with raised_signals():
             if self._robot is None:
-                self._robot = going.simulated_robot(command, avlmap, self._start)
-            here = replace(self._robot, start=self._robot.driver.pose)
-            return _driven(going.drive(command, avlmap, here, translator, translation))
+                self._robot = going.robot_of(command, avlmap, self._start)
+            return _driven(going.drive(command, avlmap, self._robot, translator, translation))
 
 
 def _driven(answer: dict[str, Any]) -> Reply:

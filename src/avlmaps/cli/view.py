@@ -107,10 +107,9 @@ def _lines(answer: dict[str, Any]) -> list[str]:
 
 
 def _robot(scene: str) -> "MakeRobot":
-    from avlmaps.navigate.scenes import open_robot_scene
+    from avlmaps.navigate.robots import open_robot_scene
 
-    opened = open_robot_scene(scene)
-    return lambda avlmap: opened.robot(avlmap).driver
+    return open_robot_scene(scene).robot
 
 
 def _serve(verb: View) -> None:

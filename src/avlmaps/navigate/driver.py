@@ -18,6 +18,7 @@ from avlmaps.navigate.bodies import BASE, Body, BodyShape
 from avlmaps.navigate.controller import ActionController, StallDetector, bearing, turns_for
 from avlmaps.navigate.costmap import ContactMap, CostSettings, costmap_of
 from avlmaps.navigate.grids import rooms
+from avlmaps.navigate.interrupts import Halt
 from avlmaps.navigate.planner import Planner, PlanSettings, Stop
 
 _SAMPLE_M = 0.02  # places along a straight move that are looked at
@@ -169,6 +170,26 @@ class MapDriver:
             costmap = costmap_of(self.obstacles, self.shape.radius_m, settings.costs, self.contacts.cells)
             self._planner = Planner(costmap, settings.planning)
         return self._planner
+
+    @property
+    def touched(self) -> Float[np.ndarray, "m 2"]:
+        """The places where the body touched what the map does not know, level x and y."""
+        return self.obstacles.origin_m + (np.argwhere(self.contacts.cells) + 0.5) * self.obstacles.cell_size_m
+
+    # See `robots.RobotDriver`: a body that moves only while a command runs.
+
+    owes = False
+
+    def fault(self) -> str:
+        """Return "": it can always be driven."""
+        return ""
+
+    def halt(self) -> Halt:
+        """Return that it stands."""
+        return Halt(True, "the simulated robot moves only while the command runs")
+
+    def close(self) -> None:
+        """Do nothing."""
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
         """Drive to a place, or as near to it as the robot can stand and see it.
@@ -376,7 +397,7 @@ class MapDriver:
         for _ in range(len(planned) + _EXTRA_TURNS):
             if (gone_m := start.distance_m(self.pose)) > _BEYOND_M:
                 trip.fault = f"the body moved by {gone_m:.2f} m where it was to turn on the spot (check its pose)"
-            if self._is_held(trip) or trip.fault:
+            if trip.fault:
                 break
             # Those that were planned first, so that an exact body takes no other; then what is still off.
             if not planned and abs(left_rad) > _TURNED_RAD:
@@ -390,18 +411,14 @@ class MapDriver:
 
     def _take(self, action: Action, trip: _Trip) -> bool:
         """Take an action; return False where something stopped it."""
-        if action is not Action.STOP and self._is_held(trip):
+        if action is not Action.STOP and (why := self.held()):
+            trip.fault = why
             return False
         before = self.pose
         moved = self._of_body("move", lambda: _moved(self.body.act(action)))
         trip.actions.append(action)
         planned = before.after(action)
         return self._noted(trip, before, planned, moved)
-
-    def _is_held(self, trip: _Trip) -> bool:
-        why = self.held()
-        trip.fault = why or trip.fault
-        return bool(why)
 
     def _noted(self, trip: _Trip, before: GroundPose, planned: GroundPose, moved: Moved) -> bool:
         trip.movements += 1

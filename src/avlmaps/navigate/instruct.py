@@ -5,7 +5,7 @@ The whole path in one function; a program is data all along, and nothing but the
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter, sleep
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from avlmaps.core.poses import FRAME
 from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program
 from avlmaps.language.sentence import Attachments
 from avlmaps.language.translator import LearnedTranslator, Translation, Translator
-from avlmaps.navigate.brake import Brake, EditBrake, braked
+from avlmaps.navigate.brake import Brake, braked
 from avlmaps.navigate.driver import Driver
 from avlmaps.navigate.file_access import Readable, offered_by
 from avlmaps.navigate.grounding import Heats
@@ -149,7 +149,8 @@ def instruct(
     readable: Readable | None = None,
     translation: Translation | None = None,
     tell: Callable[[str], None] = _silent,
-    pause: Callable[[float], None] = sleep,
+    pause: Callable[[float], None] | None = None,
+    brake: Brake | None = None,
     heats: Heats | None = None,
 ) -> Outcome:
     """Do what a command says. An area that is forbidden meanwhile ends it.
@@ -165,7 +166,8 @@ def instruct(
             command names.
         translation: the translator's answer to the command, if it exists already.
         tell: called with each line: the program, what is found, each step.
-        pause: waits for some seconds, for the skill ``wait``.
+        pause: waits for some seconds, for the skill ``wait``; by default as long as nothing stops the drive.
+        brake: stops the drive from another thread.
         heats: what this map answered before, so that it is not queried again.
 
     Raises:
@@ -175,10 +177,10 @@ def instruct(
     if translation is None and isinstance(translator, LearnedTranslator) and not translator.knows_map:
         translator = LearnedTranslator(given_by(avlmap, said=command))
     translation = translation or translator.program_for(command)
-    brake = EditBrake(avlmap)
+    brake = brake or Brake(avlmap)
     with braked(driver, brake) as held:
         files = readable or offered_by(command)
-        robot = Robot(avlmap, held, settings, files, lambda line: tell(f"  {line}"), pause, heats)
+        robot = Robot(avlmap, held, settings, files, lambda line: tell(f"  {line}"), pause or brake.pause, heats)
         run = _Run(command, translator, robot, budget, brake, tell)
         for doubt in avlmap.doubts_of_drives:
             run.note(doubt)

@@ -116,9 +116,9 @@ class Lane:
             future.cancel()
             raise
 
-    def close(self) -> None:
+    def close(self, wait: bool = True) -> None:
         """End the threads after the work that they have."""
-        self._threads.shutdown(wait=True, cancel_futures=True)
+        self._threads.shutdown(wait=wait, cancel_futures=True)
 
     def _freed(self, _: object) -> None:
         with self._lock:

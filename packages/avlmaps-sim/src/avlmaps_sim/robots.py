@@ -10,7 +10,7 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, BodyShape
 from avlmaps.navigate.costmap import costmap_of, obstacles_for
-from avlmaps.navigate.scenes import SimulatedRobot
+from avlmaps.navigate.driver import MapDriver
 from avlmaps.query.avlmap import AVLMap
 from avlmaps_sim import scenes
 from avlmaps_sim.free_space import FreeSpace, floor_heights, free_space
@@ -26,11 +26,11 @@ _CARRIED_M, _SWAY_M = 0.3, 0.12  # least height of a camera over its floor; how 
 
 @dataclass(frozen=True, slots=True)
 class DrivenScene:
-    """A scene that robots are put into; see `avlmaps.navigate.scenes.RobotScene`."""
+    """A scene that robots are put into; see `avlmaps.navigate.robots.RobotScene`."""
 
     scene: Scene
 
-    def robot(self, avlmap: AVLMap, shape: BodyShape = BASE, start: GroundPose | None = None) -> SimulatedRobot:
+    def robot(self, avlmap: AVLMap, shape: BodyShape = BASE, start: GroundPose | None = None) -> MapDriver:
         """Put a robot into the scene; see `robot_in`."""
         return robot_in(avlmap, self.scene, shape, start)
 
@@ -40,8 +40,8 @@ def open_driven_scene(name: str) -> DrivenScene:
     return DrivenScene(scenes.open_scene(name))
 
 
-def robot_in(avlmap: AVLMap, scene: Scene, shape: BodyShape = BASE, start: GroundPose | None = None) -> SimulatedRobot:
-    """Put a robot into a scene.
+def robot_in(avlmap: AVLMap, scene: Scene, shape: BodyShape = BASE, start: GroundPose | None = None) -> MapDriver:
+    """Put a robot into a scene, and return what drives it.
 
     By the map alone the robot finds its way; the scene is what its body touches. It starts at a free place near that
     where the map's walk began, if none is given.
@@ -50,7 +50,6 @@ def robot_in(avlmap: AVLMap, scene: Scene, shape: BodyShape = BASE, start: Groun
         SceneError: the scene and the map do not lie in the same frame.
         NavigationError: the robot cannot stand at the start.
     """
-    from avlmaps.navigate.driver import MapDriver
     from avlmaps_sim.body import SimulatedBody
 
     obstacles = obstacles_for(avlmap, shape)
@@ -63,7 +62,7 @@ def robot_in(avlmap: AVLMap, scene: Scene, shape: BodyShape = BASE, start: Groun
     body = SimulatedBody(
         scene, start, shape.radius_m, shape.height_m, step_m=shape.step_m, flies_m=shape.flies_m, floor=floor
     )
-    return SimulatedRobot(MapDriver(obstacles, body, shape), start, obstacles)
+    return MapDriver(obstacles, body, shape)
 
 
 def _on_storey(cameras: Float[np.ndarray, "k 4 4"], obstacles: Obstacles) -> Float[np.ndarray, "m 4 4"]:

@@ -10,7 +10,8 @@ import signal
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
-from functools import cached_property, partial
+from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +21,13 @@ from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 
+from avlmaps.core.files import state_file
 from avlmaps.core.wording import option
 from avlmaps.serve.agents import AgentServer, Tool, described, text_of, token_count
 from avlmaps.serve.app import EVENTS, agents_route, http_error, json_object, json_response
-from avlmaps.serve.drive.orders import ConfirmRequest, Dispatcher, OrderLog, PlanRequest, Who, default_log
-from avlmaps.serve.drive.robots import open_machine
-from avlmaps.serve.lanes import Report, RequestError
+from avlmaps.serve.drive.orders import ConfirmRequest, Dispatcher, OrderLog, PlanRequest, Who
+from avlmaps.serve.drive.robots import Machine
+from avlmaps.serve.lanes import Lane, Report, RequestError
 from avlmaps.serve.operations import Operation, tool_schema
 from avlmaps.serve.requests import NoQuery, read
 from avlmaps.serve.service import Service, error_response
@@ -41,44 +43,36 @@ MOST_PROGRAM = 300  # tokens: its plan has to fit into one answer that a person 
 _LOOK_S, _BEAT_S = 0.1, 10.0
 _MOST_BODY = 200_000
 _MOST_WAITING = 8
-_AGENT = Who("agent", "mcp")
+_AGENT, _SERVER = Who("agent", "mcp"), Who("server", "signal")
 
 
 class DriveService:
     """A dispatcher, and the threads in which its work is done; stops have their own, which no plan can fill."""
 
     def __init__(self, dispatcher: Dispatcher, maps: Service) -> None:
-        self.dispatcher, self.maps = dispatcher, maps
-        self.orders = ThreadPoolExecutor(2, "avlmaps-drive")
+        self.dispatcher, self.maps, self.ending = dispatcher, maps, False
+        self.orders = Lane("drive", 2, _MOST_WAITING - 2, inf)
         self.stops = ThreadPoolExecutor(4, "avlmaps-stop")
-        self.waiting, self.ending = 0, False
 
     async def plan(self, query: PlanRequest, who: Who) -> dict[str, Any]:
         """Plan an order; one that waits here is void after the next stop or order."""
         begun = self.dispatcher.begun
-        return await self._ordered(self.dispatcher.plan, query.words, query.program, who, begun, query.choose)
+        given = query.words, query.program, who, begun, query.choose
+        return await self.orders.run(lambda _: self.dispatcher.plan(*given))
 
     async def confirm(self, query: ConfirmRequest, who: Who) -> dict[str, Any]:
         """Start the plan of a token."""
-        return await self._ordered(self.dispatcher.confirm, query.token, who)
+        return await self.orders.run(lambda _: self.dispatcher.confirm(query.token, who))
 
     async def stop(self, query: NoQuery, who: Who) -> dict[str, Any]:
         """Stop the robot: the brake at once, here; the robot's confirmation in a thread."""
         self.dispatcher.brake_now()
-        return await _in(self.stops, self.dispatcher.stop, who)
+        run = copy_context().run
+        return await asyncio.get_running_loop().run_in_executor(self.stops, run, self.dispatcher.stop, who)
 
     async def status(self, query: NoQuery, who: Who) -> dict[str, Any]:
         """Return what the robot is at."""
-        return await self._ordered(self.dispatcher.status)
-
-    async def _ordered(self, work: Callable[..., dict[str, Any]], *given: Any) -> dict[str, Any]:
-        if self.waiting >= _MOST_WAITING:
-            raise RequestError(f"{self.waiting} orders are being read; send this one again in a second.", 503, "busy")
-        self.waiting += 1
-        try:
-            return await _in(self.orders, work, *given)
-        finally:
-            self.waiting -= 1
+        return await self.orders.run(lambda _: self.dispatcher.status())
 
     async def events(self) -> AsyncIterator[bytes]:
         """Yield the status at each change, until the server ends."""
@@ -86,7 +80,7 @@ class DriveService:
         while not self.ending:
             if self.dispatcher.change != seen:
                 seen = self.dispatcher.change
-                yield b"event: status\ndata: " + encoded(await self._ordered(self.dispatcher.status)) + b"\n\n"
+                yield b"event: status\ndata: " + encoded(await self.status(NoQuery(), _SERVER)) + b"\n\n"
                 sent_s = loop.time()
             elif loop.time() - sent_s > _BEAT_S:
                 yield b": nothing new\n\n"
@@ -98,7 +92,7 @@ class DriveService:
         self.ending = True
         self.dispatcher.brake_now()
         with contextlib.suppress(RuntimeError):  # the threads have ended
-            self.stops.submit(self.dispatcher.stop, Who("server", "signal"))
+            self.stops.submit(self.dispatcher.stop, _SERVER)
 
     @contextlib.asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
@@ -112,7 +106,7 @@ class DriveService:
             self.ending = True
             self.dispatcher.brake_now()
             await asyncio.shield(loop.run_in_executor(self.stops, self.dispatcher.close))
-            self.orders.shutdown(wait=False, cancel_futures=True)
+            self.orders.close(wait=False)
             self.stops.shutdown(wait=False)
 
     @cached_property
@@ -126,11 +120,6 @@ class DriveService:
         app.router.redirect_slashes = False
         app.state.operations = OPERATIONS
         return app
-
-
-async def _in(threads: ThreadPoolExecutor, work: Callable[..., dict[str, Any]], *given: Any) -> dict[str, Any]:
-    run = partial(copy_context().run, work, *given)
-    return await asyncio.get_running_loop().run_in_executor(threads, run)
 
 
 _STOP, _STATUS = "/stop", "/status"
@@ -217,13 +206,13 @@ def open_driving(robot_file: Path, maps: Service, log: Path | None = None) -> Dr
             written.
         RequestError: there is no such map.
     """
-    machine = open_machine(robot_file)
+    machine = Machine(robot_file)
     if machine.is_real and maps.settings.token is None:
         raise ServeError(
             f"Driving a {machine.name} needs a token, also on this machine; give {option('token-file', 'FILE')} or set "
             "AVLMAPS_TOKEN."
         )
     maps.shelf.get(machine.map)
-    dispatcher = Dispatcher(machine, lambda: maps.shelf.get(machine.map), OrderLog(log or default_log()))
+    dispatcher = Dispatcher(machine, lambda: maps.shelf.get(machine.map), OrderLog(log or state_file("orders.jsonl")))
     dispatcher.connect()
     return DriveService(dispatcher, maps)

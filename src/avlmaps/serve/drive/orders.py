@@ -25,7 +25,6 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from avlmaps.core.errors import AvlmapsError, NavigationError, SeveralFitError, kind_named
-from avlmaps.core.files import state_file
 from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable, printable_json
@@ -50,7 +49,6 @@ log = logging.getLogger("avlmaps.serve.drive")
 _REHEARSAL = Budget(seconds=20.0)
 _MOVED_M, _MOVED_RAD = 0.5, 0.35  # a robot that stands elsewhere than its plan begins is not driven by it
 _LONGEST_STOP_S, _STOP_AGAIN_S = 15.0, 0.5
-_WATCH_S = 0.5
 _MOST_PLANS = 16
 _MOST_LINES, _LONGEST_LINE = 50, 500
 
@@ -170,27 +168,17 @@ class ConfirmRequest(Request):
     token: Token
 
 
-def default_log() -> Path:
-    """Return the log in the user's state folder."""
-    return state_file("orders.jsonl")
-
-
 class OrderLog:
     """Appends entries; a line is whole or not there, also when several processes write."""
 
     def __init__(self, path: Path) -> None:
-        """Open the log.
+        """Take its file.
 
         Raises:
             NavigationError: it cannot be opened for writing.
         """
         self.path = path
-        self._lock = threading.Lock()
-        try:
-            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
-        except OSError as error:
-            raise self._fault(error) from None
+        self._append(b"")
 
     def write(self, event: str, entry: Mapping[str, Any]) -> None:
         """Append an entry and wait until it is on the disk.
@@ -200,27 +188,21 @@ class OrderLog:
         """
         time = datetime.now(UTC).isoformat(timespec="milliseconds")
         line = json.dumps({"time": time, "event": event, **entry}, ensure_ascii=False, allow_nan=False)
-        content = printable_json(line).encode() + b"\n"
+        self._append(printable_json(line).encode() + b"\n")
+
+    def _append(self, content: bytes) -> None:
         try:
-            with self._lock:
-                if os.write(self._file, content) != len(content):
+            self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            number = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+            with os.fdopen(number, "wb", buffering=0) as file:
+                if file.write(content) != len(content):
                     raise OSError("the disk is full")
-                os.fsync(self._file)
+                os.fsync(number)
         except OSError as error:
-            raise self._fault(error) from None
-
-    def close(self) -> None:
-        """Close the file."""
-        with self._lock:
-            if self._file >= 0:
-                os.close(self._file)
-            self._file = -1  # the number may be another file's from now on
-
-    def _fault(self, error: OSError) -> NavigationError:
-        return NavigationError(
-            f"The log of orders {self.path.name} cannot be written ({error.strerror or error}), so nothing is driven; "
-            "check its folder and the space on the disk."
-        )
+            raise NavigationError(
+                f"The log of orders {self.path.name} cannot be written ({error.strerror or error}), so nothing is "
+                "driven; check its folder and the space on the disk."
+            ) from None
 
 
 @dataclass(slots=True)
@@ -229,15 +211,21 @@ class RunningOrder:
 
     plan: OrderPlan
     now: ServedMap
-    brake: Brake = field(default_factory=Brake)
+    brake: Brake
     lines: deque[str] = field(default_factory=lambda: deque(maxlen=_MOST_LINES))
     thread: threading.Thread | None = None
-    over: threading.Event = field(default_factory=threading.Event)
-    why: str = ""
+    stopped: bool = False  # by a client, who hears whether the robot stands
 
 
 class Dispatcher:
-    """Decides what moves the robot."""
+    """Decides what moves the robot.
+
+    Attributes:
+        machine: the robot.
+        log: of orders.
+        fault: why the robot may still drive although it was stopped last; "" where it stood.
+        change: a number that grows with each change of the status.
+    """
 
     def __init__(
         self,
@@ -248,14 +236,12 @@ class Dispatcher:
         token_s: float = 60.0,
         clock: Callable[[], float] = monotonic,
     ) -> None:
-        self._machine, self._current, self._log, self._clock = machine, current, order_log, clock
-        self._book = PlanBook(token_s)
+        self.machine, self.log, self.fault, self.change = machine, order_log, "", 0
+        self._current, self._clock, self._book = current, clock, PlanBook(token_s)
         self._preparing = threading.Lock()  # plans and confirmations, one at a time; never needed for a stop
         self._lock = threading.Lock()  # of what follows; never held while something waits
         self._running: RunningOrder | None = None
         self._last: dict[str, Any] | None = None
-        self._fault = ""
-        self._change = 0
         self._closed = False
 
     # Planning.
@@ -269,9 +255,9 @@ class Dispatcher:
         self._ready(self._current())
 
     def _ready(self, now: ServedMap) -> "Obstacles":
-        obstacles = self._machine.prepare(now.avlmap, now.version)
-        if fault := self._machine.fault():
-            raise NavigationError(f"The {self._machine.name} cannot be driven: {fault.rstrip('.')}.")
+        obstacles = self.machine.prepare(now.avlmap, now.version)
+        if fault := self.machine.driver.fault():
+            raise NavigationError(f"The {self.machine.name} cannot be driven: {fault.rstrip('.')}.")
         return obstacles
 
     @property
@@ -298,7 +284,7 @@ class Dispatcher:
             with self._lock:
                 token = self._book.add(plan, self._clock(), begun)
             told = msgspec.to_builtins(plan)
-            self._log.write("planned", {"who": asdict(who), **told})
+            self.log.write("planned", {"who": asdict(who), **told})
         self._changed()
         # The token stands before the path, which may be long.
         return {"order": plan.order, "token": token, "expires_in_s": self._book.lifetime_s, **told}
@@ -317,9 +303,9 @@ class Dispatcher:
         now = self._current()
         translation = self._read(words, program, now, choose)
         choose = choose[1:] if translation.chosen else choose
-        obstacles, start = self._ready(now), self._machine.pose()
+        obstacles, start = self._ready(now), self.machine.driver.pose
         outcome = rehearse(
-            words, translation, now.avlmap, obstacles, start, shape=self._machine.shape,
+            words, translation, now.avlmap, obstacles, start, shape=self.machine.shape,
             settings=self._settings(choose), budget=_REHEARSAL,
         )  # fmt: skip
         if outcome.error is not None:
@@ -337,7 +323,7 @@ class Dispatcher:
             subgoals=[move.to_json() for move in outcome.subgoals],
             map=now.name,
             version=now.version,
-            robot=self._machine.identity,
+            robot=self.machine.identity,
             start=start,
             choose=choose,
         )
@@ -351,7 +337,7 @@ class Dispatcher:
         return LearnedTranslator(given_by(now.avlmap, said=words), next(iter(choose), None)).program_for(words)
 
     def _settings(self, choose: tuple[int, ...]) -> RobotSettings:
-        return RobotSettings(guess=self._machine.guess, choose=choose)
+        return RobotSettings(guess=self.machine.guess, choose=choose)
 
     # Driving.
 
@@ -365,7 +351,7 @@ class Dispatcher:
             order = self._begun(token)
             try:
                 self._require_ready(order)
-                self._log.write("confirmed", {"who": asdict(who), **msgspec.to_builtins(order.plan)})
+                self.log.write("confirmed", {"who": asdict(who), **msgspec.to_builtins(order.plan)})
                 if order.brake.pulled:
                     raise _refused("stopped")
                 run = copy_context().run  # what the order says is read over HTTP
@@ -385,12 +371,12 @@ class Dispatcher:
             plan = self._book.take(token, self._clock())
             if plan.version != now.version or plan.map != now.name:
                 raise _refused("map-changed")
-            if plan.robot != self._machine.identity:
+            if plan.robot != self.machine.identity:
                 raise _refused("robot-changed")
-            if self._fault:
-                raise _refused("unstopped", self._fault)
+            if self.fault:
+                raise _refused("unstopped", self.fault)
             self._book.clear()  # other plans begin where the robot stands now
-            self._running = RunningOrder(plan, now)
+            self._running = RunningOrder(plan, now, Brake(now.avlmap, self.machine.pace_s))
             return self._running
 
     def _require_idle(self) -> None:
@@ -402,59 +388,32 @@ class Dispatcher:
 
     def _require_ready(self, order: RunningOrder) -> None:
         self._ready(order.now)
-        here, start = self._machine.pose(), order.plan.start
+        here, start = self.machine.driver.pose, order.plan.start
         turned_rad = abs(wrap_angle(here.heading_rad - start.heading_rad))
         if here.distance_m(start) > _MOVED_M or turned_rad > _MOVED_RAD:
             raise _refused("moved", here.distance_m(start), degrees(turned_rad))
 
     def _run(self, order: RunningOrder, who: Who) -> None:
-        outcome: Outcome | None = None
-        error = "The order ended by a fault of avlmaps; the server's log has the details."
-        watch = copy_context().run
-        threading.Thread(target=watch, args=(self._watch, order), name="avlmaps-watch", daemon=True).start()
+        plan, brake = order.plan, order.brake
+        answer = {"ok": False, "error": "The order ended by a fault of avlmaps; the server's log has the details."}
         try:
-            outcome = instruct(
-                order.plan.words, order.now.avlmap, self._machine.driver(order.brake), LearnedTranslator(),
-                settings=self._settings(order.plan.choose), readable=NO_FILES,
-                translation=Translation(order.plan.program, tuple(order.plan.notes), order.plan.reading),
-                tell=lambda line: self._tell(order, line), pause=order.brake.pause,
-            )  # fmt: skip
+            answer = instruct(
+                plan.words, order.now.avlmap, self.machine.driver, LearnedTranslator(),
+                settings=self._settings(plan.choose), readable=NO_FILES,
+                translation=Translation(plan.program, tuple(plan.notes), plan.reading),
+                tell=lambda line: self._tell(order, line), brake=brake,
+            ).to_json()  # fmt: skip
         except Exception:
-            log.exception("order %s", order.plan.order)
-            order.brake.pull()
-            stands, note = self._halt()
-            with self._lock:
-                self._fault = "" if stands else note
-        order.over.set()
-        answer = {"ok": False, "error": error} if outcome is None else outcome.to_json()
-        ended = {
-            "order": order.plan.order,
-            "words": order.plan.words,
-            "stopped": order.brake.pulled,
-            "outcome": answer,
-            **({"note": order.why} if order.why else {}),
-        }
+            log.exception("order %s", plan.order)
+            brake.pull()
+        if brake.pulled and not order.stopped:  # by an edit, or by a fault of ours
+            self._noted_stop(Who("server", "edit" if brake.forbidden else "fault"), plan.order, *self._halt())
+        note = {"note": brake.forbidden} if brake.forbidden else {}
+        ended = {"order": plan.order, "words": plan.words, "stopped": brake.pulled, "outcome": answer, **note}
         self._note("ended", {"who": asdict(who), **ended})
         with self._lock:
             self._running, self._last = None, ended
         self._changed()
-
-    def _watch(self, order: RunningOrder) -> None:
-        """Stop the robot when a person forbids an area while it drives: the order knows the map as it was."""
-        known = _forbidden(order.now)
-        while not order.over.wait(_WATCH_S):
-            try:
-                now = self._current()
-                added = {} if now.version == order.plan.version else _forbidden(now)
-            except Exception:  # a map that is being written, or that was taken away, forbids nothing new
-                log.debug("the map of order %s cannot be read", order.plan.order, exc_info=True)
-                continue
-            names = [name for edit, name in added.items() if edit not in known]
-            if names and not order.over.is_set():
-                order.why = printable(f"{', '.join(names)} was forbidden while the robot drove; plan again.")
-                self._tell(order, order.why)
-                self.stop(Who("server", "edit"))
-                return
 
     def _tell(self, order: RunningOrder, line: str) -> None:
         order.lines.append(printable(line, _LONGEST_LINE))
@@ -462,7 +421,7 @@ class Dispatcher:
 
     def _note(self, event: str, entry: dict[str, Any]) -> None:
         try:
-            self._log.write(event, entry)
+            self.log.write(event, entry)
         except NavigationError as fault:
             log.error("%s", fault)
 
@@ -479,10 +438,12 @@ class Dispatcher:
                 stands, note = self._halt()
         if thread is not None and thread.is_alive():
             stands, note = False, f"{note.rstrip('.')}; its program has not ended"
+        return self._noted_stop(who, None if order is None else order.plan.order, stands, note)
+
+    def _noted_stop(self, who: Who, order: str | None, stands: bool, note: str) -> dict[str, Any]:
         with self._lock:
-            self._fault = "" if stands else note
-        name = None if order is None else order.plan.order
-        answer: dict[str, Any] = {"stopped": stands, "note": note, "order": name}
+            self.fault = "" if stands else note
+        answer: dict[str, Any] = {"stopped": stands, "note": note, "order": order}
         self._note("stop", {"who": asdict(who), **answer})
         self._changed()
         return answer
@@ -495,12 +456,13 @@ class Dispatcher:
         with self._lock:
             self._book.clear()
             if self._running is not None:
+                self._running.stopped = True
                 self._running.brake.pull()
             return self._running
 
     def _halt(self) -> tuple[bool, str]:
         try:
-            return self._machine.stop()
+            return self.machine.stop()
         except Exception as error:
             log.exception("stop")
             return False, f"the stop failed ({printable(error, 200)}); use the robot's own stop"
@@ -512,39 +474,18 @@ class Dispatcher:
                 return
             self._closed = True
         self.stop(Who("server", "shutdown"))
-        self._machine.close()
-        self._log.close()
+        self.machine.close()
 
     # Status.
 
-    @property
-    def robot(self) -> str:
-        """The robot's name."""
-        return self._machine.name
-
-    @property
-    def log_file(self) -> Path:
-        """The log of orders."""
-        return self._log.path
-
-    @property
-    def fault(self) -> str:
-        """Why the robot may still drive although it was stopped last; "" where it stood."""
-        return self._fault
-
-    @property
-    def change(self) -> int:
-        """A number that grows with each change of the status."""
-        return self._change
-
     def _changed(self) -> None:
         with self._lock:
-            self._change += 1
+            self.change += 1
 
     def status(self) -> dict[str, Any]:
         """Return what the robot is at."""
         with self._lock:
-            order, last, fault, waiting = self._running, self._last, self._fault, len(self._book)
+            order, last, fault, waiting = self._running, self._last, self.fault, len(self._book)
         state = "idle" if order is None else "stopping" if order.brake.pulled else "driving"
         running = None
         if order is not None:
@@ -555,8 +496,8 @@ class Dispatcher:
             }  # fmt: skip
         return {
             "state": "unstopped" if fault and order is None else state,
-            "robot": self._machine.name,
-            "real": self._machine.is_real,
+            "robot": self.machine.name,
+            "real": self.machine.is_real,
             "pose": self._pose(),
             "frame": FRAME,
             "order": running,
@@ -567,7 +508,7 @@ class Dispatcher:
 
     def _pose(self) -> dict[str, Any] | None:
         try:
-            pose, now = self._machine.pose(), self._current()
+            pose, now = self.machine.driver.pose, self._current()
             place = now.avlmap.space.world(np.array([pose.x_m, pose.y_m, _floor_m(now)]))
         except AvlmapsError:
             return None
@@ -579,11 +520,6 @@ class Dispatcher:
 
 def _floor_m(now: ServedMap) -> float:
     return now.once("floor", lambda: floor_of_walk(now.avlmap))
-
-
-def _forbidden(now: ServedMap) -> dict[str, str]:
-    """Return the areas of a map that no robot enters: their names by the ids of their edits."""
-    return {edit.id: edit.name for edit in now.avlmap.edited.edits if edit.does == "forbid"}
 
 
 def _refusal(error: AvlmapsError) -> RequestError:

@@ -94,15 +94,14 @@ def drive(
         return None
     command, legs = chosen
     try:
-        robot = robot_in(avlmap, scene)
+        driver = robot_in(avlmap, scene)
+        start = driver.pose
         # The goals are truly there, so the robot may go to a best guess; the report says whether that was right.
-        outcome = instruct(
-            command, avlmap, robot.driver, LearnedTranslator(), settings=RobotSettings(guess=True), tell=tell
-        )
+        outcome = instruct(command, avlmap, driver, LearnedTranslator(), settings=RobotSettings(guess=True), tell=tell)
     except AvlmapsError as fault:
         return Drive(command, legs, None, None, str(fault))
-    plot_path(out / PICTURE, avlmap.space, robot.start, outcome.moves, robot.obstacles, robot.contacts, f"“{command}”")
-    return Drive(command, legs, robot.start, outcome, outcome.error)
+    plot_path(out / PICTURE, avlmap.space, start, outcome.moves, driver.obstacles, driver.touched, f"“{command}”")
+    return Drive(command, legs, start, outcome, outcome.error)
 
 
 def drive_card(drive: Drive, sheet: Sheet, scene: str) -> str:

@@ -1,22 +1,25 @@
-"""Real robots, driven by what another package brings (the group ``avlmaps.robots``)."""
+"""Robots that other packages bring: simulated ones in a scene (``avlmaps.scenes``), real ones (``avlmaps.robots``)."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from avlmaps.core.errors import BackendError
-from avlmaps.core.extras import how_to_get
+from avlmaps.core.errors import BackendError, NavigationError
+from avlmaps.core.extras import SIMULATOR, how_to_get, install_command
+from avlmaps.core.motion import GroundPose
 from avlmaps.core.registry import brought, entry_points
-from avlmaps.navigate.driver import Driver
+from avlmaps.navigate.bodies import BASE, BodyShape
+from avlmaps.navigate.driver import Driver, MapDriver
 from avlmaps.navigate.interrupts import Halt
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
+    from avlmaps.query.avlmap import AVLMap
 
-ENTRY_POINT_GROUP = "avlmaps.robots"
+SCENES_GROUP, ROBOTS_GROUP = "avlmaps.scenes", "avlmaps.robots"
 
 
-class RealDriver(Driver, Protocol):
-    """Drives a robot that moves on when nobody watches it."""
+class RobotDriver(Driver, Protocol):
+    """Drives a robot that may move on when nobody watches it."""
 
     def fault(self) -> str:
         """Return why the robot cannot be driven now, in part of a sentence; "" where it can."""
@@ -42,7 +45,7 @@ class RealRobot(Protocol):
     An entry point is called with an address and a file, or None, and returns one.
     """
 
-    def __call__(self, obstacles: "Obstacles") -> RealDriver:
+    def __call__(self, obstacles: "Obstacles") -> RobotDriver:
         """Connect, with a guard that cancels the robot's goals when this process dies.
 
         Args:
@@ -67,7 +70,36 @@ def find_robot(kind: str, address: str, file: Path | None) -> RealRobot:
         NavigationError: the file cannot be read.
         BackendError: the package that drives such robots is not installed.
     """
-    for entry in entry_points(ENTRY_POINT_GROUP):
+    for entry in entry_points(ROBOTS_GROUP):
         if entry.name == kind:
             return brought(entry, "the robot")(address, file)
     raise BackendError(f"Robots of {kind} need a package of their own; get it with: {how_to_get('robots', kind)}")
+
+
+class RobotScene(Protocol):
+    """A scene that a robot can be put into."""
+
+    def robot(self, avlmap: "AVLMap", shape: BodyShape = BASE, start: GroundPose | None = None) -> MapDriver:
+        """Put a robot into the scene, and return what drives it by the map alone.
+
+        Args:
+            avlmap: the map of the scene.
+            shape: of the body.
+            start: where it stands at first; by default a free place near that where the map's walk began.
+
+        Raises:
+            AvlmapsError: the scene and the map do not lie in the same frame, or the robot cannot stand at the start.
+        """
+        ...
+
+
+def open_robot_scene(name: str) -> RobotScene:
+    """Open a scene by its name, such as ``house:7``.
+
+    Raises:
+        AvlmapsError: there is no such scene, or nothing that opens scenes is installed.
+    """
+    for entry in entry_points(SCENES_GROUP):
+        return brought(entry, "the simulator", NavigationError)(name)
+    get = install_command(distribution=SIMULATOR.name)
+    raise NavigationError(f"The scene {name} cannot be opened, since no simulator is installed; get it with: {get}")
