@@ -121,6 +121,15 @@ def test_a_piece_of_wall_between_two_doors_is_no_screen_though_a_leaf_stands_at_
     assert drawn.at(label, 2.0, 2.0) != drawn.at(label, 6.0, 3.5) != NONE
 
 
+def test_a_wall_stands_where_depth_strays_between_its_faces() -> None:
+    drawn = Drawn(8.15, 4.0).room(0, 0, 4.0, 4.0).room(4.15, 0, 4.0, 4.0)
+    grid = drawn.grid()
+    strays = np.zeros(grid.free.shape, bool)
+    strays[cells(5.05), cells(2.0) : cells(3.0) : 3] = True
+    found = rooms_of_storey(replace(grid, free=grid.free | strays, wall=grid.wall & ~strays))
+    assert drawn.at(found.label, 2.0, 3.0) != drawn.at(found.label, 6.0, 3.0) and not len(found.beside)
+
+
 def test_a_nook_belongs_to_its_room_and_an_empty_storey_has_none() -> None:
     drawn = Drawn(4.0, 4.3).room(0, 0, 4.0, 3.0).room(1.0, 3.0, 0.7, 1.0)
     label = rooms_of_storey(drawn.grid()).label

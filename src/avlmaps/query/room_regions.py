@@ -38,7 +38,7 @@ _DOOR_M = 1.3  # width of a doorway beside another, with a piece of wall between
 
 NONE = -1
 """The region of a place in no room."""
-_NARROW_M, _WIDER_M = 0.65, 0.15  # half the width of a door at most, and by how much rooms are wider on both sides
+_NARROW_M, _WIDER_M = 0.45, 0.15  # half the width of a door, and by how much rooms are wider on both sides
 _LEAST_M2, _LEAST_HALF_M = 1.5, 0.45  # a smaller or narrower region is a nook
 _LEAST_UNENTERED_M2 = 4.0  # so is one of this size that no camera entered: behind a shelf, under a bunk bed
 _GAP_M = 0.3  # unseen floor up to twice this width, and doorways, belong to a region beside them
@@ -56,8 +56,10 @@ def _without_leaves(wall: Cells, free: Cells, cell_m: float) -> Cells:
     # Leaves of doors and other pieces that are thin, short and seen from both sides are no walls.
     hidden = pieces(~(free | wall))
     small = storey_grid.extents(hidden)[:, 2] * cell_m**2 <= _SHADOW_M2
-    shadows = (small & of_pieces(hidden, distance(~(free | wall)) * cell_m >= _SHADOW_M / 2.0))[hidden]
-    core = distance(~(free | shadows), beyond=True) * cell_m > _LEAF_THICKNESS_M - 0.01
+    wide = 2 * round(_SHADOW_M / cell_m / 2.0) + 1
+    shadows = small[hidden] & storey_grid.opened(hidden > 0, wide, wide)  # not what lies between the faces of a wall
+    seen = storey_grid.opened(free, 3, 3)  # depth that strays between the faces of a wall shows no side of it
+    core = distance(~(seen | shadows), beyond=True) * cell_m > _LEAF_THICKNESS_M - 0.01
     thick = distance(~core, beyond=True) * cell_m <= _LEAF_THICKNESS_M + 0.02
     thin = wall & ~thick
     piece = pieces(thin, diagonally=True)
