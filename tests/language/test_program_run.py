@@ -188,12 +188,11 @@ def test_a_comparison_costs_what_it_goes_through() -> None:
     assert "steps" in str(ran(text, steps=300).error) and ran(text, steps=400).ok
 
 
-def test_elements_are_counted_as_often_as_they_appear() -> None:
-    # [1, 1] is 3, and ([1, 1], [1, 1]) is 7 more.
+def test_elements_are_counted_where_they_are_made() -> None:
     text = "a = [1, 1]\nb = (a, a)\n"
-    assert ran(text, elements=10).ok
-    trace = ran(text, elements=9)
-    assert trace.error and trace.error.startswith("Line 2: the program makes more than 9 elements")
+    assert ran(text, elements=6).ok
+    trace = ran(text, elements=5)
+    assert trace.error and trace.error.startswith("Line 2: the program makes more than 5 elements")
 
 
 def test_what_the_trace_keeps_is_counted() -> None:

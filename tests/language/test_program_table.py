@@ -4,13 +4,10 @@ import inspect
 import os
 import re
 from pathlib import Path
-from typing import Protocol
-
-import pytest
 
 from avlmaps.language.program import SKILLS, parse_program, run_program, skill_lines
 from avlmaps.language.program.parser import BUILTINS
-from avlmaps.language.program.vocabulary import RobotSkills, ValueType, skills_of
+from avlmaps.language.program.vocabulary import RobotSkills, ValueType
 from helpers.recording_robot import RecordingRobot
 
 PAGE = Path(__file__).parents[2] / "docs" / "programs.md"
@@ -40,18 +37,6 @@ def test_lines_for_a_prompt_hold_every_signature_and_what_it_does() -> None:
     assert len(lines) == len(SKILLS)
     assert lines[0] == "robot.load_image(path: str) -> Picture: Load a picture from a file, to ask where it was taken."
     assert skill_lines("", [SKILLS["turn"]])[0].startswith("turn(angle_deg: float) -> None: Turn on the spot")
-
-
-def test_a_vocabulary_that_programs_have_no_values_for_is_a_mistake() -> None:
-    class Odd(Protocol):
-        def skill(self, thing: dict[str, int]) -> None: ...
-
-    class Starred(Protocol):
-        def skill(self, *things: str) -> None: ...
-
-    for vocabulary in (Odd, Starred):
-        with pytest.raises(TypeError, match="skill"):
-            skills_of(vocabulary)
 
 
 def test_the_page_shows_the_table_as_it_is() -> None:

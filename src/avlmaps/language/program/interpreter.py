@@ -3,7 +3,6 @@
 import ast
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from enum import Enum, auto
 from time import monotonic
 from typing import Any
 
@@ -14,8 +13,7 @@ from avlmaps.language.program.parser import (
     Program,
     branches_of,
     called,
-    check_argument,
-    check_exactly_one,
+    check_arguments,
     given_to,
     grown,
     misfit,
@@ -164,12 +162,12 @@ class _SkillFailedError(Exception):
         self.fault = fault
 
 
-class _Next(Enum):
-    """Where a run continues after a statement."""
+class _LeftError(Exception):
+    """A `break` or a `continue` on its way to its loop."""
 
-    STATEMENT = auto()
-    ROUND = auto()
-    AFTER_LOOP = auto()
+    def __init__(self, *, loop: bool) -> None:
+        super().__init__()
+        self.loop = loop
 
 
 class _Run:
@@ -183,7 +181,6 @@ class _Run:
         self.names: dict[str, Any] = {}
         self.steps: list[Step] = []
         self.computed = self.made = 0
-        self.sizes = values.Sizes()
 
     # ---- the budget
 
@@ -215,14 +212,11 @@ class _Run:
 
     # ---- statements
 
-    def block(self, statements: Sequence[ast.stmt]) -> _Next:
+    def block(self, statements: Sequence[ast.stmt]) -> None:
         for statement in statements:
-            after = self.statement(statement)
-            if after is not _Next.STATEMENT:
-                return after
-        return _Next.STATEMENT
+            self.statement(statement)
 
-    def statement(self, node: ast.stmt) -> _Next:
+    def statement(self, node: ast.stmt) -> None:
         self.step(node.lineno)
         match node:
             case ast.Assign(targets=[target]):
@@ -237,23 +231,21 @@ class _Run:
                 self.value(node.value)
             case ast.If():
                 chosen, otherwise = branches_of(node)
-                return self.block(next((each.body for each in chosen if self.truth(each.test)), otherwise))
+                self.block(next((each.body for each in chosen if self.truth(each.test)), otherwise))
             case ast.For():
                 self.loop(node)
-            case ast.Break():
-                return _Next.AFTER_LOOP
-            case ast.Continue():
-                return _Next.ROUND
-        return _Next.STATEMENT
+            case ast.Break() | ast.Continue():
+                raise _LeftError(loop=isinstance(node, ast.Break))
 
     def loop(self, node: ast.For) -> None:
-        through = self.value(node.iter)
-        values.check_kind(node.lineno, "walk", values.kind_of(through))
-        for element in through:
+        for element in self.needed(node.iter, "walk"):
             self.step(node.lineno)
             self.give(node.target, element)
-            if self.block(node.body) is _Next.AFTER_LOOP:
-                return
+            try:
+                self.block(node.body)
+            except _LeftError as left:
+                if left.loop:
+                    return
 
     def give(self, target: ast.expr, value: Any) -> None:
         names = target_names(target)
@@ -277,14 +269,12 @@ class _Run:
                 return self.name(line, name)
             case ast.List() | ast.Tuple():
                 elements = [self.value(each) for each in node.elts]
-                made = elements if isinstance(node, ast.List) else tuple(elements)
-                self.keep(line, self.sizes.of(line, made))
-                return made
+                self.keep(line, 1 + len(elements))
+                return elements if isinstance(node, ast.List) else tuple(elements)
             case ast.UnaryOp(op=ast.Not()):
                 return not self.truth(node.operand)
             case ast.UnaryOp():
-                number = self.value(node.operand)
-                values.check_kind(line, "sign", values.kind_of(number))
+                number = self.needed(node.operand, "sign")
                 return -number if isinstance(node.op, ast.USub) else number
             case ast.BinOp():
                 left, right = self.value(node.left), self.value(node.right)
@@ -296,10 +286,7 @@ class _Run:
             case ast.IfExp():
                 return self.value(node.body if self.truth(node.test) else node.orelse)
             case ast.Subscript():
-                of, index = self.value(node.value), self.value(node.slice)
-                values.check_kind(line, "index of", values.kind_of(of))
-                values.check_kind(line, "index", values.kind_of(index))
-                return values.element_of(line, of, index)
+                return values.element_of(line, self.needed(node.value, "index of"), self.needed(node.slice, "index"))
             case ast.Call() if called(node) in SKILLS:
                 return self.skill_call(node)
             case ast.Call():
@@ -310,10 +297,14 @@ class _Run:
             raise refused(line, f"`{name}` has no value yet; give it one before, on every way that leads here")
         return self.names[name]
 
-    def truth(self, node: ast.expr) -> bool:
+    def needed(self, node: ast.expr, use: str) -> Any:
+        """Return the value of an expression; refuse one that does not serve a use."""
         value = self.value(node)
-        values.check_kind(node.lineno, "truth", values.kind_of(value))
-        return bool(value)
+        values.check_kind(node.lineno, use, values.kind_of(value))
+        return value
+
+    def truth(self, node: ast.expr) -> bool:
+        return bool(self.needed(node, "truth"))
 
     def arithmetic(self, line: int, sign: str, left: Any, right: Any) -> Value:
         try:
@@ -323,7 +314,7 @@ class _Run:
         except AvlmapsError as fault:
             raise _SkillFailedError(line, f"`{sign}`", fault) from fault
         if isinstance(made, (str, list, tuple)):
-            self.keep(line, self.sizes.of(line, made))
+            self.keep(line, 1 + len(made))
         elif isinstance(made, values.Made):
             self.keep(line, len(made.how))
             self.look_at_clock(line)
@@ -334,8 +325,8 @@ class _Run:
         for op, operand in zip(node.ops, node.comparators, strict=True):
             right, sign = self.value(operand), SIGNS[type(op)]
             values.check_comparison(node.lineno, sign, values.kind_of(left), values.kind_of(right))
-            for value in (left, right):
-                self.step(node.lineno, self.sizes.of(node.lineno, value))
+            if not sign.startswith("is"):
+                self.step(node.lineno, values.compared(node.lineno, left, right))
             if not _COMPARE[sign](left, right):
                 return False
             left = right
@@ -344,8 +335,7 @@ class _Run:
     def logical(self, node: ast.BoolOp) -> Value:
         stops_at = isinstance(node.op, ast.Or)
         for operand in node.values[:-1]:
-            value = self.value(operand)
-            values.check_kind(operand.lineno, "truth", values.kind_of(value))
+            value = self.needed(operand, "truth")
             if bool(value) is stops_at:
                 return value
         return self.value(node.values[-1])
@@ -364,9 +354,7 @@ class _Run:
         """Call a skill, the one place where a program reaches anything."""
         line, skill = node.lineno, SKILLS[called(node)]
         arguments = {name: self.value(each) for name, each in given_to(skill, node).items()}
-        for name, value in arguments.items():
-            check_argument(line, skill, skill.parameters[name], values.kind_of(value))
-        check_exactly_one(line, skill, sum(arguments.get(name) is not None for name in skill.alternatives))
+        check_arguments(line, skill, {name: values.kind_of(value) for name, value in arguments.items()})
         self.look_at_clock(line)
         if len(self.steps) == self.budget.skill_calls:
             raise refused(
@@ -386,7 +374,7 @@ class _Run:
         result = values.adopted(skill, returned, how)
         content = values.shown(result)
         self.record(Step(skill.name, seen, content, line, self.clock() - began))
-        self.keep(line, self.sizes.of(line, result) + values.size_of_shown(content))
+        self.keep(line, values.size_of_shown(content))
         return result
 
     def record(self, step: Step) -> None:

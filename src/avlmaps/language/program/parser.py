@@ -1,13 +1,12 @@
 """From text to a program: Python's own parser reads it, and a whitelist of its nodes says what may stand in one.
 
-What Python's parser must not see is refused before it: characters that hide what a line does, names that only look like
-others, numbers and strings in unusual forms, brackets that nest without end. A program without a part on the whitelist
-is refused by its line, and so is one that must fail wherever it gets to: a robot that has begun to move should not stop
-half way for a slip that could be seen from the start. What is left means what Python means by it.
+Characters that hide what a line does, letters that only look like others and odd escapes are refused before. A program
+with a part that is not on the whitelist is refused by its line, and so is one that must fail wherever it gets to: a
+robot that has begun to move should not stop half way for a slip that could be seen from the start. What is left means
+what Python means by it.
 """
 
 import ast
-import keyword
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,38 +24,35 @@ from avlmaps.language.program.values import (
     kind_of_result,
     refused,
 )
-from avlmaps.language.program.vocabulary import ROBOT, SKILLS, Parameter, Skill, ValueType
+from avlmaps.language.program.vocabulary import ROBOT, SKILLS, Skill, ValueType
 
 MOST_CHARACTERS = 20_000
-LONGEST_NAME = 64
 DEEPEST_BLOCK = 10
 DEEPEST = 50
 """How deep an expression may nest: far beyond what anyone writes, far within what recursion can take."""
-# How few and how many arguments each function takes; None is no limit.
-BUILTINS: Mapping[str, tuple[int, int | None]] = {
-    "len": (1, 1), "min": (1, None), "max": (1, None), "abs": (1, 1), "range": (1, 3), "round": (1, 2),
+# How few and how many arguments each function takes.
+BUILTINS: Mapping[str, tuple[int, int]] = {
+    "len": (1, 1), "min": (1, MOST_CHARACTERS), "max": (1, MOST_CHARACTERS), "abs": (1, 1), "range": (1, 3),
+    "round": (1, 2),
 }  # fmt: skip
 SIGNS: Mapping[type, str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.USub: "-",
     ast.UAdd: "+", ast.Not: "not", ast.And: "and", ast.Or: "or", ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<",
     ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.In: "in", ast.NotIn: "not in", ast.Is: "is", ast.IsNot: "is not",
 }  # fmt: skip
-_LONGEST_NUMBER = 40
-_NUMBER = re.compile(r"(?:[0-9][0-9_]*(?:\.[0-9_]*)?|\.[0-9_]+)(?:[eE][+-]?[0-9_]+)?")
-_PIECE = re.compile(
-    r"""
-    (?P<comment>\#[^\n]*)
-    | (?P<string>[A-Za-z_]*(?:'(?:[^'\\\n]|\\.)*'|"(?:[^"\\\n]|\\.)*")) | (?P<open>['"])
-    | (?P<number>(?:[0-9]|\.[0-9])(?:(?<=[eE])[+-]|[A-Za-z0-9_.])*)
-    | (?P<name>[A-Za-z_][A-Za-z0-9_]*) | (?P<bracket>[()\[\]{}]) | (?P<strange>[^\x00-\x7f])
-    """,
-    re.VERBOSE,
-)
-_PREFIXES = re.compile(rf"(?:[-+~][ \t]*){{{DEEPEST},}}|(?:not[ \t]+){{{DEEPEST},}}")
-_ESCAPE = re.compile(r"\\(?:x[0-9a-fA-F]{2}|u[0-9a-fA-F]{4}|U[0-9a-fA-F]{8}|[\\'\"nt])|\\(?P<odd>.)")
-# What is no part of a program, and what is to be written instead.
+_QUOTED = re.compile(r"""#[^\n]*|'(?:[^'\\\n]|\\.)*'|"(?:[^"\\\n]|\\.)*\"""")
+_ESCAPE = re.compile(r"\\(?:x[0-9a-fA-F]{2}|u[0-9a-fA-F]{4}|U[0-9a-fA-F]{8}|[\\'\"nt])|(?P<odd>\\)")
+# What may stand in no program outside of strings, and why.
+_STRANGE = (
+    (re.compile(r"[^\x00-\x7f]"), "the character {0!r} (U+{1:04X}) has no meaning here; names are written in the "
+     "letters a to z, phrases between quotes"),
+    (re.compile(r"\w{65,}"), "`{0:.20}...` has more than 64 characters; shorten it"),
+    (re.compile(r"\\(?!\n)"), "a backslash stands outside of a string; remove it"),
+)  # fmt: skip
+# What is no part of a program, or not in this form, and what is to be written instead.
 _INSTEAD = {
     "While": "count with a bounded loop, such as `for i in range(10):`",
+    "For": "leave out its `else`",
     "Import ImportFrom": "the skills and `len, min, max, abs, range, round` are all there is",
     "With AsyncWith AsyncFor Await": "call skills one after the other",
     "Try TryStar Raise": "a skill that fails ends the program by itself",
@@ -68,9 +64,13 @@ _INSTEAD = {
     "Set Dict": "write a list, [...]",
     "Slice": "pick one element, or go through all with `for`",
     "Starred": "write each value",
-    "NamedExpr AnnAssign TypeAlias": "a name is given a value on a line of its own, with `=` alone",
+    "JoinedStr": "join strings with +",
+    "Assign NamedExpr AnnAssign TypeAlias": "a name is given a value on a line of its own, with one `=`",
     "Pow MatMult LShift RShift BitAnd BitOr BitXor Invert": "use `+ - * / // %`, `and`, `or` and `not`",
-}
+    "Expr": "the line works out a value and does nothing with it; name it or call a skill",
+    "Break Continue": "put it into the block of a `for`",
+    "Attribute": "the only dot is that of `robot.SKILL(...)`; a list grows by `name = name + [element]`",
+}  # fmt: skip
 _REMEDIES = {name: remedy for names, remedy in _INSTEAD.items() for name in names.split()}
 
 
@@ -113,78 +113,36 @@ def parse_program(text: str) -> Program:
         )
     plain = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     _check_text(plain)
-    statements = _tree(plain).body
+    try:
+        statements = ast.parse(plain, filename="").body  # a file without a name, so that no error can quote one
+    except SyntaxError as fault:
+        said = printable(fault.msg or "invalid syntax", 200).rstrip(".?!")
+        raise refused(fault.lineno or 1, f"this is not written as Python ({said}); mend the line") from None
+    except (RecursionError, MemoryError):
+        raise _too_deep(1) from None
     if not statements:
         raise ProgramError("The program is empty; write at least one line, such as `robot.move_to('chair')`.")
     _Checker(statements).block(statements)
     return Program(statements, text)
 
 
-def _tree(text: str) -> ast.Module:
-    """Return what Python's parser makes of a text. Its file has no name, so that no error can quote one."""
-    try:
-        return ast.parse(text, filename="")
-    except SyntaxError as fault:
-        said = printable(fault.msg or "invalid syntax", 200).rstrip(".?!")
-        raise refused(fault.lineno or 1, f"this is not written as Python ({said}); mend the line") from None
-    except (RecursionError, MemoryError):
-        raise _too_deep(1) from None
-    except ValueError:
-        raise refused(1, "a character of the program is half of one; remove it") from None
+def _check_text(text: str) -> None:
+    """Refuse what Python's parser must not see, or a person would not see."""
+    unsafe = next((found for found in UNSAFE.finditer(text) if found.group() not in "\n\t"), None)
+    if unsafe:
+        raise _at(text, unsafe, f"the character U+{ord(unsafe.group()):04X} has no place in a program; remove it")
+    for quoted in _QUOTED.finditer(text):
+        odd = next((found for found in _ESCAPE.finditer(quoted.group()) if found["odd"]), None)
+        if odd and quoted.group()[0] != "#":
+            raise _at(text, quoted, "a string has a backslash that makes no character; write `\\\\` for a backslash")
+    bare = _QUOTED.sub("''", text)
+    for strange, why in _STRANGE:
+        if found := strange.search(bare):
+            raise _at(bare, found, why.format(found.group(), ord(found.group()[0])))
 
 
-def _check_text(text: str) -> None:  # noqa: C901 - one case for each kind of piece
-    """Refuse what Python's parser must not see."""
-    depth, line, seen = 0, 1, 0
-    found = next((found for found in UNSAFE.finditer(text) if found.group() not in "\n\t"), None)
-    if found:
-        line = text.count("\n", 0, found.start()) + 1
-        raise refused(line, f"the character U+{ord(found.group()):04X} has no place in a program; remove it")
-    for piece in _PIECE.finditer(text):
-        line, seen = line + text.count("\n", seen, piece.start()), piece.start()
-        said = piece.group()
-        match piece.lastgroup:
-            case "string":
-                _check_string(line, said)
-                if len(said) == 2 and text.startswith(said[0], piece.end()):
-                    raise refused(line, "strings have one quote on each side; write a comment with #")
-            case "open":
-                raise refused(line, f"the string that starts with {said} does not end on its line; close it")
-            case "number" if len(said) > _LONGEST_NUMBER:
-                raise refused(line, f"the number `{said[:12]}...` has more than {_LONGEST_NUMBER} characters; round it")
-            case "number" if not _NUMBER.fullmatch(said):
-                raise refused(line, f"`{said}` is no number; write it in plain digits, such as 12 or 0.5")
-            case "name" if len(said) > LONGEST_NAME:
-                raise refused(line, f"the name `{said[:20]}...` is longer than {LONGEST_NAME} letters; shorten it")
-            case "name" if said.startswith("__"):
-                raise refused(line, f"`{said}` starts with two underscores, as no name may; choose another name")
-            case "strange":
-                raise refused(
-                    line, f"the character {said!r} (U+{ord(said):04X}) has no meaning here; names are written in the "
-                    "letters a to z, phrases between quotes",
-                )  # fmt: skip
-            case "bracket":
-                depth += 1 if said in "([{" else -1
-                if depth > DEEPEST:
-                    raise _too_deep(line)
-            case _:
-                pass
-    found = _PREFIXES.search(text)
-    if found:
-        raise _too_deep(text.count("\n", 0, found.start()) + 1)
-
-
-def _check_string(line: int, text: str) -> None:
-    prefix = text[: min(text.index(quote) for quote in "'\"" if quote in text)]
-    if prefix not in ("", "r", "R"):
-        raise refused(
-            line, f"a string has no `{printable(prefix, 40)}` before its quote; write it plainly, or join with +"
-        )
-    odd = next((found["odd"] for found in _ESCAPE.finditer(text) if found["odd"]), None) if not prefix else None
-    if odd is not None:
-        raise refused(
-            line, f"the string has a backslash before {odd!r}, which makes no character; write `\\\\` for a backslash"
-        )
+def _at(text: str, found: re.Match[str], why: str) -> ProgramError:
+    return refused(text.count("\n", 0, found.start()) + 1, why)
 
 
 def called(call: ast.Call) -> str:
@@ -192,11 +150,19 @@ def called(call: ast.Call) -> str:
     return call.func.attr if isinstance(call.func, ast.Attribute) else call.func.id  # type: ignore[attr-defined]
 
 
-def given_to(skill: Skill, call: ast.Call) -> dict[str, ast.expr]:
-    """Return the arguments of a call by the names of their parameters."""
-    return dict(zip(skill.parameters, call.args, strict=False)) | {
-        each.arg: each.value for each in call.keywords if each.arg
-    }
+def given_to(skill: Skill, call: ast.Call) -> Mapping[str, ast.expr]:
+    """Return the arguments of a call by the names of their parameters.
+
+    Raises:
+        ProgramError: they do not fit the skill's signature.
+    """
+    named = {each.arg or "**": each.value for each in call.keywords}
+    try:
+        if len(named) < len(call.keywords):
+            raise TypeError("one argument is given twice")
+        return skill.given(call.args, named)
+    except TypeError as fault:
+        raise refused(call.lineno, f"`{skill.name}`: {fault}; it is {skill.signature}") from None
 
 
 def branches_of(node: ast.If) -> tuple[list[ast.If], list[ast.stmt]]:
@@ -208,24 +174,22 @@ def branches_of(node: ast.If) -> tuple[list[ast.If], list[ast.stmt]]:
     return found, node.orelse
 
 
-def check_argument(line: int, skill: Skill, parameter: Parameter, kind: ValueType) -> None:
-    """Refuse a skill an argument of a kind that its parameter does not take."""
-    if kind in parameter.kinds:
-        return
-    takes = [str(each) for each in ValueType if each in parameter.kinds]
-    wanted = takes[0] if len(takes) == 1 else f"{', '.join(takes[:-1])} or {takes[-1]}"
-    makers = [f"`{other.name}`" for other in SKILLS.values() if {other.returns} == parameter.kinds]
-    made = f"; {' or '.join(makers)} gives one" if makers else ""
-    raise refused(
-        line, f"`{skill.name}` takes {wanted} as its `{parameter.name}`, not {kind}; it is {skill.signature}{made}"
-    )
-
-
-def check_exactly_one(line: int, skill: Skill, given: int) -> None:
-    """Refuse none, or several, of what are alternatives."""
-    if skill.alternatives and given != 1:
-        many = "none" if given == 0 else given
-        raise refused(line, f"`{skill.name}` takes exactly one of {_listed(skill.alternatives, 'or')}, not {many}")
+def check_arguments(line: int, skill: Skill, kinds: Mapping[str, "Guess"]) -> None:
+    """Refuse arguments of kinds that a skill does not take, and none or several of what are alternatives."""
+    for name, kind in kinds.items():
+        parameter = skill.parameters[name]
+        if isinstance(kind, ValueType) and kind not in parameter.kinds:
+            wanted = _listed([str(each) for each in ValueType if each in parameter.kinds])
+            makers = [f"`{other.name}`" for other in SKILLS.values() if {other.returns} == parameter.kinds]
+            made = f"; {_listed(makers)} gives one" if makers else ""
+            raise refused(
+                line, f"`{skill.name}` takes {wanted} as its `{name}`, not {kind}; it is {skill.signature}{made}"
+            )
+    chosen = [kind for name, kind in kinds.items() if name in skill.alternatives]
+    surely = sum(isinstance(kind, ValueType) and kind is not ValueType.NOTHING for kind in chosen)
+    if skill.alternatives and (surely > 1 or all(kind is ValueType.NOTHING for kind in chosen)):
+        names = _listed([f"`{name}`" for name in skill.alternatives])
+        raise refused(line, f"`{skill.name}` takes exactly one of {names}, not {surely or 'none'}")
 
 
 def grown(line: int, name: str) -> ProgramError:
@@ -270,64 +234,60 @@ class _Checker:
         match node:
             case ast.Assign(targets=[target]):
                 self.assign(target, node.value)
-            case ast.Assign():
-                raise refused(line, "a line has one `=`; give each name its value on a line of its own")
             case ast.AugAssign(target=ast.Name(id=name)):
-                _check_assignable(line, name)
                 before, sign = self.name(line, name), _sign(line, node.op)
                 made = self.arithmetic(line, sign, before, self.value(node.value))
                 if sign == "+" and made is ValueType.LIST:
                     raise grown(line, name)
-                self.give(name, made)
-            case ast.AugAssign():
-                raise refused(line, "an update such as `+=` is of one name; write it out with `=`")
-            case ast.Expr():
-                self.value(node.value)
-                if not (isinstance(node.value, ast.Call) and called(node.value) in SKILLS):
-                    raise refused(line, "the line works out a value and does nothing with it; name it or call a skill")
+                self.give(line, name, made)
+            case ast.Expr(value=ast.Call() as call):
+                self.value(call)
+                if called(call) not in SKILLS:
+                    raise _no_part(line, node)
             case ast.For(orelse=[]):
                 self.loop(node, deep)
-            case ast.For():
-                raise refused(line, "`else` belongs to no `if`; put it right under its block")
             case ast.If():
                 chosen, otherwise = branches_of(node)
                 for each in chosen:
                     self.needed(each.test, "truth")
                     self.block(each.body, deep, in_loop=in_loop)
-                if otherwise:
-                    self.block(otherwise, deep, in_loop=in_loop)
-            case ast.Break() | ast.Continue() if not in_loop:
-                word = type(node).__name__.lower()
-                raise refused(line, f"`{word}` is in no loop; put it into the block of a `for`")
-            case ast.Pass() | ast.Break() | ast.Continue():
+                self.block(otherwise, deep, in_loop=in_loop)
+            case ast.Break() | ast.Continue() if in_loop:
                 pass
+            case ast.Pass():
+                pass
+            case ast.Expr():
+                self.value(node.value)
+                raise _no_part(line, node)
             case _:
                 raise _no_part(line, node)
 
     def loop(self, node: ast.For, deep: int) -> None:
-        kind, names = self.needed(node.iter, "walk"), _checked_target(node.target)
+        kind = self.needed(node.iter, "walk")
         counts = kind is ValueType.RANGE and isinstance(node.target, ast.Name)
-        for name in names:
-            self.give(name, ValueType.NUMBER if counts else None)
+        for name in _targets(node.target):
+            self.give(node.lineno, name, ValueType.NUMBER if counts else None)
         # Any round but the first may use what a later line of the body gave.
         self.given.update(*(_names_given(inner) for inner in ast.walk(node)))
         self.block(node.body, deep, in_loop=True)
 
     def assign(self, target: ast.expr, value: ast.expr) -> None:
-        names, kind = _checked_target(target), self.value(value)
+        names, kind = _targets(target), self.value(value)
         kinds: list[Guess] = [kind]
-        if isinstance(target, ast.Tuple) and isinstance(value, ast.List | ast.Tuple):
-            kinds = [self.value(each) for each in value.elts]
-            if len(kinds) != len(names):
-                raise misfit(target.lineno, len(names), len(kinds))
-        elif isinstance(target, ast.Tuple):
-            if isinstance(kind, ValueType):
-                check_kind(target.lineno, "unpack", kind)
+        if isinstance(target, ast.Tuple):
             kinds = [None] * len(names)
+            if isinstance(value, ast.List | ast.Tuple):
+                kinds = [self.value(each) for each in value.elts]
+            elif isinstance(kind, ValueType):
+                check_kind(target.lineno, "unpack", kind)
+        if len(kinds) != len(names):
+            raise misfit(target.lineno, len(names), len(kinds))
         for name, one in zip(names, kinds, strict=True):
-            self.give(name, one)
+            self.give(target.lineno, name, one)
 
-    def give(self, name: str, kind: Guess) -> None:
+    def give(self, line: int, name: str, kind: Guess) -> None:
+        if name == ROBOT or name in SKILLS or name in BUILTINS:
+            raise refused(line, f"`{name}` is the robot, a skill or a function; give the value another name")
         self.kinds[name] = kind if self.lines[name] == 1 else None
         self.given.add(name)
 
@@ -378,16 +338,12 @@ class _Checker:
                 return None
             case ast.Call():
                 return self.call(node, deep)
-            case ast.Attribute():
-                raise _attribute(line, node)
             case _:
                 raise _no_part(line, node)
 
     def name(self, line: int, name: str) -> Guess:
-        if name == ROBOT:
-            raise refused(line, f"`{ROBOT}` is no value; write `{ROBOT}.SKILL(...)`")
-        if name in SKILLS or name in BUILTINS:
-            raise refused(line, f"`{name}` is called, not handed on; write `{name}(...)`")
+        if name == ROBOT or name in SKILLS or name in BUILTINS:
+            raise refused(line, f"`{name}` is no value; write `{ROBOT}.SKILL(...)` or call the function")
         if name not in self.given:
             raise _without_value(line, name, self.given, later=name in self.lines)
         return self.kinds.get(name)
@@ -397,7 +353,8 @@ class _Checker:
         kinds = [self.value(each, deep) for each in parts]
         for at, each in enumerate(node.ops):
             sign, left, right = _sign(node.lineno, each), kinds[at], kinds[at + 1]
-            if sign.startswith("is") and not any(_is_none(part) for part in parts[at : at + 2]):
+            nothing = any(isinstance(part, ast.Constant) and part.value is None for part in parts[at : at + 2])
+            if sign.startswith("is") and not nothing:
                 raise refused(node.lineno, f"`{sign}` compares with None alone; use `==` or `!=`")
             if isinstance(left, ValueType) and isinstance(right, ValueType):
                 check_comparison(node.lineno, sign, left, right)
@@ -412,83 +369,42 @@ class _Checker:
         line = node.lineno
         match node.func:
             case ast.Attribute(value=ast.Name(id=robot), attr=name) if robot == ROBOT:
-                return self.skill(node, _skill_named(line, name), deep)
-            case ast.Name(id=name) if name in SKILLS:
-                return self.skill(node, SKILLS[name], deep)
-            case ast.Name(id=name) if name in BUILTINS:
-                return self.function(node, name, deep)
+                known: Sequence[str] = tuple(SKILLS)
             case ast.Name(id=name):
-                close = nearest(name, [*SKILLS, *BUILTINS])
-                other = f"call a skill of `{ROBOT}`, or one of {', '.join(BUILTINS)}."
-                raise ProgramError(
-                    f"Line {line}: there is no function `{name}`; {f'did you mean `{close}`?' if close else other}"
-                )
-            case ast.Attribute() as asked:
-                raise _attribute(line, asked)
+                known = (*SKILLS, *BUILTINS)
             case _:
-                raise refused(line, f"only skills and functions are called; write `{ROBOT}.SKILL(...)`")
+                raise _no_part(line, node.func)
+        if name not in known:
+            close = nearest(name, known)
+            advice = f"did you mean `{close}`?" if close else f"there are {', '.join(known)}."
+            raise ProgramError(f"Line {line}: there is no skill or function `{name}`; {advice}")
+        if name in BUILTINS:
+            return self.function(node, name, deep)
+        kinds = {name: self.value(each, deep) for name, each in given_to(SKILLS[name], node).items()}
+        check_arguments(line, SKILLS[name], kinds)
+        return SKILLS[name].returns
 
     def function(self, node: ast.Call, name: str, deep: int) -> Guess:
         line, (fewest, most) = node.lineno, BUILTINS[name]
-        if node.keywords:
-            raise refused(line, f"`{name}` takes nothing by name; give it values alone")
-        if len(node.args) < fewest or (most is not None and len(node.args) > most):
-            takes = "1 or more" if most is None else str(fewest) if fewest == most else f"{fewest} to {most}"
-            raise refused(line, f"`{name}` takes {takes} arguments, not {len(node.args)}")
+        if node.keywords or not fewest <= len(node.args) <= most:
+            raise refused(line, f"`{name}` takes {fewest} to {most} values, and nothing by name")
         kinds = [self.value(each, deep) for each in node.args]
         known = tuple(kind for kind in kinds if isinstance(kind, ValueType))
         if len(known) == len(kinds):
             check_function(line, name, known)
         return ValueType.RANGE if name == "range" else ValueType.NUMBER
 
-    def skill(self, node: ast.Call, skill: Skill, deep: int) -> Guess:
-        _check_bound(node.lineno, skill, node)
-        kinds = {name: self.value(each, deep) for name, each in given_to(skill, node).items()}
-        for name, kind in kinds.items():
-            if isinstance(kind, ValueType):
-                check_argument(node.lineno, skill, skill.parameters[name], kind)
-        chosen = [kind for name, kind in kinds.items() if name in skill.alternatives]
-        surely = sum(isinstance(kind, ValueType) and kind is not ValueType.NOTHING for kind in chosen)
-        if surely > 1 or all(kind is ValueType.NOTHING for kind in chosen):
-            check_exactly_one(node.lineno, skill, surely)
-        return skill.returns
 
-
-def _check_bound(line: int, skill: Skill, node: ast.Call) -> None:
-    """Refuse a call with too many or too few arguments, twice the same, or a name that the skill does not have."""
-    names = [*list(skill.parameters)[: len(node.args)], *(each.arg for each in node.keywords)]
-    missing = [each.name for each in skill.parameters.values() if each.default is None and each.name not in names]
-    strange = next((name for name in names if name not in skill.parameters), "")
-    if any(each.arg is None for each in node.keywords):
-        raise refused(line, "`**` is not part of a program; write each argument")
-    if len(node.args) > len(skill.parameters):
-        wrong = f"takes {len(skill.parameters)} arguments, not {len(node.args)}"
-    elif strange:
-        close = nearest(strange, skill.parameters)
-        wrong = f"takes no `{strange}`" + (f", did you mean `{close}`" if close else "")
-    elif len(set(names)) < len(names):
-        wrong = f"is given its `{next(name for name in names if names.count(name) > 1)}` twice"
-    elif missing:
-        wrong = f"needs its {_listed(missing)}"
-    else:
-        return
-    raise refused(line, f"`{skill.name}` {wrong}; it is {skill.signature}")
-
-
-def _constant(line: int, value: object) -> ValueType:
+def _constant(line: int, value: bool | str | float | None) -> ValueType:
     if isinstance(value, str) and (found := UNSAFE.search(value.replace("\n", "").replace("\t", ""))):
         raise refused(
             line, f"a string has the character U+{ord(found.group()):04X}, which is not seen or turns the direction of "
             "writing; leave it out"
         )  # fmt: skip
-    kind = kind_of(value)  # type: ignore[arg-type]
+    kind = kind_of(value)
     if kind is ValueType.NUMBER:
         bounded(line, value)  # type: ignore[arg-type]
     return kind
-
-
-def _is_none(node: ast.expr) -> bool:
-    return isinstance(node, ast.Constant) and node.value is None
 
 
 def _names_given(node: ast.AST) -> list[str]:
@@ -501,21 +417,12 @@ def _names_given(node: ast.AST) -> list[str]:
             return []
 
 
-def _check_assignable(line: int, name: str) -> str:
-    if name == ROBOT or name in SKILLS or name in BUILTINS:
-        what = "the robot" if name == ROBOT else "the name of a skill" if name in SKILLS else "the name of a function"
-        raise refused(line, f"`{name}` is {what} and cannot be given a value; choose another name")
-    return name
-
-
-def _checked_target(node: ast.expr) -> list[str]:
-    line = node.lineno
-    if isinstance(node, ast.Subscript):
-        raise refused(line, "a list is not changed but made again, as in `a = a + [b]`")
-    parts = node.elts if isinstance(node, ast.Tuple) else [node, node]
-    if len(parts) < 2 or not all(isinstance(each, ast.Name) for each in parts):
-        raise refused(line, "only a name is given a value, or several as in `a, b = 1, 2`; put it left of the `=`")
-    return [_check_assignable(line, name) for name in target_names(node)]
+def _targets(node: ast.expr) -> list[str]:
+    """Return the names that take a value; refuse all else."""
+    names = target_names(node)
+    if len(names) != (len(node.elts) if isinstance(node, ast.Tuple) else 1) or not names:
+        raise refused(node.lineno, "only names take a value, as in `a = 1` and `a, b = 1, 2`; a list is made again")
+    return names
 
 
 def _without_value(line: int, name: str, given: set[str], *, later: bool) -> ProgramError:
@@ -537,38 +444,13 @@ def _sign(line: int, node: ast.AST) -> str:
 
 def _no_part(line: int, node: ast.AST) -> ProgramError:
     name = type(node).__name__
-    word = name.removeprefix("Async").removesuffix("From").lower()
-    written = word if keyword.iskeyword(word) else name
-    return refused(
-        line, f"`{written}` is not part of a program; {_REMEDIES.get(name, 'call skills and work out values')}"
-    )
+    remedy = _REMEDIES.get(name, "call skills and work out values")
+    return refused(line, f"`{name.lower()}` is not part of a program in this form; {remedy}")
 
 
 def _too_deep(line: int) -> ProgramError:
     return refused(line, f"an expression nests more than {DEEPEST} deep; give its parts names on lines before")
 
 
-def _skill_named(line: int, name: str) -> Skill:
-    if name in SKILLS:
-        return SKILLS[name]
-    close = nearest(name, SKILLS)
-    advice = f"did you mean `{close}`?" if close else f"the skills are {', '.join(SKILLS)}."
-    raise ProgramError(f"Line {line}: the robot has no skill `{name}`; {advice}")
-
-
-def _attribute(line: int, node: ast.Attribute) -> ProgramError:
-    if node.attr in ("append", "extend", "insert"):
-        return refused(line, f"`.{node.attr}` does not work on a value; write `name = name + [element]`")
-    if isinstance(node.value, ast.Name) and node.value.id == ROBOT:
-        name = _skill_named(line, node.attr).name
-        return refused(line, f"`{ROBOT}.{name}` is called, not handed on; write `{ROBOT}.{name}(...)`")
-    return refused(
-        line,
-        f"`.{node.attr}` does not work on a value; the only dot is that of `{ROBOT}.SKILL(...)`, and a Place is added, "
-        "subtracted and scaled whole",
-    )
-
-
-def _listed(names: Sequence[str], last: str = "and") -> str:
-    quoted = [f"`{name}`" for name in names]
-    return quoted[0] if len(quoted) == 1 else f"{', '.join(quoted[:-1])} {last} {quoted[-1]}"
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"

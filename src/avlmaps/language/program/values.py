@@ -13,8 +13,6 @@ from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Skil
 
 LARGEST = 10**15
 """No number in a program is further from zero: below it, whole numbers and floats are both exact."""
-DEEPEST_VALUE = 20
-"""How deep lists and tuples nest in each other."""
 
 
 def refused(line: int, text: str) -> ProgramError:
@@ -160,44 +158,6 @@ def kind_of_result(line: int, sign: str, left: ValueType, right: ValueType) -> V
     return results[left, right]
 
 
-class Sizes:
-    """The sizes of the lists and tuples of one run: values never change, so each is counted once."""
-
-    def __init__(self) -> None:
-        self._known: dict[int, tuple[Value, int, int]] = {}  # with the value itself: nothing else gets its hash so
-
-    def of(self, line: int, value: Value) -> int:
-        """Return how many elements and characters a value has, counted as often as they appear in it.
-
-        A list that holds another many times over is small in memory and large by this count.
-
-        Raises:
-            ProgramError: it nests too deep.
-        """
-        if isinstance(value, str):
-            return 1 + len(value)
-        return 1 + self._inside(line, value)[0] if isinstance(value, (list, tuple)) else 1
-
-    def _inside(self, line: int, value: list[Any] | tuple[Any, ...]) -> tuple[int, int]:
-        """Return how many elements and characters are in a list or tuple, and how deep such nest in it."""
-        key = object.__hash__(value)  # by identity, as id(), which raises an audit event
-        known = self._known.get(key)
-        if known is not None and known[0] is value:
-            return known[1:]
-        size, depth = len(value), 0
-        for each in value:
-            if type(each) is str:
-                size += len(each)
-            elif type(each) in (list, tuple):
-                inside, levels = self._inside(line, each)
-                size += inside
-                depth = max(depth, levels)
-        if depth == DEEPEST_VALUE:
-            raise refused(line, f"lists and tuples nest more than {DEEPEST_VALUE} deep; keep them flat")
-        self._known[key] = value, size, depth + 1
-        return size, depth + 1
-
-
 def combined(line: int, sign: str, left: Any, right: Any, factors: int) -> Value:
     """Return the result of an arithmetic operator on two values; ``factors`` are the most Heats in one product.
 
@@ -221,6 +181,18 @@ def combined(line: int, sign: str, left: Any, right: Any, factors: int) -> Value
     for number in (made.x, made.y, made.z) if kind is _PLACE else (made,) if kind is _NUMBER else ():
         bounded(line, number)
     return made
+
+
+def compared(line: int, *sides: Value) -> int:
+    """Return how many elements and characters a comparison goes through.
+
+    Raises:
+        ProgramError: a list holds lists: one that is small and holds another many times over is compared for years.
+    """
+    nests = any(isinstance(each, (list, tuple)) for side in sides if isinstance(side, (list, tuple)) for each in side)
+    if nests:
+        raise refused(line, "lists in lists are not compared; compare their elements")
+    return sum(1 + len(side) for side in sides if isinstance(side, (str, list, tuple)))
 
 
 def element_of(line: int, values: list[Any] | tuple[Any, ...], index: Any) -> Value:

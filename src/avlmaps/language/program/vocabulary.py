@@ -8,8 +8,7 @@ Names are those of the paper and of VLMaps; angles in degrees and metres, since 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from inspect import Parameter as Declared
-from inspect import getdoc, signature
+from inspect import Signature, getdoc, signature
 from math import isfinite
 from types import MappingProxyType, NoneType, UnionType
 from typing import Any, Protocol, Union, get_args, get_origin, get_type_hints, runtime_checkable
@@ -284,6 +283,7 @@ class Skill:
         returns: the kind of its result.
         returns_text: the type of its result, as in the signature.
         doc: what it does.
+        takes: its signature, without the robot.
     """
 
     name: str
@@ -291,6 +291,11 @@ class Skill:
     returns: ValueType
     returns_text: str
     doc: str
+    takes: Signature
+
+    def given(self, values: Sequence[Any], named: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return what a call gives to each parameter; raises TypeError where they do not fit."""
+        return self.takes.bind(*values, **named).arguments
 
     @property
     def signature(self) -> str:
@@ -314,34 +319,24 @@ class Skill:
 
 
 def skills_of(vocabulary: type) -> Mapping[str, Skill]:
-    """Return the skills that a vocabulary's class declares, in its order.
-
-    Raises:
-        TypeError: a signature has something that a program has no value for.
-    """
+    """Return the skills that a vocabulary's class declares, in its order."""
     names = [name for name, member in vars(vocabulary).items() if not name.startswith("_") and callable(member)]
     return MappingProxyType({name: _skill(name, getattr(vocabulary, name)) for name in names})
 
 
 def _skill(name: str, method: Any) -> Skill:
-    hints = get_type_hints(method)
+    hints, takes = get_type_hints(method), signature(method)
+    takes = takes.replace(parameters=list(takes.parameters.values())[1:])
     parameters: dict[str, Parameter] = {}
-    for declared in list(signature(method).parameters.values())[1:]:
-        if declared.kind is not Declared.POSITIONAL_OR_KEYWORD:
-            raise TypeError(f"the parameter {declared} of the skill {name} is neither plain nor named")
-        kinds, text = _kinds_of(name, hints[declared.name])
-        default = None if declared.default is Declared.empty else repr(declared.default)
-        parameters[declared.name] = Parameter(declared.name, kinds, text, default)
-    (returns,), returns_text = _kinds_of(name, hints["return"])
-    return Skill(name, parameters, returns, returns_text, " ".join((getdoc(method) or "").split()))
+    for declared in takes.parameters.values():
+        default = None if declared.default is Signature.empty else repr(declared.default)
+        parameters[declared.name] = Parameter(declared.name, *_kinds_of(hints[declared.name]), default)
+    (returns,), returns_text = _kinds_of(hints["return"])
+    return Skill(name, parameters, returns, returns_text, " ".join((getdoc(method) or "").split()), takes)
 
 
-def _kinds_of(skill: str, hint: Any) -> tuple[frozenset[ValueType], str]:
-    choices = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
-    try:
-        known = [_TYPES[choice] for choice in choices]
-    except (KeyError, TypeError):
-        raise TypeError(f"a program has no value of the type {hint} in the skill {skill}") from None
+def _kinds_of(hint: Any) -> tuple[frozenset[ValueType], str]:
+    known = [_TYPES[choice] for choice in (get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,))]
     return frozenset(kind for kind, _ in known), " | ".join(text for _, text in known)
 
 
