@@ -17,7 +17,7 @@ from avlmaps.language.claims import claimed_words
 from avlmaps.language.intents import Pick, Target, TargetKind
 from avlmaps.language.lexer import WORDS, Token, in_figures, tokenise
 from avlmaps.language.names import class_words, is_entry, is_known, respelt, sounding_words
-from avlmaps.language.rephrase import forms, in_degrees, rewritten
+from avlmaps.language.rephrase import forms, rewritten
 from avlmaps.language.verbalise import phrase
 from avlmaps.language.word_classes import table
 from avlmaps.perception.embedded.words import is_word
@@ -94,7 +94,7 @@ class Sentence:
         self.text = text
         plain, self.order_notes = rewritten(text)
         tokens, self.respelt = respelt(tokenise(plain))
-        self.tokens = in_degrees(in_figures(tokens))
+        self.tokens = in_figures(tokens)
         self.tokens += given.tokens((token.text for token in self.tokens), len(text))
         self.given = given
 
