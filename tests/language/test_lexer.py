@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from avlmaps.language.lexer import duration_at, in_figures, length_at, number_at, tokenise
 from avlmaps.language.translator import LearnedTranslator
+from avlmaps.language.word_classes import table
 
 
 @pytest.mark.parametrize(
@@ -48,26 +49,7 @@ def test_centimetres_need_no_unit_behind_metres(metres: int, centimetres: int) -
     assert max(length_at(tokenise(f"{metres} metres {centimetres}"), 0))[1] == pytest.approx(metres + centimetres / 100)
 
 
-SMALL_WORDS = [
-    "zero",
-    "one",
-    "two",
-    "three",
-    "four",
-    "five",
-    "six",
-    "seven",
-    "eight",
-    "nine",
-    "ten",
-    "eleven",
-    "twelve",
-    "thirteen",
-    "fourteen",
-    "fifteen",
-]
-SMALL_WORDS += ["sixteen", "seventeen", "eighteen", "nineteen"]
-TENS_WORDS = ["ten", "twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"]
+SMALL_WORDS, TENS_WORDS = (table("amounts")["words"][name].split("|") for name in ("small", "tens"))
 
 
 def in_words(number: int, *, joined: bool, article: str) -> str:
@@ -75,7 +57,7 @@ def in_words(number: int, *, joined: bool, article: str) -> str:
     if number < 20:
         return SMALL_WORDS[number]
     if number < 100:
-        return f"{TENS_WORDS[number // 10 - 1]} {SMALL_WORDS[number % 10] if number % 10 else ''}".strip()
+        return f"{TENS_WORDS[number // 10 - 2]} {SMALL_WORDS[number % 10] if number % 10 else ''}".strip()
     size, name = (1000, "thousand") if number >= 1000 else (100, "hundred")
     head = f"{article} {name}" if number // size == 1 and article != "one" else f"{SMALL_WORDS[number // size]} {name}"
     rest = in_words(number % size, joined=joined, article="one") if number % size else ""

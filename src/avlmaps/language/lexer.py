@@ -36,11 +36,9 @@ _TABLE = table("amounts")
 _list = partial(word_list, "amounts")
 LENGTHS, _ANGLES, _TIMES = (_TABLE[name] for name in ("lengths", "angles", "times"))
 _FOOT = LENGTHS["foot"]
-_NUMBERS = {
-    **{word: at for at, word in enumerate(_TABLE["words"]["small"].split("|"))}, "nought": 0,
-    **{word: 10 * at for at, word in enumerate(["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"], 2)},
-    "fourty": 40,
-}  # fmt: skip
+_SMALL, _TENS = (_TABLE["words"][name].split("|") for name in ("small", "tens"))
+_NUMBERS = {word: at for at, word in enumerate(_SMALL)} | {word: 10 * at for at, word in enumerate(_TENS, 2)}
+_NUMBERS |= {"nought": 0, "fourty": 40}
 WORDS = frozenset({
     *_NUMBERS, *_TABLE["vague"], *_TABLE["parts"], "hundred", "dozen", *LENGTHS, *_ANGLES, *_TIMES, *_list("sizes"),
     *_TABLE["short"],
@@ -344,12 +342,7 @@ def _unit(tokens: Sequence[Token], at: int, units: Mapping[str, float]) -> float
     behind = tokens[at + 1].text if at + 1 < len(tokens) else ""
     if units is LENGTHS and raw in ("'", '"'):
         return LENGTHS["foot" if raw == "'" else "inch"]
-    if (
-        word == "in"
-        and at + 1 < len(tokens)
-        and tokens[at + 1].kind == "word"
-        and tokens[at + 1].text in _list("after_in")
-    ):
+    if word == "in" and behind in _list("after_in"):
         return None
     return units.get(word) or (units.get(word.removesuffix("s")) if len(word) > 2 else None)
 
