@@ -5,7 +5,7 @@
 
 ``operations`` is the one table of what HTTP offers and agents call; it runs the functions of ``work`` in the threads of
 a ``lanes.Lane``. ``guard`` stands before everything: Host, Origin, token, size and time of bodies. A further
-application under the same guard is any ASGI application: ``create_app(service, mounts={"/drive": app})``.
+application under the same guard: ``create_app(service, mounts={"/drive": app})``.
 """
 
 from typing import TYPE_CHECKING

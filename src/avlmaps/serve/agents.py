@@ -12,14 +12,15 @@ import re
 import sys
 import threading
 from codecs import BOM_UTF8
+from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 from urllib.parse import quote
 
 import msgspec
-import numpy as np
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
@@ -42,18 +43,14 @@ HANDSHAKES = ("2024-11-05", "2025-03-26", "2025-06-18", "2025-11-25")
 VERSIONS = (*HANDSHAKES, "2026-07-28")
 _VERSION_KEY = "io.modelcontextprotocol/protocolVersion"
 _PARSE, _INVALID, _NO_METHOD, _PARAMS, _INTERNAL = -32700, -32600, -32601, -32602, -32603
-_SCHEME = "avlmaps://maps"
+_SCHEME, _UNKNOWN = "avlmaps://maps", "unknown"
 _MOST_ARGUMENT = 500
 _MOST_ENUM = 6  # maps that every tool names in its schema
 _MOST_MARKS = 20
 
 
-class ProtocolError(Exception):
-    """A message that has no answer, with its code of JSON-RPC."""
-
-    def __init__(self, code: int, sentence: str) -> None:
-        super().__init__(sentence)
-        self.code = code
+def _unknown(sentence: str) -> RequestError:
+    return RequestError(sentence, kind=_UNKNOWN)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,35 +117,30 @@ class AgentServer:
         if not isinstance(message, dict) or not isinstance(message.get("method"), str):
             is_response = isinstance(message, dict) and ("result" in message or "error" in message)
             return None if is_response else _error(None, _INVALID, "A message is a JSON object with a method.")
-        number, params = message.get("id"), message.get("params", {})
+        number, params, method = message.get("id"), message.get("params", {}), message["method"]
         if number is None:
             return None
-        meta = params.get("_meta") if isinstance(params, dict) else None
+        if not isinstance(params, dict):
+            return _error(number, _PARAMS, "params is no object.")
+        meta = params.get("_meta")
         meta = meta if isinstance(meta, dict) else {}
         try:
-            if not isinstance(params, dict):
-                raise ProtocolError(_PARAMS, "params is no object.")
-            result = await self._result(message["method"], params, _reporter(meta.get("progressToken"), tell))
-        except ProtocolError as fault:
-            return _error(number, fault.code, str(fault))
+            if method == "tools/call":
+                result = await self._called(params, _reporter(meta.get("progressToken"), tell))
+            elif method == "resources/read":
+                result = await self._resource(str(params.get("uri")))
+            elif method in _METHODS:
+                result = _METHODS[method](self, params)
+            else:
+                return _error(number, _NO_METHOD, f"There is no method {method[:80]!r} here.")
         except RequestError as fault:
-            return _error(number, _INTERNAL, str(fault))
+            return _error(number, _PARAMS if fault.kind == _UNKNOWN else _INTERNAL, str(fault))
         except Exception:  # noqa: BLE001 - unknown faults go to the log
-            log.exception("%s", message["method"][:80])
+            log.exception("%s", method[:80])
             return _error(number, _INTERNAL, "The server could not do this; its log says why.")
-        if _VERSION_KEY in meta or message["method"] == "server/discover":
+        if _VERSION_KEY in meta or method == "server/discover":
             result |= {"resultType": "complete", "ttlMs": 0, "cacheScope": "private"}
         return {"jsonrpc": "2.0", "id": number, "result": result}
-
-    async def _result(self, method: str, params: dict[str, Any], report: Report) -> dict[str, Any]:
-        if method == "tools/call":
-            return await self._called(params, report)
-        if method == "resources/read":
-            return await self._resource(str(params.get("uri")))
-        made = _METHODS.get(method)
-        if made is None:
-            raise ProtocolError(_NO_METHOD, f"There is no method {method[:80]!r} here.")
-        return made(self, params)
 
     def initialized(self, params: dict[str, Any]) -> dict[str, Any]:
         """Return the answer to the handshake of older revisions."""
@@ -157,7 +149,7 @@ class AgentServer:
 
     async def _resource(self, uri: str) -> dict[str, Any]:
         if uri not in self.resources:
-            raise ProtocolError(_PARAMS, f"There is no resource {uri[:120]!r}; list them first.")
+            raise _unknown(f"There is no resource {uri[:120]!r}; list them first.")
         text = await self.resources[uri][1]()
         return {"contents": [{"uri": uri, "mimeType": JSON_TYPE, "text": text}]}
 
@@ -175,7 +167,7 @@ class AgentServer:
         name, given = str(params.get("name")), params.get("arguments") or {}
         tool = self.tools.get(name)
         if tool is None:
-            raise ProtocolError(_PARAMS, f"There is no tool {name[:80]!r}; the tools are: {', '.join(self.tools)}.")
+            raise _unknown(f"There is no tool {name[:80]!r}; the tools are: {', '.join(self.tools)}.")
         try:
             if not isinstance(given, dict):
                 raise RequestError("The arguments of a tool are an object.")
@@ -185,15 +177,16 @@ class AgentServer:
 
     def prompt(self, params: dict[str, Any]) -> dict[str, Any]:
         """Return a prompt, filled."""
-        name, given = str(params.get("name")), params.get("arguments") or {}
+        name, given = str(params.get("name")), params.get("arguments")
         prompt = next((one for one in self.prompts if one.name == name), None)
         if prompt is None:
-            raise ProtocolError(_PARAMS, f"There is no prompt {name[:80]!r}.")
-        value = str(given.get(prompt.argument, "")).strip() if isinstance(given, dict) else ""
-        if prompt.argument and not 0 < len(value) <= _MOST_ARGUMENT:
-            most = f"of up to {_MOST_ARGUMENT} characters"
-            raise ProtocolError(_PARAMS, f"The prompt needs {prompt.argument}, {most}.")
-        text = prompt.text.replace("{" + prompt.argument + "}", value) if prompt.argument else prompt.text
+            raise _unknown(f"There is no prompt {name[:80]!r}.")
+        text = prompt.text
+        if prompt.argument:
+            value = str(given.get(prompt.argument, "")).strip() if isinstance(given, dict) else ""
+            if not 0 < len(value) <= _MOST_ARGUMENT:
+                raise _unknown(f"The prompt needs {prompt.argument}, of up to {_MOST_ARGUMENT} characters.")
+            text = text.replace("{" + prompt.argument + "}", value)
         message = {"role": "user", "content": {"type": "text", "text": text}}
         return {"description": prompt.about, "messages": [message]}
 
@@ -239,7 +232,7 @@ def text_of(answer: Mapping[str, Any]) -> dict[str, Any]:
     """Return an answer as the content of a result: the text of an error, else JSON that is short enough to be read."""
     if answer.keys() == {"error"} and answer["error"].keys() == {"kind", "message"}:
         return {"type": "text", "text": answer["error"]["message"]}
-    return {"type": "text", "text": encoded(fitting(compact(answer, left_out=frozenset()))).decode()}
+    return {"type": "text", "text": _shown(answer, frozenset())}
 
 
 def described(one: Operation, schema: dict[str, Any]) -> dict[str, Any]:
@@ -265,31 +258,27 @@ def agent_server(service: Service, *, reads_files: bool = False) -> AgentServer:
         return Tool(described(one, schema), call)
 
     async def text_of_maps() -> str:
-        return _resource_text(list_maps(service.shelf))
+        return _shown(list_maps(service.shelf), frozenset())
 
-    def text_of_map(name: str) -> Callable[[], Awaitable[str]]:
-        async def text() -> str:
-            task = WorkInput(service.shelf.get(name), service.settings.limits)
-            return _resource_text(await service.slow.run(lambda _: describe_map(task, NoQuery())))
+    async def text_of_map(name: str) -> str:
+        task = WorkInput(service.shelf.get(name), service.settings.limits)
+        return _shown(await service.slow.run(lambda _: describe_map(task, NoQuery())), frozenset())
 
-        return text
-
-    summary = "Counts, extent, models and sounds of a map."
-    resources = {_SCHEME: (_resource("maps", "Maps", "All maps."), text_of_maps)} | {
-        f"{_SCHEME}/{quote(name)}": (_resource(name, f"Summary of {name}", summary), text_of_map(name))
-        for name in names
-    }
+    resources = {_SCHEME: (_resource("maps", "Maps", "All maps."), text_of_maps)}
+    for name in names:
+        about = _resource(name, f"Summary of {name}", "Counts, extent, models and sounds of a map.")
+        resources[f"{_SCHEME}/{quote(name)}"] = about, partial(text_of_map, name)
     tools = {one.tool: tool(one) for one in OPERATIONS if one.tool}
-    about = f"{INSTRUCTIONS}\nMaps: {', '.join(names)}."
-    return AgentServer("avlmaps", about, tools, lambda error: service.described(error)[1], PROMPTS, resources)
+    instructions = f"{INSTRUCTIONS}\nMaps: {', '.join(names)}."
+    return AgentServer("avlmaps", instructions, tools, lambda error: service.described(error)[1], PROMPTS, resources)
 
 
 def _resource(name: str, title: str, about: str) -> dict[str, Any]:
     return {"name": name, "title": title, "description": about, "mimeType": JSON_TYPE}
 
 
-def _resource_text(answer: Any) -> str:
-    return encoded(fitting(compact(answer, left_out=frozenset()))).decode()
+def _shown(answer: Any, left_out: frozenset[str]) -> str:
+    return encoded(fitting(compact(answer, left_out=left_out))).decode()
 
 
 async def _content(
@@ -309,7 +298,7 @@ async def _content(
         return answer, _drawn(task, one, query, answer) if wants else None
 
     answer, image = await lane.run(job, report)
-    content = [{"type": "text", "text": encoded(fitting(compact(answer))).decode()}]
+    content = [{"type": "text", "text": _shown(answer, _LEFT_OUT)}]
     if image:
         data = base64.b64encode(image).decode()
         content.append({"type": "image", "data": data, "mimeType": "image/png"})
@@ -383,9 +372,12 @@ async def serve_stdio(server: AgentServer, longest_s: float) -> None:
         except (msgspec.DecodeError, UnicodeDecodeError) as fault:
             tell(_error(None, _PARSE, f"The line is no JSON ({str(fault)[:200]})."))
             continue
-        if (given_up := _cancelled(message)) in running:
-            running[given_up].cancel()
-        number = str(message.get("id")) if isinstance(message, dict) else ""
+        fields: dict[str, Any] = message if isinstance(message, dict) else {}
+        if fields.get("method") == "notifications/cancelled" and isinstance(fields.get("params"), dict):
+            if (given_up := running.get(str(fields["params"].get("requestId")))) is not None:
+                given_up.cancel()
+            continue
+        number = str(fields.get("id"))
         running[number] = asyncio.create_task(answered(message))
         running[number].add_done_callback(lambda _, number=number: running.pop(number, None))
     if running:
@@ -404,14 +396,6 @@ async def _stdin_lines() -> AsyncIterator[bytes]:
     while (line := await lines.get()) is not None:
         if plain := line.removeprefix(BOM_UTF8).strip():
             yield plain
-
-
-def _cancelled(message: Any) -> str:
-    """Return the number of the request that a client gives up; "" where a message says nothing of it."""
-    if not isinstance(message, dict) or message.get("method") != "notifications/cancelled":
-        return ""
-    params = message.get("params")
-    return str(params.get("requestId")) if isinstance(params, dict) else ""
 
 
 MOST_TOKENS = 800
@@ -447,22 +431,16 @@ def compact(answer: Any, decimals: int = _DECIMALS, left_out: frozenset[str] = _
 def fitting(answer: dict[str, Any], most: int = MOST_TOKENS) -> dict[str, Any]:
     """Return an answer of at most some tokens; ``left_out`` says how many entries of which lists are missing.
 
-    The longest list loses its end, wherever it stands in the answer; a path loses places between its ends, and where
-    no list is left the longest text is cut.
+    The longest list loses its end, wherever it stands in the answer; a path loses every second place between its ends,
+    and where no list is left the longest text is cut.
     """
     answer = deepcopy(answer)
-    gone: dict[str, int] = {}
-    while _size(answer) > most:
-        key, rows = max(_lists(answer), key=lambda one: _size(one[1]), default=("", []))
-        if not rows:
-            break
-        cut = max(1, len(rows) // 8)
-        if key.rpartition(".")[2] == "path":
-            kept = np.unique(np.linspace(0, len(rows) - 1, len(rows) - cut).round().astype(int))
-            rows[:] = [rows[at] for at in kept.tolist()]
-        else:
-            del rows[-cut:]
-        gone[key] = gone.get(key, 0) + cut
+    gone: Counter[str] = Counter()
+    while _size(answer) > most and (lists := list(_lists(answer))):
+        key, rows = max(lists, key=lambda one: _size(one[1]))
+        count = len(rows)
+        del rows[slice(1, -1, 2) if key.rpartition(".")[2] == "path" else slice(-max(1, count // 8), None)]
+        gone[key] += count - len(rows)
         answer[_LEFT_OUT_KEY] = gone
     while _size(answer) > most:
         where, key = max(_texts(answer), key=lambda one: len(one[0][one[1]]))

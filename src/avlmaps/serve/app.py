@@ -2,13 +2,13 @@
 
 import asyncio
 from codecs import BOM_UTF8
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
+from functools import partial
 from typing import Any
 
 import msgspec
 from starlette.applications import Starlette
-from starlette.convertors import Convertor, register_url_convertor
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
@@ -26,54 +26,48 @@ from avlmaps.serve.requests import PHOTO, Files, files_in, lists_of, read
 from avlmaps.serve.service import Service, error_response
 from avlmaps.serve.work import File, WorkInput, encoded, list_maps
 
-
-class _Whole(Convertor[int]):
-    """Whole numbers in addresses, of a few digits."""
-
-    regex = "-?[0-9]{1,9}"
-
-    def convert(self, value: str) -> int:
-        return int(value)
-
-    def to_string(self, value: int) -> str:
-        return str(value)
-
-
-register_url_convertor("whole", _Whole())
 EVENTS = "text/event-stream"
 _POLL_S = 2.0
 
 
-def create_app(service: Service, mounts: Mapping[str, App] | None = None, agents: bool = True) -> App:
+def create_app(service: Service, mounts: Mapping[str, Starlette] | None = None, agents: bool = True) -> App:
     """Return the ASGI application of a server.
 
     Args:
         service: maps, lanes and settings.
-        mounts: further ASGI applications by path, such as ``{"/drive": driving.app}``; the guard stands before them,
-            too. A Starlette application names in ``state.operations`` what the OpenAPI document says of it.
+        mounts: further applications by path, such as ``{"/drive": driving.app}``; the guard stands before them, too.
+            One may name in ``state.operations`` what the OpenAPI document says of it.
         agents: whether agents are served, under ``/mcp``.
     """
     mounts = mounts or {}
-    inner = [app for app in mounts.values() if isinstance(app, Starlette)]
+    token, names = service.settings.token, service.shelf.names
+    more = {path: getattr(app.state, "operations", ()) for path, app in mounts.items()}
+
+    def told(answer: Callable[[str], Any]) -> Callable[[Request], Awaitable[Response]]:
+        async def endpoint(request: Request) -> Response:
+            return json_response(answer(str(request.base_url).rstrip("/")))
+
+        return endpoint
+
     routes: list[BaseRoute] = [
         Route("/", _page, methods=["GET"]),
-        Route("/health", _health, methods=["GET"]),
-        Route("/openapi.json", _openapi(service, mounts), methods=["GET"]),
-        Route("/maps", _maps(service), methods=["GET"]),
+        Route("/health", told(lambda _: {"status": "ok", "version": __version__}), methods=["GET"]),
+        Route("/openapi.json", told(lambda url: document(names, url, token is not None, more)), methods=["GET"]),
+        Route("/maps", told(lambda _: list_maps(service.shelf)), methods=["GET"]),
     ]
     routes += [
-        Route(f"/maps/{{map}}{one.path}", _endpoint(service, one), methods=list(one.methods))
+        Route(f"/maps/{{map}}{one.path}", partial(_endpoint, service, one), methods=list(one.methods))
         for one in OPERATIONS
         if one.path is not None
     ]
     if agents:
         routes.append(agents_route(agent_server(service), service.settings.limits.body_bytes))
-    routes += [Mount(path, app=app) for path, app in sorted(mounts.items(), key=lambda pair: -len(pair[0]))]
+    routes += [Mount(path, app=app) for path, app in mounts.items()]
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         async with AsyncExitStack() as stack:
-            for one in inner:
+            for one in mounts.values():
                 await stack.enter_async_context(one.router.lifespan_context(one))
             looking = asyncio.create_task(_look_for_replaced_maps(service))
             try:
@@ -128,51 +122,23 @@ async def _page(request: Request) -> Response:
     return HTMLResponse(page, headers={"content-security-policy": CONTENT_POLICY})
 
 
-async def _health(_: Request) -> Response:
-    return json_response({"status": "ok", "version": __version__})
-
-
-def _openapi(service: Service, mounts: Mapping[str, App]) -> Callable[[Request], Any]:
-    more = {
-        path: app.state.operations
-        for path, app in mounts.items()
-        if isinstance(app, Starlette) and hasattr(app.state, "operations")
-    }
-
-    async def endpoint(request: Request) -> Response:
-        url = str(request.base_url).rstrip("/")
-        return json_response(document(service.shelf.names, url, service.settings.token is not None, more))
-
-    return endpoint
-
-
-def _maps(service: Service) -> Callable[[Request], Any]:
-    async def endpoint(_: Request) -> Response:
-        return json_response(list_maps(service.shelf))
-
-    return endpoint
-
-
-def _endpoint(service: Service, operation: Operation) -> Callable[[Request], Any]:
-    async def endpoint(request: Request) -> Response:
-        try:
-            return await _answered(service, operation, request)
-        except Exception as error:  # noqa: BLE001 - every fault gets its JSON, and unknown ones go to the log
-            return error_response(service, error)
-
-    return endpoint
+async def _endpoint(service: Service, operation: Operation, request: Request) -> Response:
+    try:
+        return await _answered(service, operation, request)
+    except Exception as error:  # noqa: BLE001 - every fault gets its JSON, and unknown ones go to the log
+        return error_response(service, error)
 
 
 async def _answered(service: Service, operation: Operation, request: Request) -> Response:
     served = service.shelf.get(request.path_params["map"])
     values, files = await values_of(request, operation, service.settings.limits.body_bytes)
-    query = read(values, operation.query)
+    in_path = {name: value for name, value in request.path_params.items() if name != "map"}
+    query = read({**values, **in_path}, operation.query)
     lane = service.slow if operation.slow or files else service.quick
-    numbers = {name: value for name, value in request.path_params.items() if name != "map"}
     tag = f'"{served.version}"'
 
     def job(watch: Cancellation) -> Any:
-        made = operation.work(WorkInput(served, service.settings.limits, files, watch, numbers), query)
+        made = operation.work(WorkInput(served, service.settings.limits, files, watch), query)
         return made if isinstance(made, File) else encoded(made)
 
     if isinstance(operation.answer, str):

@@ -3,10 +3,9 @@
 import asyncio
 import re
 import threading
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import ContextVar, copy_context
-from pathlib import Path
 from typing import TypeVar
 
 from avlmaps.core.errors import (
@@ -18,7 +17,6 @@ from avlmaps.core.errors import (
     QueryError,
     kind_named,
 )
-from avlmaps.core.files import user_path
 from avlmaps.core.printable import printable
 from avlmaps.query.schema import ErrorAnswer
 
@@ -151,9 +149,7 @@ async def streamed(work: Callable[[Callable[[bytes], None]], Awaitable[bytes]]) 
         working.cancel()
 
 
-_STATUS = {"map": 503}  # of a backend that is missing none: no retry helps, and other queries are answered
 _ABSOLUTE = re.compile(r"(?<![\w.:/~<>-])(?:/[\w.@+~-]+){2,}|\b[A-Za-z]:\\[^\s]+|\\\\[^\s]+")
-_GENERAL = "The server cannot read one of its files; its log names the file."
 
 
 class RequestError(AvlmapsError):
@@ -179,47 +175,29 @@ def without_folders(text: str) -> str:
     return _ABSOLUTE.sub(lambda found: re.split(r"[/\\\\]", found.group())[-1], text)
 
 
-class Privacy:
-    """Takes this machine's paths out of sentences."""
-
-    def __init__(self, names: Iterable[tuple[Path, str]]) -> None:
-        """Remember the folders that may be named."""
-        spellings: dict[str, str] = {}
-        for path, name in names:
-            for spelling in (str(path), str(user_path(path).absolute()), str(user_path(path).resolve())):
-                spellings[spelling] = name
-        self._spellings = sorted(spellings.items(), key=lambda pair: -len(pair[0]))
-
-    def cleaned(self, sentence: str) -> str:
-        """Return a sentence of ours with public names; a general one where a path is left."""
-        for spelling, name in self._spellings:
-            sentence = sentence.replace(spelling, name)
-        return _GENERAL if _ABSOLUTE.search(sentence) else sentence
-
-    def described(self, error: BaseException) -> tuple[int, ErrorAnswer]:
-        """Return the HTTP status and the JSON of an error."""
-        if isinstance(error, RequestError):
-            return error.status, _answer(error.kind, str(error), error.choices)
-        if isinstance(error, AskError):
-            return 400, _answer("usage", str(error))
-        if isinstance(error, NoFloorError):  # the map is whole, and no retry helps
-            return 422, _answer("map", str(error))
-        if isinstance(error, AvlmapsError):
-            kind = kind_named(type(error).__name__)
-            # These quote nothing but the client's own words, which may look like a path; others may quote a file.
-            ours = not isinstance(error, QueryError | LanguageError | NavigationError)
-            message = self.cleaned(str(error)) if ours else str(error)
-            return _STATUS.get(kind, 422), _answer(kind, message)
-        if isinstance(error, OSError | MemoryError):
+def described(error: BaseException, public: Callable[[str], str] = without_folders) -> tuple[int, ErrorAnswer]:
+    """Return the HTTP status and the JSON of an error; ``public`` takes paths out of what may quote a file."""
+    kind, message, choices = kind_named(type(error).__name__), str(error), ()
+    match error:
+        case RequestError():
+            status, kind, choices = error.status, error.kind, error.choices
+        case AskError():
+            status, kind = 400, "usage"
+        case NoFloorError():  # the map is whole, and no retry helps
+            status, kind = 422, "map"
+        case QueryError() | LanguageError() | NavigationError():  # these quote nothing but the client's own words
+            status = 422
+        case AvlmapsError():
+            # of a backend that is missing no retry helps, and other queries are answered
+            status, message = 503 if kind == "map" else 422, public(message)
+        case OSError() | MemoryError():
             what = "memory" if isinstance(error, MemoryError) else error.strerror or "a file"
-            return 503, _answer("system", f"The server lacks what this needs ({printable(what)}); its log says more.")
-        return 500, _answer(
-            "internal", "This is a fault of avlmaps; the server's log has the details. Please report it."
-        )
-
-
-def _answer(kind: str, message: str, choices: Sequence[str] = ()) -> ErrorAnswer:
+            message = f"The server lacks what this needs ({printable(what)}); its log says more."
+            status, kind = 503, "system"
+        case _:
+            message = "This is a fault of avlmaps; the server's log has the details. Please report it."
+            status, kind = 500, "internal"
     answer: ErrorAnswer = {"error": {"kind": kind, "message": message}}
     if choices:
         answer["error"]["choices"] = list(choices)
-    return answer
+    return status, answer

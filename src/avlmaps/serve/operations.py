@@ -32,7 +32,7 @@ class Operation:
 
     Attributes:
         name: ``operationId`` of the OpenAPI document; of what agents alone can do, their name of it.
-        path: below its mount, with ``{name:whole}`` for whole numbers; None for what agents alone can do.
+        path: below its mount, with ``{name}`` for values of the request; None for what agents alone can do.
         about: one sentence.
         query: the type of the request.
         answer: the type of the answer's JSON, or a media type.
@@ -76,8 +76,8 @@ OPERATIONS = (
               ask.ListedThingsQuery, work.ListedThingsAnswer, work.list_things, slow=True),
     Operation("listSounds", "/sounds", "List the sounds of a map.",
               ask.NoQuery, work.SoundsAnswer, work.list_sounds, slow=True),
-    Operation("getSound", "/sounds/{sound:whole}/clip", "Return the clip of a sound, counted from 0.",
-              ask.NoQuery, "audio/flac", work.sound_clip, slow=True),
+    Operation("getSound", "/sounds/{sound}/clip", "Return the clip of a sound, counted from 0.",
+              ask.SoundQuery, "audio/flac", work.sound_clip, slow=True),
     Operation("listRooms", "/rooms", "List the rooms of a map, as `avlmaps rooms` does.",
               ask.RoomsQuery, RoomsAnswer, work.list_rooms, slow=True),
     Operation("listSources", "/sources", "List where the sounds came from, as `avlmaps sources` does.",
@@ -116,10 +116,10 @@ OPERATIONS = (
               ask.PictureQuery, "image/png", work.picture, slow=True, methods=_BOTH, files=_FILES),
     Operation("listTiles", "/tiles", "List the tiles of a map's voxels, by level of detail.",
               ask.NoQuery, TilesAnswer, work.tiles, slow=True),
-    Operation("getTile", "/tiles/{level:whole}/{i:whole}/{j:whole}/{k:whole}", "Return one tile of voxels.",
+    Operation("getTile", "/tiles/{level}/{i}/{j}/{k}", "Return one tile of voxels.",
               ask.TilesQuery, _BYTES, work.tile, slow=True),
-    Operation("getKeyframe", "/keyframes/{keyframe:whole}", "Return the picture of a keyframe, counted from 0.",
-              ask.NoQuery, "image/jpeg", work.keyframe),
+    Operation("getKeyframe", "/keyframes/{keyframe}", "Return the picture of a keyframe, counted from 0.",
+              ask.KeyframeQuery, "image/jpeg", work.keyframe),
     Operation("view", "/view", "Show the map in a browser, as `avlmaps view` does.",
               ask.ViewQuery, "text/html", work.viewer),
     Operation("viewMap", "/view/map", "Return what the page of `view` needs to begin.",
@@ -130,8 +130,8 @@ OPERATIONS = (
               ask.NoQuery, _BYTES, work.drawn_labels, slow=True),
     Operation("viewContents", "/view/contents", "Return things, sounds and rooms with the colours of the page.",
               ask.NoQuery, dict, work.drawn_contents, slow=True),
-    Operation("viewVoxel", "/view/voxels/{voxel:whole}", "Return what a voxel that is drawn is taken for.",
-              ask.NoQuery, dict, work.drawn_voxel),
+    Operation("viewVoxel", "/view/voxels/{voxel}", "Return what a voxel that is drawn is taken for.",
+              ask.VoxelQuery, dict, work.drawn_voxel),
     Operation("askInView", "/view/ask", "Query a map, and return the answer with the heat of each voxel that is drawn.",
               ask.AskQuery, _BYTES, work.ask_in_view, methods=_BOTH, files=_FILES),
     Operation("rehearse", "/view/rehearse", "Plan a command on the map; no real robot moves.",
@@ -176,7 +176,7 @@ def document(
     paths["/maps"]["get"]["responses"] = {"200": _content("The maps.", of[work.MapsAnswer]), **errors}
     named = {"name": "map", "in": "path", "required": True, "schema": {"type": "string", "examples": list(maps)}}
     for mount, one in every:
-        item = paths.setdefault(mount + (one.path or "").replace(":whole", ""), {})
+        item = paths.setdefault(mount + (one.path or ""), {})
         for method in one.methods:
             described = _described(one, method, [named] if "{map}" in mount else [], of)
             item[method.lower()] = described | {"responses": {**errors, **described["responses"]}}
@@ -199,28 +199,23 @@ def document(
 
 def _described(one: Operation, method: str, parameters: list[Any], of: Mapping[Any, Any]) -> dict[str, Any]:
     schema = ask.schema_of(one.query)
-    parameters = parameters + [
-        {"name": name, "in": "path", "required": True, "schema": {"type": "integer"}}
-        for name in re.findall(r"{(\w+):whole}", one.path or "")
-    ]
-    if method == "GET":
-        parameters += [
-            {"name": name, "in": "query", "required": name in schema.get("required", ()),
-             "description": value.get("description", ""), "schema": value}
-            for name, value in schema["properties"].items()
-            if name != "intrinsics" or not one.files  # they belong to a photo
-        ]  # fmt: skip
-    done = "The answer."
+    in_path = re.findall(r"{(\w+)}", one.path or "")
+    for name, value in schema["properties"].items():
+        # intrinsics belong to a photo
+        if name in in_path or (method == "GET" and not (name == "intrinsics" and one.files)):
+            place = {"in": "path" if name in in_path else "query", "required": name in schema.get("required", ())}
+            about = {"description": value.get("description", ""), "schema": value}
+            parameters = [*parameters, {"name": name, **place, **about}]
+    text = {"schema": {"type": "string"}}
     if isinstance(one.answer, str):
-        response = {"description": done, "content": {one.answer: {"schema": {"type": "string"}}}}
+        content = {one.answer: text}
     else:
-        response = _content(done, of[one.answer])
-        response["content"]["text/event-stream"] = {"schema": {"type": "string"}}
+        content = {"application/json": {"schema": of[one.answer]}, "text/event-stream": text}
     described = {
         "operationId": one.name if method == one.methods[0] else f"{one.name}By{method.title()}",
         "summary": one.about,
         "parameters": parameters,
-        "responses": {str(one.status): response},
+        "responses": {str(one.status): {"description": "The answer.", "content": content}},
     }
     if one.name == "getTile":
         from avlmaps.serve import drawn
@@ -270,10 +265,6 @@ def _brief(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 CONTENT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'"
-_STYLE = """
-body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color-scheme:light dark}
-code,pre{font:14px/1.4 ui-monospace,monospace}pre{overflow:auto}
-"""
 
 
 def html_page(address: str) -> str:
@@ -285,16 +276,15 @@ def html_page(address: str) -> str:
     )
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width,initial-scale=1">
-<title>avlmaps server</title><style>{_STYLE}</style></head><body>
-<h1>avlmaps server</h1>
-<p>Version {escape(__version__)}. The maps: <a href="maps">maps</a>. In the browser, a map is at
-<code>/maps/NAME/view</code>. For programs: <a href="openapi.json">openapi.json</a> (OpenAPI 3.1), with the values of
-each operation. For agents: MCP by streamable HTTP at <code>/mcp</code>.</p>
+<title>avlmaps server</title>
+<style>body{{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;color-scheme:light dark}}</style>
+</head><body><h1>avlmaps server {escape(__version__)}</h1>
+<p>The maps: <a href="maps">maps</a>. In the browser: <code>/maps/NAME/view</code>. For programs:
+<a href="openapi.json">openapi.json</a> (OpenAPI 3.1). For agents: MCP by streamable HTTP at <code>/mcp</code>.</p>
 <pre>curl -G {escape(address)}/maps/NAME/ask --data-urlencode "sentence=the chair near the table"
 curl -F photo=@photo.jpg {escape(address)}/maps/NAME/locate</pre>
-<p>Answers are the JSON that the command line prints under <code>--json</code>. Errors are
+<p>Answers are the JSON that the command line prints under <code>--json</code>, errors
 <code>{{"error": {{"kind": ..., "message": ...}}}}</code>. Send <code>Accept: text/event-stream</code> for the
 progress of work that takes long.</p>
-<ul>{rows}</ul>
-</body></html>
+<ul>{rows}</ul></body></html>
 """

@@ -238,9 +238,31 @@ class RehearseQuery(Request):
     ] = None
 
 
-class TilesQuery(Request):
-    """How tiles are coloured."""
+class SoundQuery(Request):
+    """A sound, by its number from 0."""
 
+    sound: int
+
+
+class KeyframeQuery(Request):
+    """A keyframe, by its number from 0."""
+
+    keyframe: int
+
+
+class VoxelQuery(Request):
+    """A voxel that is drawn, by its number from 0."""
+
+    voxel: int
+
+
+class TilesQuery(Request):
+    """A tile, and how it is coloured."""
+
+    level: int
+    i: int
+    j: int
+    k: int
     heat: Annotated[
         Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema=_shown("[A-Za-z]"))] | None,
         Meta(description="a query in words; each voxel then has its heat as a seventh byte, 0 to 255"),

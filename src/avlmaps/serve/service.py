@@ -19,7 +19,7 @@ from avlmaps.core.files import read_regular, user_path
 from avlmaps.core.wording import option
 from avlmaps.query.schema import ErrorAnswer
 from avlmaps.serve.guard import App
-from avlmaps.serve.lanes import JSON_TYPE, Lane, Privacy, RequestError
+from avlmaps.serve.lanes import JSON_TYPE, Lane, RequestError, described, without_folders
 from avlmaps.serve.settings import ServeError, ServeSettings
 from avlmaps.serve.shelf import MapSource, Shelf
 from avlmaps.serve.work import encoded
@@ -39,7 +39,6 @@ class Service:
     shelf: Shelf
     quick: Lane  # of queries in words
     slow: Lane  # of photos, clips, lists and pictures
-    privacy: Privacy  # takes paths out of sentences
 
     @classmethod
     def open(
@@ -63,7 +62,6 @@ class Service:
             shelf,
             Lane("quick", limits.quick_workers, limits.waiting, limits.answer_s),
             Lane("slow", limits.slow_workers, limits.waiting, limits.answer_s),
-            Privacy((path, name) for name, path in shelf.paths.items()),
         )
 
     def close(self) -> None:
@@ -73,10 +71,15 @@ class Service:
 
     def described(self, error: BaseException) -> tuple[int, ErrorAnswer]:
         """Return the HTTP status and the JSON of an error; what is a fault of ours goes to the log."""
-        status, answer = self.privacy.described(error)
+        status, answer = described(error, self._public)
         if status >= 500 and not isinstance(error, RequestError):
             log.error("%s", error, exc_info=error if status == 500 else None)
         return status, answer
+
+    def _public(self, sentence: str) -> str:
+        for name, path in self.shelf.paths.items():
+            sentence = sentence.replace(str(path), name)
+        return without_folders(sentence)
 
 
 def error_response(service: Service, error: BaseException) -> Response:

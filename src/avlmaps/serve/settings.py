@@ -34,11 +34,6 @@ class Limits:
     cache_bytes: int = 192 * MB  # memory for the heat of words that were queried before, for each map
     shutdown_s: float = 30.0  # longest time for running queries after SIGTERM
 
-    def __post_init__(self) -> None:
-        for name in ("body_bytes", "body_s", "answer_s", "quick_workers", "slow_workers", "connections"):
-            if getattr(self, name) <= 0:
-                raise ServeError(f"The limit {name} is {getattr(self, name)}; it must be over 0.")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServeSettings:
@@ -65,8 +60,6 @@ class ServeSettings:
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
-        if not 0 <= self.port <= 65535:
-            raise ServeError(f"The port is {self.port}; it must lie between 0 (any free one) and 65535.")
         if not self.is_loopback and self.token is None:
             raise ServeError(
                 f"A server on {self.host} can be reached by other machines, so it needs a token; give "

@@ -1,6 +1,6 @@
 """The work of each request: from a request's values to its answer, in a thread of a lane.
 
-What cannot be answered raises an ``AvlmapsError``; ``lanes.Privacy`` gives it a status and takes paths out of it.
+What cannot be answered raises an ``AvlmapsError``; ``lanes.described`` gives it a status and takes paths out of it.
 """
 
 import tempfile
@@ -61,13 +61,12 @@ from avlmaps.serve.shelf import ServedMap, Shelf
 
 @dataclass(frozen=True, slots=True)
 class WorkInput:
-    """What a piece of work is given; ``path`` are the numbers in the address."""
+    """What a piece of work is given."""
 
     map: ServedMap
     limits: Limits
     files: Files = field(default_factory=dict[str, bytes])
     watch: Cancellation = field(default_factory=Cancellation)
-    path: dict[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,9 +212,9 @@ def edit(task: WorkInput, query: requests.EditQuery) -> EditsAnswer:
     return {**editor.history(), "map": task.map.name, "text": edit_text(made)}
 
 
-def sound_clip(task: WorkInput, query: requests.NoQuery) -> File:
+def sound_clip(task: WorkInput, query: requests.SoundQuery) -> File:
     """Return the FLAC file of a sound."""
-    sounds, number = task.map.avlmap.data.sounds, task.path["sound"]
+    sounds, number = task.map.avlmap.data.sounds, query.sound
     if not 0 <= number < len(sounds):
         raise RequestError(f"The map has {len(sounds)} sounds, counted from 0; there is no {number}.", 404)
     try:
@@ -309,8 +308,7 @@ def tile(task: WorkInput, query: requests.TilesQuery) -> File:
     if query.heat is not None:
         shown = ask_map(task, requests.AskQuery(sentence=query.heat)).heat
         heat = None if shown is None else shown.shown
-    level, i, j, k = (task.path[name] for name in ("level", "i", "j", "k"))
-    content = _pyramid(task).tile(level, (i, j, k), heat)
+    content = _pyramid(task).tile(query.level, (query.i, query.j, query.k), heat)
     if content is None:
         raise RequestError("There is no such tile; /maps/{map}/tiles lists them.", 404, "tile")
     return File(content, "application/octet-stream", {"etag": f'"{task.map.version}"'})
@@ -494,17 +492,17 @@ def drawn_contents(task: WorkInput, query: NoQuery) -> dict[str, Any]:
     return task.map.page.describe_contents()
 
 
-def drawn_voxel(task: WorkInput, query: NoQuery) -> dict[str, Any]:
+def drawn_voxel(task: WorkInput, query: requests.VoxelQuery) -> dict[str, Any]:
     """Return what one voxel is taken for."""
-    page, number = task.map.page, task.path["voxel"]
+    page, number = task.map.page, query.voxel
     if not 0 <= number < len(page.layout):
         raise RequestError(f"There is no voxel {number}; the page draws {len(page.layout):,}.", 404)
     return page.describe_voxel(number)
 
 
-def keyframe(task: WorkInput, query: NoQuery) -> File:
+def keyframe(task: WorkInput, query: requests.KeyframeQuery) -> File:
     """Return the picture of a keyframe."""
-    number, keyframes = task.path["keyframe"], task.map.avlmap.data.keyframes
+    number, keyframes = query.keyframe, task.map.avlmap.data.keyframes
     jpeg = task.map.page.layout.thumbnail(number)
     if jpeg is None:
         raise RequestError(

@@ -10,7 +10,7 @@ import signal
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -67,8 +67,8 @@ class DriveService:
     async def stop(self, query: NoQuery, who: Who) -> dict[str, Any]:
         """Stop the robot: the brake at once, here; the robot's confirmation in a thread."""
         self.dispatcher.brake_now()
-        run = copy_context().run
-        return await asyncio.get_running_loop().run_in_executor(self.stops, run, self.dispatcher.stop, who)
+        stop = partial(copy_context().run, self.dispatcher.stop, who)
+        return await asyncio.get_running_loop().run_in_executor(self.stops, stop)
 
     async def status(self, query: NoQuery, who: Who) -> dict[str, Any]:
         """Return what the robot is at."""
