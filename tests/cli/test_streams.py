@@ -82,20 +82,6 @@ def test_other_errors_are_not_about_memory() -> None:
         assert not is_short_of_memory(error)
 
 
-@pytest.mark.few(1)
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs a limit on the address space")
-@pytest.mark.parametrize("megabytes", [250, 450])
-def test_a_small_address_space_is_one_sentence(built: Path, megabytes: int) -> None:
-    line = f'ulimit -v {megabytes * 1000}; exec "$@"'
-    for words in (["things", built, "--json"], ["query", built, "the red chair near the table"]):
-        command = ["bash", "-c", line, "bash", sys.executable, "-m", "avlmaps", *map(str, words)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=200)
-        assert done.returncode in (0, 1), done
-        assert "Traceback" not in done.stderr, done.stderr
-        if done.returncode:
-            assert "there is not enough memory for this" in done.stderr or "which is too little memory" in done.stderr
-
-
 def test_a_fault_in_one_line_of_the_shell_ends_only_that_line(
     built: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

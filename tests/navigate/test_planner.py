@@ -11,9 +11,7 @@ from test_costmap import CELL_M, grid_of, of_states
 
 from avlmaps.maps.obstacles import CellState, ForbiddenArea, Obstacles
 from avlmaps.navigate.costmap import costmap_of
-from avlmaps.navigate.planner import Planner, PlanSettings
-
-COARSE = PlanSettings(exact_cells=1)
+from avlmaps.navigate.planner import Planner
 
 
 def clutter(seed, size=90):
@@ -52,9 +50,9 @@ def costs_along(costmap, points):
     return total
 
 
-@given(seed=st.integers(0, 100_000), coarse=st.booleans())
-def test_a_way_is_found_where_there_is_one_and_never_leads_through_an_obstacle(seed, coarse):
-    planner = Planner(costmap_of(of_states(clutter(seed)), 0.15), COARSE if coarse else None)
+@given(seed=st.integers(0, 100_000))
+def test_a_way_is_found_where_there_is_one_and_never_leads_through_an_obstacle(seed):
+    planner = Planner(costmap_of(of_states(clutter(seed)), 0.15))
     costmap = planner.costmap
     if not costmap.passable.any():
         return
@@ -71,33 +69,6 @@ def test_a_way_is_found_where_there_is_one_and_never_leads_through_an_obstacle(s
 
 
 @given(seed=st.integers(0, 100_000))
-def test_searching_coarse_to_fine_costs_at_most_a_tenth_more(seed):
-    costmap = costmap_of(of_states(clutter(seed, 120)), 0.1)
-    exact, coarse = Planner(costmap), Planner(costmap, COARSE)
-    if not costmap.passable.any():
-        return
-    start, goal = two_places(exact, seed)
-    way, other = exact.way(start, goal), coarse.way(start, goal)
-    assert (way is None) == (other is None)
-    if way is not None and other is not None:
-        assert other.cost <= 1.1 * way.cost + 1e-9
-
-
-def test_across_a_large_open_floor_the_way_is_the_straight_line_and_past_a_wall_it_is_not():
-    hall = np.full((120, 160), CellState.FREE)
-    start, goal = np.array([1.0, 1.0]), np.array([5.0, 7.0])
-    way = Planner(costmap_of(of_states(hall), 0.1), COARSE).way(start, goal)
-    assert way is not None
-    np.testing.assert_allclose(way.points, [start, goal])
-    hall[60:63, 10:] = CellState.OCCUPIED
-    costmap = costmap_of(of_states(hall), 0.1)
-    around = Planner(costmap, COARSE).way(start, goal)
-    assert around is not None
-    assert len(around.points) > 2
-    assert costs_along(costmap, around.points) < np.inf
-
-
-@given(seed=st.integers(0, 100_000))
 def test_pulling_it_straight_never_makes_a_way_dearer(seed):
     planner = Planner(costmap_of(of_states(clutter(seed)), 0.1))
     if not planner.costmap.passable.any():
@@ -106,7 +77,7 @@ def test_pulling_it_straight_never_makes_a_way_dearer(seed):
     way = planner.way(start, goal)
     if way is None:
         return
-    cells = planner._search(planner.costmap.cell_of(start), planner.costmap.cell_of(goal))
+    cells = planner._cells.path(planner.costmap.cell_of(start), planner.costmap.cell_of(goal))
     rough = planner._measured(np.concatenate([cells[:1], cells[1:-1], cells[-1:]]) + 0.5, None)
     assert way.cost <= rough.cost + 1e-6
 
@@ -129,7 +100,7 @@ def test_a_turned_or_mirrored_floor_has_turned_and_mirrored_ways(seed, turns, mi
     if way is not None and same is not None:
         assert same.cost == pytest.approx(way.cost, rel=0.02)
         first, second = (
-            planner._search(*planner.costmap.cell_of(ends)) for planner, ends in ((one, places), (two, moved))
+            planner._cells.path(*planner.costmap.cell_of(ends)) for planner, ends in ((one, places), (two, moved))
         )
         assert one._measured(first + 0.5, None).cost == pytest.approx(two._measured(second + 0.5, None).cost, rel=1e-5)
 
@@ -262,24 +233,6 @@ def test_a_closed_room_has_no_way_in():
     stop = planner.stop_for(inside, np.array([3.4, 1.0]))
     assert stop is not None
     assert not stop.seen
-
-
-@pytest.mark.parametrize("around", [(0,), (2, 1), (2, 1, 0)])
-def test_a_coarse_way_that_leads_past_a_corner_never_hides_the_way(monkeypatch, around):
-    from avlmaps.navigate import planner as module
-
-    monkeypatch.setattr(module, "_AROUND", around)
-    for seed in range(60):
-        rng = np.random.default_rng(seed)
-        states = rng.choice([CellState.FREE, CellState.OCCUPIED], rng.integers(10, 41, 2), p=[0.7, 0.3])
-        planner = Planner(costmap_of(of_states(states), 0.01), COARSE)
-        start, goal = two_places(planner, seed)
-        way = planner.way(start, goal)
-        parts = label(planner.costmap.passable)[0]
-        ends = (parts[tuple(planner.costmap.cell_of(place))] for place in (start, goal))
-        assert (way is not None) == (len(set(ends)) == 1)
-        if way is not None:
-            assert costs_along(planner.costmap, way.points) < np.inf
 
 
 @pytest.mark.filterwarnings("error")

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 READER_GONE = 141
 """Exit status where a reader went away: what a shell reports for a program that SIGPIPE (13) ended."""
-# A question about a small map needs 0.9 GB of addresses (not of memory): libraries reserve more than they use.
-_LEAST_BYTES = 1_000_000_000
 # The language asks for files in words that fit every program; here an option names them.
 _ATTACHED = {
     "Which picture? Attach it": "Which picture? Give it with --image FILE",
@@ -127,8 +125,6 @@ def _name_of(verb: "Verb") -> str:
 
 
 def _compiling(verb: "Verb") -> AbstractContextManager[None]:
-    if verb.compiles or hasattr(verb, "map"):
-        _require_address_space()
     if not verb.compiles:
         return nullcontext()
     from avlmaps.core.progress import announce_compiling
@@ -202,19 +198,6 @@ def _is_broken(stream: TextIO) -> bool:
 def _drop(stream: TextIO) -> None:
     """Let all that a stream still holds, or gets, go nowhere: Python would report it on standard error when it ends."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
-def _require_address_space() -> None:
-    if sys.platform == "win32":
-        return
-    import resource
-
-    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if limit != resource.RLIM_INFINITY and limit < _LEAST_BYTES:
-        raise output.AddressSpaceError(
-            f"this process may have {limit / 1e6:,.0f} MB of address space, which is too little memory: this needs "
-            f"{_LEAST_BYTES / 1e6:,.0f} MB or more; raise the limit (ulimit -v)"
-        )
 
 
 @contextmanager

@@ -20,10 +20,6 @@ class UsageError(Exception):
         self.help = help
 
 
-class AddressSpaceError(MemoryError):
-    """The limit on this process's address space is too low; its sentence has the numbers."""
-
-
 class AnsweredError(Exception):
     """A verb failed and its answer, which is printed already, says why.
 
@@ -80,8 +76,6 @@ def system_sentence(error: OSError) -> str:
 
 def fault_sentence(fault: Exception) -> str:
     """Return the sentence for an error that is none of ours: of the system, of too little memory, or unforeseen."""
-    if isinstance(fault, AddressSpaceError):
-        return str(fault)
     if is_short_of_memory(fault):
         return NO_MEMORY
     if isinstance(fault, OSError):

@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 from contextlib import redirect_stderr
 from functools import cache
 from importlib import import_module
+from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, Union, get_args, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, Union
 
 import tyro
 
@@ -107,95 +108,45 @@ def _any_verb(verbs: dict[str, type[Verb]]) -> Any:
 CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff)
 V = TypeVar("V", bound=Verb)
 Options = TypeVar("Options")
-_CHOICE = re.compile(
-    r"invalid choice '(?P<given>[^']*)' for argument '(?P<name>[^']*)'. Expected one of \((?P<known>[^)]*)\)"
-)
-_NO_VALUE = re.compile(r"Missing value for argument '(?P<name>[^']*)'")
-_NO_NUMBER = re.compile(
-    r"Error parsing (?P<name>--[\w-]+).*?: (?:could not convert|invalid literal).*?: (?P<given>'.*?')"
-)
 
 
 def usage_sentence(printed: str) -> str:
-    """Return the fault in the words, out of the frame that the parser prints."""
-    return " ".join(" ".join(_framed(printed)).split())
-
-
-def _framed(printed: str) -> list[str]:
-    """Return the lines of what is wrong: after a title and a rule, until the rule before help."""
+    """Return the fault in the words out of what the parser prints: between a title and the rule before help."""
     # in a box the title lies in its upper edge
     printed = re.sub(r"^╭─ [^\n]*╮$", "title\n────", printed.lstrip(), count=1, flags=re.MULTILINE)
     parts = re.split(r"\n *[-─]{3,} *\n", re.sub("[╭╮╰╯│]", " ", printed))
-    return parts[min(1, len(parts) - 1)].splitlines()
+    return " ".join(parts[min(1, len(parts) - 1)].split())
 
 
 def meant(words: Sequence[str], printed: str, verbs: Mapping[str, type[Verb]]) -> str:
-    """Return the fault in a command line in one sentence, with the verb, option or value that was probably meant."""
-    sentence = usage_sentence(printed)
-    name = words[0] if words else ""
+    """Return the fault in a command line in one sentence, with the verb or option that was probably meant."""
+    sentence, name = usage_sentence(printed), words[0] if words else ""
     if not name or name.startswith("-"):
         return f"a verb comes first: {', '.join(verbs)}."
     if name not in verbs:
         return f"there is no verb {name[:60]!r}{did_you_mean(name, verbs)} The verbs: {', '.join(verbs)}."
-    options = _options(verbs[name])
-    if found := _CHOICE.search(sentence):
-        known = [word for word in re.findall(r"'([^']*)'", found["known"]) if word != "None"]
-        return f"{found['name']} takes {', '.join(known)}; not {found['given']!r}{did_you_mean(found['given'], known)}"
-    given = [word.partition("=")[0] for word in _before_dashes(words[1:]) if re.match("--[a-z]", word)]
+    options, before_dashes = _options(verbs[name]), list(takewhile(lambda word: word != "--", words[1:]))
+    given = [word.partition("=")[0] for word in before_dashes if re.match("--[a-z]", word)]
     unknown = [word for word in given if word.replace("_", "-") not in options]
-    close = nearest(unknown[0].replace("_", "-"), tuple(options)) if unknown else None
-    if close is not None:
-        said = f"Unrecognized options: {unknown[0]}" if "Unrecognized" not in sentence else sentence
-        return f"{said.partition(' Perhaps you meant')[0].rstrip('.')}; did you mean {close}?"
+    if unknown and (close := nearest(unknown[0].replace("_", "-"), options)) is not None:
+        return f"there is no option {unknown[0]}; did you mean {close}?"
     plain = [word for word in words[1:] if not word.startswith("-")]
-    if sentence.startswith("Missing from"):
-        lacking = f"{name} needs {' and '.join(_missing(_framed(printed)[1:]))}"
-        if "sentence" in verbs[name].__dataclass_fields__ and plain and not Path(plain[0]).exists():
-            return f"{lacking}; the map comes first, and there is none at {plain[0][:80]!r}."
-        return f"{lacking}."
-    if "Unrecognized" in sentence and len(plain) > 2 and "sentence" in verbs[name].__dataclass_fields__:
-        return f"put the sentence in quotes: avlmaps {name} {shlex.join([plain[0], ' '.join(plain[1:])])}"
-    if found := _NO_VALUE.search(sentence):
-        return f"{found['name']} needs a value: {options.get(found['name']) or 'see its help'}."
-    if found := _NO_NUMBER.search(sentence):
-        kind = "a whole number" if "int()" in sentence else "a number"
-        return f"{found['name']} takes {kind}, not {found['given']}."
+    if "sentence" in verbs[name].__dataclass_fields__:
+        if sentence.startswith("Missing from") and plain and not Path(plain[0]).exists():
+            return f"{name} needs a map and a sentence; the map comes first, and there is none at {plain[0][:80]!r}."
+        if "Unrecognized" in sentence and len(plain) > 2:
+            return f"put the sentence in quotes: avlmaps {name} {shlex.join([plain[0], ' '.join(plain[1:])])}"
     return sentence
 
 
-def _missing(lines: Sequence[str]) -> list[str]:
-    """Return the names out of a list of names, each with its help further to the right."""
-    margins = [len(line) - len(line.lstrip()) for line in lines]
-    names: list[str] = []
-    for line, margin in zip(lines, margins, strict=True):
-        if line.strip() and margin == min(margins):
-            if names and names[-1].endswith(","):  # a long one continues
-                names[-1] += line.strip()
-            else:
-                names.append(line.strip())
-    return names
-
-
-def _before_dashes(words: Sequence[str]) -> Sequence[str]:
-    return words[: words.index("--")] if "--" in words else words
-
-
-def _options(verb: type[Any]) -> dict[str, str]:
-    """Return the options of a verb as they are typed, those of its groups among them, and what each takes."""
-    options: dict[str, str] = {"--help": ""}
-    for field in dataclasses.fields(verb):
-        kind = get_type_hints(verb, include_extras=True)[field.name]
-        notes = getattr(kind, "__metadata__", ())
-        bare = kind.__origin__ if notes else kind
-        if dataclasses.is_dataclass(bare):
-            options |= _options(bare if isinstance(bare, type) else type(bare))
-        elif tyro.conf.Positional not in notes and "Positional" not in str(notes):
-            takes = next((note.metavar for note in notes if getattr(note, "metavar", None)), "")
-            takes = takes or "|".join(map(str, get_args(bare)))
-            own = next((note.name for note in notes if getattr(note, "name", None)), field.name.replace("_", "-"))
-            for name in (f"--{own}", *(alias for note in notes for alias in getattr(note, "aliases", None) or ())):
-                options[name] = takes
-    return options
+def _options(verb: type[Any]) -> tuple[str, ...]:
+    """Return the options of a verb as they are typed, those of its groups among them."""
+    names = ["--help"]
+    for each in dataclasses.fields(verb):
+        group = each.default_factory
+        is_group = isinstance(group, type) and dataclasses.is_dataclass(group)
+        names += _options(group) if is_group else [f"--{each.name.replace('_', '-')}"]
+    return tuple(names)
 
 
 def at_home(given: Options) -> Options:

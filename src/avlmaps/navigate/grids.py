@@ -1,4 +1,4 @@
-"""The floor grid: a graph of its cells for Dijkstra, its blocks, loops over lines, and what is near and what is seen.
+"""The floor grid: a graph of its cells for Dijkstra, loops over lines, and what is near and what is seen.
 
 Grids are indexed (i, j) for x and y; places are in cells, so that cell (i, j) covers [i, i + 1) x [j, j + 1).
 """
@@ -11,8 +11,6 @@ from jaxtyping import Bool, Float, Float64, Int
 from numba import njit
 from scipy.sparse import csgraph, csr_array
 
-BLOCK = 4
-"""Cells a side of a block, of the coarse graph."""
 _SAMPLE = 0.2  # of a line of sight, cells
 # Half of the sixteen neighbours, each with the cells that a step there passes or touches; the others are the reverse.
 _STEPS: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {
@@ -32,7 +30,7 @@ class CellGraph:
     @classmethod
     def of(cls, mask: Bool[np.ndarray, "nx ny"], cost: Float[np.ndarray, "nx ny"]) -> Self:
         """Join the true cells of a mask."""
-        number, cells = _numbered(mask)
+        number, cells = np.where(mask, np.cumsum(mask).reshape(mask.shape) - 1, -1), np.argwhere(mask)
         around, numbers = np.pad(cost, 2), np.pad(number, 2, constant_values=-1)
         pairs: list[np.ndarray] = []
         weights: list[np.ndarray] = []
@@ -44,28 +42,20 @@ class CellGraph:
                 mean = 0.5 * mean + 0.25 * sum(around[tuple((at + by).T)] for by in passed)
             pairs.append(pair)
             weights.append(np.hypot(*step) * mean)
-        return cls(number, cells, _symmetric(np.concatenate(pairs), np.concatenate(weights), len(cells)))
+        one, other = np.concatenate(pairs).T
+        ends = np.concatenate([one, other]), np.concatenate([other, one])
+        return cls(
+            number, cells, csr_array((np.tile(np.concatenate(weights), 2), ends), shape=(len(cells), len(cells)))
+        )
 
-    def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"] | None:
-        """Return the cells of the cheapest path; None where there is none."""
-        nodes = _path(self.weights, int(self.number[tuple(first)]), int(self.number[tuple(last)]))
-        return None if nodes is None else self.cells[nodes]
-
-
-def in_blocks(
-    passable: Bool[np.ndarray, "nx ny"], cost: Float[np.ndarray, "nx ny"]
-) -> tuple[Bool[np.ndarray, "bx by"], Float64[np.ndarray, "bx by"]]:
-    """Return which blocks hold a cell that can be passed, and the mean cost of these."""
-    fill = [(0, -size % BLOCK) for size in passable.shape]
-    open_cells = np.pad(passable, fill)
-    tiles = (len(open_cells) // BLOCK, BLOCK, open_cells.shape[1] // BLOCK, BLOCK)
-    count = open_cells.reshape(tiles).sum(axis=(1, 3))
-    total = np.where(open_cells, np.pad(cost, fill), 0.0).reshape(tiles).sum(axis=(1, 3))
-    return count > 0, total / np.maximum(count, 1)
-
-
-def _numbered(mask: Bool[np.ndarray, "nx ny"]) -> tuple[Int[np.ndarray, "nx ny"], Int[np.ndarray, "n 2"]]:
-    return np.where(mask, np.cumsum(mask).reshape(mask.shape) - 1, -1), np.argwhere(mask)
+    def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"]:
+        """Return the cells of the cheapest path between two cells of one connected part."""
+        start, end = int(self.number[tuple(first)]), int(self.number[tuple(last)])
+        _, before = csgraph.dijkstra(self.weights, indices=start, return_predecessors=True)
+        nodes = [end]
+        while nodes[-1] != start:
+            nodes.append(int(before[nodes[-1]]))
+        return self.cells[nodes[::-1]]
 
 
 def _joined(
@@ -77,23 +67,6 @@ def _joined(
     for by in _STEPS[step]:
         is_open &= around[tuple((cells + 2 + by).T)] >= 0
     return np.column_stack([np.flatnonzero(is_open), reached[is_open]])
-
-
-def _symmetric(pairs: Int[np.ndarray, "k 2"], weights: Float[np.ndarray, " k"], count: int) -> csr_array:
-    one, other = pairs.T
-    ends = np.concatenate([one, other]), np.concatenate([other, one])
-    return csr_array((np.concatenate([weights, weights]), ends), shape=(count, count))
-
-
-def _path(weights: csr_array, first: int, last: int) -> Int[np.ndarray, " k"] | None:
-    """Return the nodes of the cheapest path, None where there is none."""
-    cost, before = csgraph.dijkstra(weights, indices=first, return_predecessors=True)
-    if not np.isfinite(cost[last]):
-        return None  # SciPy's word for no predecessor is a negative number, which would index from the end
-    nodes = [last]
-    while nodes[-1] != first:
-        nodes.append(int(before[nodes[-1]]))
-    return np.array(nodes[::-1])
 
 
 def rooms(

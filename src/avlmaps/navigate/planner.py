@@ -1,11 +1,5 @@
-"""Paths over a cost map: SciPy's Dijkstra over cells with sixteen neighbours, pulled straight where that costs no more.
+"""Paths over a cost map: SciPy's Dijkstra over cells with sixteen neighbours, then pulled straight."""
 
-A large floor is searched twice: first over blocks of cells, then over the cells round that path. Where these do not
-lead there (a block may hold both sides of a thin wall) all cells are searched. So a path is found wherever one is;
-its cost was never above 1.1 times the least in the tests on random floors.
-"""
-
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -15,22 +9,16 @@ import numpy as np
 from jaxtyping import Bool, Float, Float64, Int
 
 from avlmaps.navigate.costmap import Costmap
-from avlmaps.navigate.grids import BLOCK, CellGraph, farthest_opaque, in_blocks, line_cost, shortcuts
+from avlmaps.navigate.grids import CellGraph, farthest_opaque, line_cost, shortcuts
 
 _EVERY = 8  # cells of a straight run of a path from which shortcuts may begin
 _WINDOW = 24  # such points that a shortcut may leap
-_AROUND = (2, 1)  # blocks around the coarse path that are searched: fewer where they hold too many cells
 
 
 @dataclass(frozen=True, slots=True)
 class PlanSettings:
     """How paths are found."""
 
-    exact_cells: int = 100_000
-    """Floors with no more cells that can be passed are searched at once; larger ones coarse to fine."""
-    direct: float = 1.05
-    """On a larger floor a straight line is taken unsearched where it costs at most this many times the least that any
-    way of its length can."""
     escape_m: float = 1.0
     """How far a body that stands where the map lets none stand may go straight to get out."""
     beside_m: float = 2.0
@@ -93,16 +81,8 @@ class Planner:
         return cv2.connectedComponents(self.costmap.passable.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)[1]
 
     @cached_property
-    def _is_small(self) -> bool:
-        return int(np.count_nonzero(self.costmap.passable)) <= self.settings.exact_cells
-
-    @cached_property
-    def _cells(self) -> "CellGraph":
+    def _cells(self) -> CellGraph:
         return CellGraph.of(self.costmap.passable, self.costmap.cost)
-
-    @cached_property
-    def _blocks(self) -> "CellGraph":
-        return CellGraph.of(*in_blocks(self.costmap.passable, self.costmap.cost))
 
     def way(self, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> PlannedPath | None:
         """Return the cheapest path between two places, None where there is none.
@@ -117,9 +97,7 @@ class Planner:
         if out is None:
             return None
         ends = np.array([self.costmap.in_cells(out), self.costmap.in_cells(goal)])
-        between = np.zeros((0, 2))
-        if self._is_small or not self._is_direct(*ends):
-            between = self._search(self.costmap.cell_of(out), self.costmap.cell_of(goal))[1:-1] + 0.5
+        between = self._cells.path(self.costmap.cell_of(out), self.costmap.cell_of(goal))[1:-1] + 0.5
         corners = np.concatenate([ends[:1], between, ends[1:]])
         return self._measured(self._straightened(corners), None if out is start else start)
 
@@ -182,42 +160,6 @@ class Planner:
         order = np.argsort(distance_m, kind="stable")
         order = order[distance_m[order] <= reach_m]
         return cells[order], distance_m[order]
-
-    def _is_direct(self, one: Float[np.ndarray, "2"], other: Float[np.ndarray, "2"]) -> bool:
-        (ax, ay), (bx, by) = one, other
-        most = self.settings.direct * float(np.hypot(bx - ax, by - ay))  # a cell costs at least 1
-        passable, cost = self.costmap.passable, self.costmap.cost
-        return bool(line_cost(ax, ay, bx, by, passable, cost, most) <= most)
-
-    def _search(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "n 2"]:
-        """Return the cells of the cheapest path between two cells of one connected part."""
-        for corridor in () if self._is_small else self._corridors(first, last):
-            cells = CellGraph.of(corridor, self.costmap.cost).path(first, last)
-            if cells is not None:
-                return cells
-        cells = self._cells.path(first, last)
-        if cells is None:
-            raise RuntimeError(f"two cells of one part are not connected: {first} and {last}")
-        return cells
-
-    def _corridors(
-        self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]
-    ) -> Iterator[Bool[np.ndarray, "nx ny"]]:
-        """Yield the cells around the cheapest path over blocks: as wide as is cheap to search, then wider."""
-        passable, size = self.costmap.passable, BLOCK
-        blocks = self._blocks.path(first // size, last // size)
-        if blocks is None:
-            return
-        nx, ny = passable.shape
-        way = np.zeros((-(-nx // size), -(-ny // size)), np.uint8)
-        way[tuple(blocks.T)] = 1
-        masks: list[Bool[np.ndarray, "nx ny"]] = []
-        for around in _AROUND:
-            wide = cv2.dilate(way, np.ones((2 * around + 1, 2 * around + 1), np.uint8))
-            masks.append(wide.astype(bool).repeat(size, 0).repeat(size, 1)[:nx, :ny] & passable)
-            if np.count_nonzero(masks[-1]) <= self.settings.exact_cells:
-                break
-        yield from reversed(masks)
 
     def _straightened(self, corners: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
         """Pull a path straight wherever that costs no more, clearance included; in cells."""
