@@ -12,7 +12,7 @@ import pytest
 from live_frames import ENCODERS, UP, add, frame, recorded, wait_for, within
 from starlette.testclient import TestClient
 
-from avlmaps.cli.live import LiveFeed, live_source
+from avlmaps.cli.live import live_source, serve_while
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.status import LiveSettings
 from avlmaps.maps.store.folder import read
@@ -47,7 +47,7 @@ def test_the_server_takes_each_snapshot_and_the_end(tmp_path: Path) -> None:
 
 
 def test_a_drive_that_fails_says_so_and_raises_where_it_is_waited_for(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     live = LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=CHOSEN)
     for number in range(4):
@@ -57,11 +57,10 @@ def test_a_drive_that_fails_says_so_and_raises_where_it_is_waited_for(
     def fails(over: object) -> None:
         raise ZeroDivisionError("nothing is left")
 
-    drive = LiveFeed(live, fails)
-    wait_for(lambda: drive.has_ended)
-    assert "no frame comes any more; stop with Ctrl-C. nothing is left" in capsys.readouterr().err
+    monkeypatch.setattr("avlmaps.cli.view.run_page", lambda service, *_: service.close())
     with pytest.raises(ZeroDivisionError):
-        within(60.0, drive.end)
+        within(60.0, lambda: serve_while(live, fails, 0, browse=False))
+    assert "no frame comes any more; stop with Ctrl-C. nothing is left" in capsys.readouterr().err
     add(live, frame(4))
     live.close()
 

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.ndimage import distance_transform_edt
 
 from avlmaps.core.errors import NavigationError, QueryError
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.bodies import BASE, DRONE, SHAPES, BodyShape
-from avlmaps.navigate.costmap import CostSettings, costmap_of, obstacles_for
+from avlmaps.navigate.costmap import costmap_of, obstacles_for
 
 CELL_M = 0.05
 
@@ -73,22 +72,12 @@ def test_a_small_hole_in_the_floor_is_crossed_at_a_cost_and_a_large_one_never(ga
     assert hole.all() == hole.any() == crossed
     if crossed:
         assert np.all(costmap.cost[30 : 30 + gap, 5:-5] > costmap.cost[29, 5])
-    assert not costmap_of(of_states(states), 0.1, CostSettings(hole_m=0.0)).passable[30 : 30 + gap].any()
 
 
 def test_unknown_beyond_the_seen_floor_is_no_hole():
     states = np.zeros((60, 60), np.uint8)
     states[20:40, 20:40] = CellState.FREE
     assert not np.any(costmap_of(of_states(states), 0.1).passable & (states != CellState.FREE))
-
-
-def test_a_careful_body_keeps_away_from_what_was_never_seen():
-    states = np.full((60, 60), CellState.FREE, np.uint8)
-    states[:, 30:] = CellState.UNKNOWN
-    costmap = costmap_of(of_states(states), 0.1, CostSettings(unknown_room_m=0.3))
-    from_unknown_m = distance_transform_edt(states != CellState.UNKNOWN) * CELL_M
-    assert costmap.passable.any()
-    assert np.all(from_unknown_m[costmap.passable] > 0.3)
 
 
 def test_what_was_met_counts_as_the_map_does():
@@ -112,9 +101,7 @@ def test_places_and_cells_agree_and_nothing_is_passable_off_the_grid():
     assert not costmap.is_passable(np.array([[-3.01, 7.01], [0.0, 0.0]])).any()
 
 
-def test_settings_and_shapes_that_are_none_are_refused():
-    with pytest.raises(NavigationError, match="must not be negative, and soft_m"):
-        CostSettings(near_cost=-1.0)
+def test_shapes_that_are_none_are_refused():
     with pytest.raises(NavigationError, match=r"A body of radius 0.0 m"):
         BodyShape(radius_m=0.0)
     with pytest.raises(NavigationError, match=r"A body cannot fly 2.0 m over the floor"):

@@ -14,7 +14,7 @@ from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, 
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.bodies import BodyShape
 from avlmaps.navigate.controller import bearing
-from avlmaps.navigate.driver import Driver, MapDriver
+from avlmaps.navigate.driver import TOLERANCE_M, Driver, MapDriver
 from avlmaps.navigate.rehearsal import FreeBody
 from avlmaps_sim.body import Building, MotionNoise, SimulatedBody
 from avlmaps_sim.scenes import open_scene
@@ -56,7 +56,7 @@ def test_by_a_true_map_it_touches_nothing_and_arrival_means_being_there(goals, o
         assert stop is not None
         away_m = hypot(arrival.pose.x_m - stop.xy[0], arrival.pose.y_m - stop.xy[1])
         assert arrival.reached == stop.seen
-        assert away_m <= driver.settings.tolerance_m
+        assert away_m <= TOLERANCE_M
         assert bool(arrival.note) == (stop.beside_m > 0.0)
         assert np.all(np.linalg.norm(np.diff(arrival.path, axis=0), axis=1) <= 0.1 + 1e-9)
 

@@ -11,7 +11,7 @@ from test_costmap import CELL_M, grid_of, of_states
 
 from avlmaps.maps.obstacles import CellState, ForbiddenArea, Obstacles
 from avlmaps.navigate.costmap import costmap_of
-from avlmaps.navigate.planner import Planner
+from avlmaps.navigate.planner import BESIDE_M, Planner
 
 
 def clutter(seed, size=90):
@@ -211,7 +211,7 @@ def test_a_stop_can_be_stood_on_and_reached_and_is_no_farther_than_said(seed):
     assert costmap.is_passable(stop.xy)
     assert planner.way(start, stop.xy) is not None
     assert np.linalg.norm(stop.xy - place) == pytest.approx(stop.beside_m, abs=1e-9)
-    assert stop.beside_m <= planner.settings.beside_m
+    assert stop.beside_m <= BESIDE_M
 
 
 def test_there_is_no_stop_far_from_a_place_or_off_the_map():

@@ -1,6 +1,7 @@
 """`avlmaps go`: turn a command into a program, and run it on a simulated or a real robot."""
 
 import sys
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from math import isfinite, radians
 from pathlib import Path
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from avlmaps.navigate.skills import RobotSettings
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.heatmap import Heatmap
-    from avlmaps.query.settings import QuerySettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,13 +115,19 @@ def go(verb: "Go") -> dict[str, Any]:
         )
     if verb.robot != "simulated" and (verb.scene or start):
         raise UsageError(f"--scene and --start belong to a simulated robot; --robot {verb.robot} is where it is.")
-    settings = verb.query_settings()
-    if verb.dry_run:
-        return _planned(verb, settings)
     from avlmaps.navigate.interrupts import raised_signals
+    from avlmaps.query.avlmap import AVLMap
 
-    with raised_signals():
-        return _driven(verb, start, settings)
+    with nullcontext() if verb.dry_run else raised_signals():
+        is_there = verb.map.exists() or not verb.dry_run
+        avlmap = AVLMap.open(verb.map, verb.query_settings()) if is_there else None
+        translator = translator_for(verb, avlmap)
+        # A sentence that is not understood fails here, before a scene is made.
+        translation = _read(verb, translator)
+        verb = numbers_left(verb, translation)
+        if verb.dry_run or avlmap is None:
+            return plan_answer(verb, translation, avlmap)
+        return drive(verb, avlmap, robot_of(verb, avlmap, start), translator, translation)
 
 
 def _read(verb: "Go", translator: "Translator") -> "Translation":
@@ -153,23 +159,14 @@ def _idle(verb: "Go", program: str) -> list[str]:
     return [note for options, names, has_effect, why in rows if not has_effect for note in idle(options, names, why)]
 
 
-def _planned(verb: "Go", settings: "QuerySettings") -> dict[str, Any]:
-    from avlmaps.query.avlmap import AVLMap
-
-    avlmap = AVLMap.open(verb.map, settings) if verb.map.exists() else None
-    translation = _read(verb, translator_for(verb, avlmap))
-    return plan_answer(numbers_left(verb, translation), translation, avlmap)
-
-
 def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None") -> dict[str, Any]:
     """Return the answer for a command that is read and not obeyed, with what a drive would report of its map."""
-    told, error, error_type, choices = (), None, None, ()
+    told, run, choices = (), None, ()
     if avlmap is not None:
         from avlmaps.navigate.rehearsal import told_by_map
 
         told, run, choices = told_by_map(translation.program, avlmap, verb.sentence, robot_settings(verb))
-        if run is not None:
-            error, error_type = run.error, run.error_type
+    error, error_type = (None, None) if run is None else (run.error, run.error_type)
     return {
         "plan": translation.plan,
         "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": error is None,
@@ -177,17 +174,6 @@ def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None")
         "choices": list(choices), "path_m": 0.0, "elapsed_s": 0.0, "frame": "recording",
         "missing": None if error is None or error_type is None else error_answer(kind_named(error_type), error),
     }  # fmt: skip
-
-
-def _driven(verb: "Go", start: "GroundPose | None", settings: "QuerySettings") -> dict[str, Any]:
-    from avlmaps.query.avlmap import AVLMap
-
-    avlmap = AVLMap.open(verb.map, settings)
-    translator = translator_for(verb, avlmap)
-    # A sentence that is not understood fails here, before a scene is made.
-    translation = _read(verb, translator)
-    verb = numbers_left(verb, translation)
-    return drive(verb, avlmap, robot_of(verb, avlmap, start), translator, translation)
 
 
 def drive(
@@ -266,28 +252,25 @@ def _choice(verb: "Go", asked: "Outcome") -> int:
 
 def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
     """Return the translator of the command."""
-    if verb.language != "chat":
-        from avlmaps.language.sentence import Attachments
-        from avlmaps.language.translator import LearnedTranslator
-        from avlmaps.navigate.instruct import given_by
+    if verb.language == "chat":
+        from avlmaps.language.chat import ChatSettings, ChatTranslator
 
-        image, clip = (None if file is None else str(file) for file in (verb.image, verb.sound_clip))
-        known = Attachments(image, clip, at=verb.at) if avlmap is None else given_by(
-            avlmap, image, clip, said=verb.sentence
-        )  # fmt: skip
-        number = next(iter(verb.choose), None)
-        if verb.language != "local":
-            return LearnedTranslator(known, number)
-        if verb.llm is None:
-            raise UsageError("--language local needs --llm, a GGUF file or the address of a llama.cpp server.")
-        from avlmaps.language.local import LocalModel, LocalTranslator
+        names = {"model": verb.chat.chat_model, "base_url": verb.chat.chat_url, "replay": verb.chat.chat_replay}
+        return ChatTranslator(ChatSettings.from_environment(**names))
+    from avlmaps.language.sentence import Attachments
+    from avlmaps.language.translator import LearnedTranslator
+    from avlmaps.navigate.instruct import given_by
 
-        return LocalTranslator(LocalModel(verb.llm), known, number)
-    from avlmaps.language.chat import ChatSettings, ChatTranslator
+    files = [None if file is None else str(file) for file in (verb.image, verb.sound_clip)]
+    known = Attachments(*files, at=verb.at) if avlmap is None else given_by(avlmap, *files, said=verb.sentence)
+    number = next(iter(verb.choose), None)
+    if verb.language != "local":
+        return LearnedTranslator(known, number)
+    if verb.llm is None:
+        raise UsageError("--language local needs --llm, a GGUF file or the address of a llama.cpp server.")
+    from avlmaps.language.local import LocalModel, LocalTranslator
 
-    chat = verb.chat
-    given = ChatSettings.from_environment(model=chat.chat_model, base_url=chat.chat_url, replay=chat.chat_replay)
-    return ChatTranslator(given)
+    return LocalTranslator(LocalModel(verb.llm), known, number)
 
 
 def read_start(words: str | None) -> "GroundPose | None":

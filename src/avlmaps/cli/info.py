@@ -115,11 +115,11 @@ def _consistency(recording: "Recording") -> dict[str, Any] | None:
 
 
 def _consistency_lines(found: dict[str, Any]) -> list[str]:
-    numbers = [
-        f"{found['pairs']} pairs of frames see the same place",
-        *([f"{found['agreeing']:.1%} of their points agree"] if found["agreeing"] is not None else []),
-        *([f"brightness correlates by {found['likeness']:.2f}"] if found["likeness"] is not None else []),
-    ]
+    numbers = [f"{found['pairs']} pairs of frames see the same place"]
+    if found["agreeing"] is not None:
+        numbers.append(f"{found['agreeing']:.1%} of their points agree")
+    if found["likeness"] is not None:
+        numbers.append(f"brightness correlates by {found['likeness']:.2f}")
     lines = [f"consistency: {found['verdict']} ({', '.join(numbers)})"]
     lines += [f"  {one['verdict']} ({one['reason']}): {one['sentence']}" for one in found["findings"]]
     return lines + [f"  {sentence}" for sentence in found["unchecked"]]
@@ -164,8 +164,13 @@ def describe_map(avlmap: "AVLMap") -> dict[str, Any]:
 
 
 def _describe_recording(recording: "Recording") -> dict[str, Any]:
-    rig, audio = recording.rig, recording.audio
-    up = recording.up_in_world
+    rig, audio, up = recording.rig, recording.audio, recording.up_in_world
+    heard = audio and {
+        "file": audio.label or audio.path.name,
+        "rate_hz": audio.rate_hz,
+        "duration_s": audio.duration_s,
+        "start_s": audio.start_s,
+    }
     return {
         "format": recording.format,
         "frames": len(recording),
@@ -178,14 +183,7 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
         },
         "up_in_world": None if up is None else [float(value) for value in up],
         "topics": dict(recording.topics),
-        "audio": None
-        if audio is None
-        else {
-            "file": audio.label or audio.path.name,
-            "rate_hz": audio.rate_hz,
-            "duration_s": audio.duration_s,
-            "start_s": audio.start_s,
-        },
+        "audio": heard,
         "notices": list(recording.notices),
         "fingerprint": recording.fingerprint,
     }
@@ -198,11 +196,10 @@ def info_lines(answer: dict[str, Any], *, verbose: bool) -> list[str]:
         answer: of the verb.
         verbose: print every entry; else what a person decides by, and what to do next.
     """
-    shown = answer if verbose else {key: value for key, value in answer.items() if key in _BRIEF}
-    layouts = _LAYOUTS if verbose else _LAYOUTS | _BRIEF_LAYOUTS
-    last = {key: shown.get(key) for key in ("plot",)}
-    lines = _entry_lines({key: value for key, value in shown.items() if key not in last}, layouts)
-    return [*lines, *([] if verbose else next_lines(answer)), *_entry_lines(last, layouts)]
+    shown = {key: value for key, value in answer.items() if key != "plot" and (verbose or key in _BRIEF)}
+    lines = _entry_lines(shown, _LAYOUTS if verbose else _LAYOUTS | _BRIEF_LAYOUTS)
+    drawn = [f"wrote {answer['plot']}"] if "plot" in answer else []
+    return [*lines, *([] if verbose else next_lines(answer)), *drawn]
 
 
 def next_lines(answer: dict[str, Any]) -> list[str]:
@@ -238,11 +235,15 @@ def _entry_lines(entries: dict[str, Any], layouts: dict[str, Callable[[Any], lis
 
 
 def _sound_lines(sounds: list[dict[str, Any]]) -> list[str]:
-    rows = [
-        f"  {max(s['onset_s'], 0.0):8.2f} - {s['offset_s']:.2f} s at {place_text(s['position'])}{_names_of(s)}"
-        for s in sounds
-    ]
-    return [f"sounds: {len(sounds)}", *rows]
+    """Lay out sounds with their best names; names that are hardly likely only where there is no better one."""
+    lines = [f"sounds: {len(sounds)}"]
+    for sound in sounds:
+        names = list(zip(sound.get("names", []), sound.get("confidences", []), strict=True))
+        shown = [pair for pair in names if pair[1] >= _LIKELY] or names[:1]
+        named = ": " + ", ".join(f"{name} {confidence:.2f}" for name, confidence in shown) if shown else ""
+        begin_s, end_s = max(sound["onset_s"], 0.0), sound["offset_s"]
+        lines.append(f"  {begin_s:8.2f} - {end_s:.2f} s at {place_text(sound['position'])}{named}")
+    return lines
 
 
 def _sound_line(sounds: list[dict[str, Any]]) -> list[str]:
@@ -254,7 +255,7 @@ def _sound_line(sounds: list[dict[str, Any]]) -> list[str]:
 # What `build` and `info` print without --verbose: what there is, and what may be wrong with it.
 _BRIEF = frozenset({
     "path", "format", "frames", "bad_frames", "keyframes", "voxels", "sounds", "profile", "bytes", "ground",
-    "elapsed_s", "duration_s", "rgb", "depth", "audio", "topics", "consistency", "notices", "faults", "plot",
+    "elapsed_s", "duration_s", "rgb", "depth", "audio", "topics", "consistency", "notices", "faults",
 })  # fmt: skip
 _BRIEF_LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
     "sounds": _sound_line,
@@ -268,7 +269,6 @@ _LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
     "sounds": _sound_lines,
     "consistency": _consistency_lines,
     "topics": lambda topics: ["topics:", *[f"  {use}: {topic}" for use, topic in topics.items()]],
-    "plot": lambda path: [f"wrote {path}"],
     "ground": ground_lines,
     "bytes": lambda count: [f"size: {size_of(count)}"],
     "voxels_removed": lambda removed: [
@@ -278,10 +278,3 @@ _LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
         "level from recording:", *["  " + " ".join(f"{value:7.4f}" for value in row) for row in rows]
     ],
 }  # fmt: skip
-
-
-def _names_of(sound: dict[str, Any]) -> str:
-    """Lay out the best names of a sound; those that are hardly likely only where there is no better one."""
-    names = list(zip(sound.get("names", []), sound.get("confidences", []), strict=True))
-    shown = [pair for pair in names if pair[1] >= _LIKELY] or names[:1]
-    return ": " + ", ".join(f"{name} {confidence:.2f}" for name, confidence in shown) if shown else ""

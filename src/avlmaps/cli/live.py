@@ -1,6 +1,5 @@
 """`avlmaps live`: a map that grows while a recording is played, as it would on a robot."""
 
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -145,13 +144,11 @@ def _recording(verb: Live) -> _Source:
             verb, ["rate", "as_fast_as_possible", "format", "topics", "audio"], "the recording is being written"
         ):
             say(f"note: {note}")
-        up_in_world = decode_description(path / UNFINISHED).up_in_world
-        return _Source(
-            up_in_world,
-            0.0,
-            microphones,
-            lambda live, over: follow(path, live, verb.give_up_s, over=over, microphones=microphones),
-        )
+
+        def following(live: "LiveMap", over: Callable[[], bool]) -> None:
+            follow(path, live, verb.give_up_s, over=over, microphones=microphones)
+
+        return _Source(decode_description(path / UNFINISHED).up_in_world, 0.0, microphones, following)
     for note in idle(verb, ["give_up_s"], "the recording is finished"):
         say(f"note: {note}")
     recording = open_recording(path, **verb.opening())
@@ -160,25 +157,23 @@ def _recording(verb: Live) -> _Source:
     for notice in recording.notices:
         say(f"note: {notice}")
     rate = None if verb.as_fast_as_possible else verb.rate
-    return _Source(
-        recording.up_in_world,
-        recording.begins_s,
-        None if recording.audio is None else recording.audio.microphones,
-        lambda live, over: replay(recording, live, rate, over=over),
-    )
+    heard_by = None if recording.audio is None else recording.audio.microphones
+
+    def playing(live: "LiveMap", over: Callable[[], bool]) -> None:
+        replay(recording, live, rate, over=over)
+
+    return _Source(recording.up_in_world, recording.begins_s, heard_by, playing)
 
 
 def _robot(verb: Live) -> _Source:
     """Return what gives the frames of a running robot; z is up in ROS's world (REP 103), and its stamps are dates."""
     from avlmaps.live.replay import join_source
 
-    if verb.recording is not None or verb.as_fast_as_possible or verb.rate != 1.0 or verb.format != "auto":
+    given = verb.recording, verb.as_fast_as_possible, verb.audio, verb.rate != 1.0, verb.format != "auto"
+    if any(given) or verb.reading != Reading():
         raise UsageError(
-            "--source ros2 takes what a robot publishes now: leave REC, --rate, --format and the like out."
-        )
-    if verb.reading != Reading() or verb.audio is not None:
-        raise UsageError(
-            "--audio, --depth-unit, --intrinsics and the like are of a recording; leave them out with --source ros2."
+            "--source ros2 takes what a robot publishes now: leave out REC, --rate, --format, --audio, --depth-unit, "
+            "--intrinsics and the like."
         )
     topics = verb.named_topics()
     if verb.same_device is not None and "directions" not in topics:
@@ -219,28 +214,22 @@ def live_source(live: "LiveMap") -> "MapSource":
     return MapSource(live.path, lambda: live.generation or None, lambda: live.map, tells=False)
 
 
-class LiveFeed:
-    """Frames that come into a live map in a thread of their own, to the end of which the map is closed."""
+def serve_while(live: "LiveMap", drive: Callable[[Callable[[], bool]], None], port: int, *, browse: bool) -> None:
+    """Serve a live map on this machine until Ctrl-C, while a drive gives it frames in a thread, and close it.
 
-    def __init__(self, live: "LiveMap", drive: Callable[[Callable[[], bool]], None]) -> None:
-        self._over = threading.Event()
-        self._driven = ThreadPoolExecutor(1, "avlmaps-drive").submit(self._run, live, drive)
+    Raises:
+        ServeError: the port is taken.
+    """
+    from avlmaps.cli.view import open_browser, run_page
+    from avlmaps.live.replay import end_drive
+    from avlmaps.serve.service import Service, listening_socket, url_of
+    from avlmaps.serve.settings import ServeSettings
 
-    @property
-    def has_ended(self) -> bool:
-        """Whether no frame comes any more."""
-        return self._driven.done()
+    over = threading.Event()
 
-    def end(self) -> None:
-        """Let it end after the frame that it has, wait until the map is closed, and raise what went wrong."""
-        self._over.set()
-        self._driven.result()
-
-    def _run(self, live: "LiveMap", drive: Callable[[Callable[[], bool]], None]) -> None:
-        from avlmaps.live.replay import end_drive
-
+    def driven() -> None:
         try:
-            drive(self._over.is_set)
+            drive(over.is_set)
             end_drive(live)
             say("The drive is over; its map is answered on until Ctrl-C.")
         except BaseException as fault:
@@ -248,34 +237,22 @@ class LiveFeed:
                 say(f"note: The drive ended, and no frame comes any more; stop with Ctrl-C. {fault}")
             raise
 
-
-def serve_while(live: "LiveMap", drive: Callable[[Callable[[], bool]], None], port: int, *, browse: bool) -> None:
-    """Serve a live map on this machine until Ctrl-C, while a drive gives it frames, and close it.
-
-    Raises:
-        ServeError: the port is taken.
-    """
-    from avlmaps.cli.view import open_browser, run_page
-    from avlmaps.serve.service import Service, listening_socket, url_of
-    from avlmaps.serve.settings import ServeSettings
-
     settings = ServeSettings(host="127.0.0.1", port=port)
-    with listening_socket(settings) as opened:
-        running = LiveFeed(live, drive)
+    with listening_socket(settings) as opened, ThreadPoolExecutor(1, "avlmaps-drive") as threads:
+        running = threads.submit(driven)
         try:
-            while not live.generation and not running.has_ended:
+            while not live.generation and not running.done():
                 time.sleep(_LOOK_S)
-            if not live.generation:  # it ended without a map, or by a fault
-                return
-            service = Service.open({_NAME: live_source(live)}, settings, say)
-            url = f"{url_of(settings, opened)}/maps/{quote(_NAME)}/view"
+            if live.generation:  # else it ended without a map, or by a fault
+                service = Service.open({_NAME: live_source(live)}, settings, say)
+                url = f"{url_of(settings, opened)}/maps/{quote(_NAME)}/view"
 
-            def told() -> None:
-                say(f"The map is at {url}; the page grows with it. Stop with Ctrl-C.")
-                sys.stderr.flush()
-                if browse:
-                    open_browser(url)
+                def told() -> None:
+                    say(f"The map is at {url}; the page grows with it. Stop with Ctrl-C.")
+                    if browse:
+                        open_browser(url)
 
-            run_page(service, opened, told)
-        finally:
-            running.end()
+                run_page(service, opened, told)
+        finally:  # after the frame that it has; what went wrong is raised
+            over.set()
+            running.result()

@@ -101,10 +101,6 @@ class Shell(MapVerb):
             raise AnsweredError(f"{failed} of {answered} lines failed.")
 
 
-class Over(Exception):  # noqa: N818 - no error: the user ends the shell
-    """The shell ends."""
-
-
 @dataclass(frozen=True, slots=True)
 class Reply:
     """The answer to a line, as JSON has it and for a person, and whether it did what the line asks for."""
@@ -210,11 +206,6 @@ class ShellSession:
     def _help(self, rest: str) -> Reply:
         lines = _HELP.splitlines()
         return Reply({"help": lines}, lines)
-
-    def _quit(self, rest: str) -> Reply:
-        raise Over
-
-    _exit = _quit
 
     def _go(self, line: str, rest: str, confirms: Callable[[str], bool], choose: tuple[int, ...] = ()) -> Reply:
         """Plan a command, and drive it in the scene where there is one and the user confirms.
@@ -336,15 +327,13 @@ def answer_lines(session: ShellSession, lines: Lines, as_json: bool) -> tuple[in
     while True:
         try:
             line = lines.next()
-            if line is None:
+            if line is None or line.lower() in ("quit", "exit"):
                 return failed, failed + done
             if not line or line.startswith("#"):
                 continue
             reply = session.answer(line, lines.confirms)
             emit(reply.answer, reply.lines, as_json)
             failed, done = failed + (not reply.ok), done + reply.ok
-        except Over:
-            return failed, failed + done
         except BrokenPipeError:
             raise
         except KeyboardInterrupt as stop:

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int
 
-from avlmaps.core.errors import MapError, NavigationError
+from avlmaps.core.errors import MapError
 from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import MIN_HITS, CellState, Obstacles, find_obstacles, floor_height
 from avlmaps.maps.storeys import said_storeys
@@ -30,24 +30,10 @@ _FAR_CELLS = 2.0**40  # farther off no grid reaches
 _HALF_DIAGONAL = np.sqrt(0.5)  # of a cell: an obstacle in one may stand in its nearest corner
 
 
-@dataclass(frozen=True, slots=True)
-class CostSettings:
-    """Which cells a path may cross, and their cost."""
-
-    soft_m: float = 0.4
-    """Free room that the body prefers beyond its radius; with more of it a metre costs no less."""
-    near_cost: float = 4.0
-    """Extra cost of a metre where the body just fits; a metre in the open costs 1."""
-    hole_m: float = 0.3
-    """Gaps in the seen floor up to so wide are crossed; no larger unknown region ever is. 0 crosses none."""
-    hole_cost: float = 2.0
-    """Extra cost of a metre of such a gap."""
-    unknown_room_m: float = 0.0
-    """Distance of the body's middle from larger unknown regions: for robots that could fall down stairs."""
-
-    def __post_init__(self) -> None:
-        if not (self.soft_m > 0.0 and min(self.near_cost, self.hole_m, self.hole_cost, self.unknown_room_m) >= 0.0):
-            raise NavigationError("The settings of a cost map must not be negative, and soft_m must be over 0.")
+_SOFT_M = 0.4  # free room that a body prefers beyond its radius; with more of it a metre costs no less
+_NEAR_COST = 4.0  # extra cost of a metre where the body just fits; a metre in the open costs 1
+# Gaps in the seen floor up to so wide are crossed, at an extra cost of a metre; no larger unknown region ever is.
+_HOLE_M, _HOLE_COST = 0.3, 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +50,7 @@ class Costmap:
         occupied: the obstacles themselves.
         opaque: what blocks the view over the floor.
         free: where the floor was seen and nothing stands.
-        known: where the content is known, small holes counted in, and far enough from unknown regions.
+        known: where the content is known, small holes counted in.
     """
 
     origin_m: Float64[np.ndarray, "2"]
@@ -193,50 +179,35 @@ def _voxels_called(avlmap: "AVLMap", word: str) -> Bool[np.ndarray, " n"]:
     return things.mask if isinstance(things, NearThings) else np.zeros(len(avlmap.space), bool)
 
 
-def costmap_of(
-    obstacles: Obstacles,
-    radius_m: float,
-    settings: CostSettings | None = None,
-    contacts: Bool[np.ndarray, "nx ny"] | None = None,
-) -> Costmap:
+def costmap_of(obstacles: Obstacles, radius_m: float, contacts: Bool[np.ndarray, "nx ny"] | None = None) -> Costmap:
     """Inflate obstacles for a body.
 
     Args:
         obstacles: what the map knows.
         radius_m: of the body.
-        settings: what it costs to come near.
-        contacts: cells that the body found occupied, though the map has nothing there.
+        contacts: cells that the body found occupied, though the map has nothing there; nobody knows how high.
     """
-    settings = settings or CostSettings()
-    occupied = obstacles.states == CellState.OCCUPIED
-    if contacts is not None:
-        occupied = occupied | contacts
+    touched = np.zeros(obstacles.states.shape, bool) if contacts is None else contacts
+    occupied = (obstacles.states == CellState.OCCUPIED) | touched
     free = (obstacles.states == CellState.FREE) & ~occupied
     cell_m = obstacles.cell_size_m
     room_m = np.maximum(_distance(occupied) - np.float32(_HALF_DIAGONAL), 0.0) * np.float32(cell_m)
-    holes = _small_holes(free | occupied, settings.hole_m / cell_m) & ~free & ~occupied
-    known = free | holes | occupied
-    if settings.unknown_room_m > 0.0:
-        known &= _distance(~np.pad(known, 1))[1:-1, 1:-1] * np.float32(cell_m) > settings.unknown_room_m
-    passable = (free | holes) & known & (room_m >= radius_m)
-    lacking = np.clip(1.0 - (room_m - np.float32(radius_m)) / np.float32(settings.soft_m), 0.0, 1.0)
-    cost = 1.0 + np.float32(settings.near_cost) * lacking * lacking
-    cost[holes] += np.float32(settings.hole_cost)
+    holes = _small_holes(free | occupied, _HOLE_M / cell_m) & ~free & ~occupied
+    lacking = np.clip(1.0 - (room_m - np.float32(radius_m)) / np.float32(_SOFT_M), 0.0, 1.0)
+    cost = 1.0 + np.float32(_NEAR_COST) * lacking * lacking
+    cost[holes] += np.float32(_HOLE_COST)
     tall = obstacles.tall
-    opaque = occupied if tall is None else tall & (obstacles.states != CellState.FREE)
-    if contacts is not None:  # nobody knows how high it is
-        opaque = opaque | contacts
     return Costmap(
-        np.asarray(obstacles.origin_m, np.float64),
-        cell_m,
-        radius_m,
-        passable,
-        cost.astype(np.float32),
-        room_m,
-        occupied,
-        opaque,
-        free,
-        known,
+        origin_m=np.asarray(obstacles.origin_m, np.float64),
+        cell_size_m=cell_m,
+        radius_m=radius_m,
+        passable=(free | holes) & (room_m >= radius_m),
+        cost=cost.astype(np.float32),
+        room_m=room_m,
+        occupied=occupied,
+        opaque=occupied if tall is None else (tall & (obstacles.states != CellState.FREE)) | touched,
+        free=free,
+        known=free | holes | occupied,
     )
 
 

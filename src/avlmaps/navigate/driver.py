@@ -16,10 +16,10 @@ from avlmaps.core.printable import printable
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, Body, BodyShape
 from avlmaps.navigate.controller import ActionController, StallDetector, bearing, turns_for
-from avlmaps.navigate.costmap import ContactMap, CostSettings, costmap_of
+from avlmaps.navigate.costmap import ContactMap, costmap_of
 from avlmaps.navigate.grids import rooms
 from avlmaps.navigate.interrupts import Halt
-from avlmaps.navigate.planner import Planner, PlanSettings, Stop
+from avlmaps.navigate.planner import ESCAPE_M, Planner, Stop
 
 _SAMPLE_M = 0.02  # places along a straight move that are looked at
 _STILL_RAD = 0.01  # smaller turns may not show
@@ -32,6 +32,9 @@ _IN_VAIN = 12  # turns that change no heading: a body that does not say how it t
 _LOOK_S, _CREEP_M = 0.1, 0.01  # a body that moves by more within that time of its stop does not stand
 _BEYOND_M = 0.3  # a body that moves by more than this beyond its command does not follow it, or its pose jumped
 _OFF_M, _OFF_SHARE = 0.25, 0.2  # a straight drive that ends farther off, in metres and of its length, is not done
+TOLERANCE_M = 0.15
+"""A robot has arrived when it stands no farther from where it is to stop."""
+_MOST_PLANS, _MOST_MOVEMENTS = 40, 5_000  # after which it gives up a place; each contact takes a plan
 T = TypeVar("T")
 
 
@@ -99,22 +102,6 @@ class Holdable(Protocol):
     """Returns why the movement must end, in part of a sentence; "" where it need not. Called all along."""
 
 
-@dataclass(frozen=True, slots=True)
-class DriveSettings:
-    """How a `MapDriver` drives."""
-
-    tolerance_m: float = 0.15
-    """It has arrived when it stands no farther from where it is to stop."""
-    most_plans: int = 40
-    """It gives up a place after this many plans; each contact takes one."""
-    most_movements: int = 5_000
-    """It gives up a place after this many actions."""
-    costs: CostSettings = field(default_factory=CostSettings)
-    """Cost of a path."""
-    planning: PlanSettings = field(default_factory=PlanSettings)
-    """Search of a path."""
-
-
 @dataclass(slots=True)
 class _Trip:
     """Events since a command was given."""
@@ -136,16 +123,12 @@ class MapDriver:
         obstacles: what the map knows.
         body: what it moves.
         shape: of the body; radius and height must be those that the obstacles were found for.
-        settings: how it drives.
         contacts: what the body touched and the map does not know.
         held: see `Holdable`.
     """
 
-    def __init__(
-        self, obstacles: Obstacles, body: Body, shape: BodyShape = BASE, settings: DriveSettings | None = None
-    ) -> None:
+    def __init__(self, obstacles: Obstacles, body: Body, shape: BodyShape = BASE) -> None:
         self.obstacles, self.body, self.shape = obstacles, body, shape
-        self.settings = settings or DriveSettings()
         self.contacts = ContactMap(obstacles, shape.radius_m)
         self._last = self._of_body("say where it is", lambda: _posed(body.pose))
         self.contacts.mark_free(self._last)
@@ -166,9 +149,7 @@ class MapDriver:
     def planner(self) -> Planner:
         """Finds paths round all obstacles that are known by now."""
         if self._planner is None:
-            settings = self.settings
-            costmap = costmap_of(self.obstacles, self.shape.radius_m, settings.costs, self.contacts.cells)
-            self._planner = Planner(costmap, settings.planning)
+            self._planner = Planner(costmap_of(self.obstacles, self.shape.radius_m, self.contacts.cells))
         return self._planner
 
     @property
@@ -204,8 +185,8 @@ class MapDriver:
         goal = self._level(place)
         if elsewhere := self.obstacles.elsewhere(place):
             return self._arrival(trip, False, elsewhere)
-        stop, note = None, f"it gave up after {self.settings.most_plans} plans"
-        for _ in range(self.settings.most_plans):
+        stop, note = None, f"it gave up after {_MOST_PLANS} plans"
+        for _ in range(_MOST_PLANS):
             stop = self.planner.stop_for(self._xy, goal)
             way = None if stop is None else self.planner.way(self._xy, stop.xy)
             if way is None:
@@ -213,7 +194,7 @@ class MapDriver:
             if self._follow(way.points, trip):
                 note = ""
                 break
-            if trip.fault or trip.movements >= self.settings.most_movements:
+            if trip.fault or trip.movements >= _MOST_MOVEMENTS:
                 note = trip.fault or f"it gave up after {trip.movements} movements"
                 break
         if face is not None and np.isfinite(x_y := self._level(face)).all():
@@ -320,7 +301,7 @@ class MapDriver:
             return self._arrival(trip, False, note)
         off_m = float(np.hypot(*(self._xy - stop.xy)))
         away_m = float(np.hypot(*(self._xy - goal)))
-        if off_m > self.settings.tolerance_m or trip.fault:
+        if off_m > TOLERANCE_M or trip.fault:
             why = trip.fault or note or "it got no nearer"
             return self._arrival(trip, False, f"{why}, {away_m:.2f} m from the place")
         if not stop.seen:
@@ -363,7 +344,7 @@ class MapDriver:
         """Follow a path until its end; return False where an obstacle stopped it, which it then knows of."""
         controller = ActionController(points, self._safe)
         watch = StallDetector(controller.route)
-        while trip.movements < self.settings.most_movements:
+        while trip.movements < _MOST_MOVEMENTS:
             trip.fault = watch.fault(self.pose)
             if trip.fault:
                 return False
@@ -371,7 +352,7 @@ class MapDriver:
             if action is Action.STOP:
                 return True
             if action is None:
-                return controller.route.to_end_m(self.pose) <= self.settings.tolerance_m
+                return controller.route.to_end_m(self.pose) <= TOLERANCE_M
             if not self._take(action, trip):
                 return False
         return False
@@ -386,9 +367,7 @@ class MapDriver:
 
     def _known_m(self, distance_m: float) -> float:
         pose = self.pose
-        return self.planner.costmap.known_ahead_m(
-            self._xy, pose.heading_rad, distance_m, self.settings.planning.escape_m
-        )
+        return self.planner.costmap.known_ahead_m(self._xy, pose.heading_rad, distance_m, ESCAPE_M)
 
     def _turned(self, angle_rad: float, trip: _Trip) -> float:
         """Turn, and return by how much it is still off."""

@@ -15,19 +15,13 @@ _EVERY = 8  # cells of a straight run of a path from which shortcuts may begin
 _WINDOW = 24  # such points that a shortcut may leap
 
 
-@dataclass(frozen=True, slots=True)
-class PlanSettings:
-    """How paths are found."""
-
-    escape_m: float = 1.0
-    """How far a body that stands where the map lets none stand may go straight to get out."""
-    beside_m: float = 2.0
-    """How far from a place that cannot be stood on the body may stop instead."""
-    roomy_m: float = 0.03
-    """A stop beside a place may be farther from it by this distance for each unit of cost that it saves, metres."""
-    own_m: tuple[float, ...] = (0.075, 0.2, 0.35, 0.5, 0.7)
-    """Obstacles within this distance of a place are the thing there itself: the least that lets it be seen, so
-    that a wardrobe is seen through its front and not through its back and the wall. For free floor just the first."""
+ESCAPE_M = 1.0  # how far a body that stands where the map lets none stand may go straight to get out
+BESIDE_M = 2.0  # how far from a place that cannot be stood on the body may stop instead
+# A stop beside a place may be farther from it by this distance for each unit of cost that it saves, metres.
+_ROOMY_M = 0.03
+# Obstacles within this distance of a place are the thing there itself: the least that lets it be seen, so that a
+# wardrobe is seen through its front and not through its back and the wall. For free floor just the first.
+_OWN_M = (0.075, 0.2, 0.35, 0.5, 0.7)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,16 +57,10 @@ class Stop:
 
 
 class Planner:
-    """Finds paths over one cost map; what several paths share is computed once.
+    """Finds paths over one cost map, ``costmap``; what several paths share is computed once."""
 
-    Attributes:
-        costmap: what it plans on.
-        settings: how.
-    """
-
-    def __init__(self, costmap: Costmap, settings: PlanSettings | None = None) -> None:
+    def __init__(self, costmap: Costmap) -> None:
         self.costmap = costmap
-        self.settings = settings or PlanSettings()
 
     @cached_property
     def _part(self) -> Int[np.ndarray, "nx ny"]:
@@ -113,7 +101,7 @@ class Planner:
             at = self._part[tuple(costmap.cell_of(start))]
             return start if part is None or at == part else None
         mask = costmap.passable if part is None else self._part == part
-        cells, _ = self._near(mask, start, self.settings.escape_m)
+        cells, _ = self._near(mask, start, ESCAPE_M)
         # An obstacle of the map under its middle does not hold it back, a wall beside it does.
         within = bool(costmap.holds(start)) and bool(costmap.occupied[tuple(costmap.cell_of(start))])
         own = costmap.radius_m / costmap.cell_size_m if within else 1.0
@@ -133,15 +121,15 @@ class Planner:
         part = self._part[tuple(costmap.cell_of(out))]
         if self._part[tuple(costmap.cell_of(place))] == part:
             return Stop(np.asarray(place, np.float64))
-        cells, distance_m = self._near(self._part == part, place, self.settings.beside_m)
+        cells, distance_m = self._near(self._part == part, place, BESIDE_M)
         if not len(cells):
             return None
-        order = np.argsort(distance_m + self.settings.roomy_m * (costmap.cost[tuple(cells.T)] - 1.0), kind="stable")
+        order = np.argsort(distance_m + _ROOMY_M * (costmap.cost[tuple(cells.T)] - 1.0), kind="stable")
         cells, distance_m = cells[order], distance_m[order]
         stands = bool(costmap.is_passable(place))
         things = 1 if costmap.free[tuple(costmap.cell_of(place))] else None  # on free floor there is no thing
         hidden_m = farthest_opaque(costmap.in_cells(place), cells, costmap.opaque) * costmap.cell_size_m
-        for own_m in self.settings.own_m[:things]:
+        for own_m in _OWN_M[:things]:
             seen = hidden_m <= own_m
             if seen.any():
                 best = int(np.argmax(seen))
