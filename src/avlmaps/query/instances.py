@@ -26,8 +26,6 @@ _COST = 1.6
 _WITHOUT = np.arange(0.1, 0.75, 0.1)
 # Fewer connected voxels are no piece of their own.
 _FEWEST_VOXELS = 8
-# A voxel left out belongs to a piece this near, metres.
-_NEAR_M = 0.11
 
 
 def longest_m(names: Sequence[str]) -> float:
@@ -78,7 +76,7 @@ def cut_at_weak(
     for number in np.flatnonzero(box_lengths_m(points_level, instance, count) > longest):
         rows = np.flatnonzero(instance == number)
         pieces = list(_pieces(index, points_level, score, rows, longest, reach))
-        near = _nearest(points_level, rows, pieces)
+        near = _nearest(index, rows, pieces, max(reach, 2))
         out[rows] = np.where(near < len(pieces), count + near, -1)
         count += len(pieces)
     kept = out >= 0
@@ -118,13 +116,28 @@ def _connected(index: Int[np.ndarray, "a 3"], rows: Int[np.ndarray, " m"], reach
 
 
 def _nearest(
-    points_level: Float[np.ndarray, "a 3"], rows: Int[np.ndarray, " m"], pieces: Sequence[Int[np.ndarray, " p"]]
+    index: Int[np.ndarray, "a 3"], rows: Int[np.ndarray, " m"], pieces: Sequence[Int[np.ndarray, " p"]], reach: int
 ) -> Int[np.ndarray, " m"]:
-    from scipy.spatial import KDTree  # most queries cut nothing and need not load it
-
+    # The piece nearest to each voxel, none beyond the reach. A search tree would take longer to load than to ask.
     owner = np.repeat(np.arange(len(pieces)), [len(piece) for piece in pieces])
-    _, nearest = KDTree(points_level[np.concatenate(pieces)]).query(points_level[rows], distance_upper_bound=_NEAR_M)
-    return np.append(owner, len(pieces))[nearest]
+    low = index[rows].min(axis=0) - reach
+    shape = index[rows].max(axis=0) + reach + 1 - low
+
+    def key_of(voxels: Int[np.ndarray, "k 3"]) -> Int[np.ndarray, " k"]:
+        return np.ravel_multi_index(tuple((voxels - low).T), tuple(shape))
+
+    keys = key_of(index[np.concatenate(pieces)])
+    order = np.argsort(keys)
+    keys, owner = keys[order], owner[order]
+    out = np.full(len(rows), len(pieces))
+    steps = np.indices((2 * reach + 1,) * 3).reshape(3, -1).T - reach
+    away = np.linalg.norm(steps, axis=1)
+    for step in steps[np.argsort(away, kind="stable")][: np.count_nonzero(away < reach + 0.5)]:
+        left = np.flatnonzero(out == len(pieces))
+        wanted = key_of(index[rows[left]] + step)
+        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        out[left] = np.where(keys[at] == wanted, owner[at], len(pieces))
+    return out
 
 
 _SPECK_M2 = 0.0199  # a guess shows at least as much surface as a mug
