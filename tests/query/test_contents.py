@@ -11,7 +11,6 @@ from query_fakes import (
     fake_encoders,
     fake_map,
     furnished_map,
-    keyframes_at,
     sounds_of,
     voxels_of,
 )
@@ -108,27 +107,6 @@ def test_sounds_have_names_times_and_the_robots_positions(furnished: AVLMap) -> 
     assert (sound.onset_s, sound.offset_s) == (0.0, 0.5)
     assert sound.position == pytest.approx((1.5, 1.0, 1.0))
     assert sound.track.shape == (2, 3)
-
-
-@pytest.mark.parametrize("places", [[0.0, 0.4, 0.8, 1.6, 2.4], [0.0, 0.4, 0.8, 9.0, 9.4], [0.0, 1.2, 2.4, 12.0, 13.2]])
-def test_a_count_of_rooms_counts_each_once_however_often_it_was_seen(places: list[float]) -> None:
-    view = np.tile(np.array([1.0, 0], np.float32), (len(places), 1))
-    where = np.array([[x, 0.0, 1.0] for x in places])
-    stored = furnished_map(views=FakeViews(), keyframes=keyframes_at(where, view))
-    stored.data.info.models = {"pixels": None, "views": None}
-    avlmap = asked(stored)
-    answer = avlmap.ask("how many kitchens are there?")
-    assert answer.count == len([room for room in avlmap.rooms() if room.name == "kitchen"])
-
-
-def test_rooms_are_keyframes_side_by_side_with_one_name() -> None:
-    places = np.array([[0.0, 0, 1], [0.4, 0, 1], [0.8, 0, 1], [9.0, 0, 1], [9.4, 0, 1], [20.0, 0, 1]])
-    view = np.array([[1.0, 0], [1, 0], [1, 0], [1, 0], [1, 0], [1, 0]], np.float32)
-    stored = furnished_map(views=FakeViews(), keyframes=keyframes_at(places, view))
-    rooms = [room for room in asked(stored).rooms() if room.name == "kitchen"]
-    assert [room.views for room in rooms] == [3, 2], "the lone view at 20 m is not a room"
-    assert rooms[0].position == pytest.approx((1.4, 0.0, 1.0)), "the middle of what was seen, one metre ahead"
-    assert all(0.0 <= room.confidence <= 1.0 for room in rooms)
 
 
 def test_an_empty_map_holds_nothing() -> None:

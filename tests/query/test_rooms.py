@@ -336,7 +336,6 @@ def test_an_open_plan_is_one_room_of_two_names_and_a_part_answers_to_the_other()
 
 def test_the_papers_rules_know_no_walls_and_no_things() -> None:
     one, other = home(query_settings("paper")), home(query_settings("paper"), door_m=0.0, things=False)
-    assert one.room_votes is None
     for m in (one, other):
         factor = m.area("bedroom").factors[0]
         assert type(factor) is NearAnchors
@@ -345,7 +344,7 @@ def test_the_papers_rules_know_no_walls_and_no_things() -> None:
 
 def test_cones_are_there_for_who_wants_them() -> None:
     m = home(QuerySettings(areas=AreaSettings(extent="cones")))
-    assert m.room_votes is None and type(m.area("kitchen").factors[0]) is NearAnchors
+    assert type(m.area("kitchen").factors[0]) is NearAnchors
 
 
 def test_votes_of_things_are_counted_once_a_map() -> None:

@@ -198,7 +198,7 @@ def room_lines(rooms: "Sequence[RoomAnswer]", frame: str = "recording") -> list[
     columns: dict[str, Column] = {
         "room": "room",
         "probability": "probability",
-        "area": lambda room: "" if room["area_m2"] is None else f"{room['area_m2']:.1f} m²",
+        "area": lambda room: f"{room['area_m2']:.1f} m²",
         f"position ({frame} frame)": "position",
         "views": "views",
         "or": lambda room: likely(room["names"][1:]),

@@ -19,7 +19,6 @@ from avlmaps.core.poses import FRAME, plain_point
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.instances import Instances, Segmentation
-from avlmaps.query.modalities.area import area_names, modes, pooled_name_shares
 from avlmaps.query.modalities.sound import sound_features
 from avlmaps.query.rooms import FEWEST_VIEWS, LEAST_PART
 from avlmaps.query.settings import FOUND_AT
@@ -119,9 +118,9 @@ class Room:
     places: Float[np.ndarray, "k 3"] = field(repr=False)
     # Kinds that it may be and how likely it is each, best first; several of an open plan.
     names: tuple[tuple[str, float], ...] = ()
-    region: int = -1  # its number in ``AVLMap.room_regions``; −1 for a room that is a group of views
-    area_m2: float | None = None  # of its floor; None for a group of views
-    # Corners on its floor, metres, recording frame; none for a group of views.
+    region: int = -1  # its number in ``AVLMap.room_regions``
+    area_m2: float = 0.0  # of its floor
+    # Corners on its floor, metres, recording frame.
     outline: Float[np.ndarray, "c 3"] = field(repr=False, default_factory=lambda: np.zeros((0, 3)))
     edited: str = ""  # who named it and when, in words; empty for what nobody corrected
 
@@ -315,34 +314,25 @@ def find_sounds(avlmap: "AVLMap", most_names: int = 3) -> list[SoundEvent]:
 def find_rooms(avlmap: "AVLMap", least_confidence: float = 0.0) -> list[Room]:
     """Return the rooms of a map, those with most views first.
 
-    A room is a region of the floor that walls and doorways bound and that keyframes looked into. Without a plan it
-    is a group of keyframes with one likeliest name whose views' places lie close to one another.
+    A room is a region of the floor that walls and doorways bound and that keyframes looked into; a map without a floor
+    plan has none.
 
     ``BackendError``: the map's profile has no view encoder.
     """
-    keyframes, settings, level = avlmap.data.keyframes, avlmap.settings.areas, avlmap.space.level
+    keyframes = avlmap.data.keyframes
     if not len(keyframes):
         return []
-    encoder, field, regions = avlmap.encoders.views, avlmap.room_field, avlmap.room_regions
+    field, regions = avlmap.room_field, avlmap.room_regions
     avlmap.require_model(Kind.VIEWS)
-    places, rooms = np.asarray(keyframes.centre, np.float64).reshape(-1, 3), list[Room]()
     if field is None or regions is None:
-        share = pooled_name_shares(np.asarray(keyframes.view), encoder, settings, places)
-        beyond = np.arange(len(places))
-    else:
-        own, share = regions.at(places), field.at(places)
-        rooms += _rooms_by_floor(field, regions, places, own)
-        beyond = np.flatnonzero(own < 0)  # where no floor is mapped, views alone speak
-    group = _groups_of_views(level(places[beyond])[:, :2], share[beyond], settings.link_m)
-    rooms += _rooms_of_views(area_names(encoder), share[beyond], places[beyond], group)
+        return []
+    rooms = _rooms_by_floor(field, regions, np.asarray(keyframes.centre, np.float64).reshape(-1, 3))
     listed = [room for room in rooms if room.views >= FEWEST_VIEWS and room.confidence >= least_confidence]
     return sorted(listed, key=lambda room: (-room.views, room.name))
 
 
-def _rooms_by_floor(
-    field: "RoomField", regions: "RoomRegions", places: Float[np.ndarray, "k 3"], own: Int[np.ndarray, " k"]
-) -> Iterator[Room]:
-    share, has_parts = field.of_rooms(regions), field.parts_of_rooms(regions)
+def _rooms_by_floor(field: "RoomField", regions: "RoomRegions", places: Float[np.ndarray, "k 3"]) -> Iterator[Room]:
+    own, share, has_parts = regions.at(places), field.of_rooms(regions), field.parts_of_rooms(regions)
     for number in np.unique(own[own >= 0]).tolist():
         seen = places[own == number]
         best: list[int] = np.argsort(-share[number], kind="stable")[:_MOST_ROOM_NAMES].tolist()
@@ -353,39 +343,3 @@ def _rooms_by_floor(
             tuple(one for one in likely if one[1] >= _LEAST_ROOM_NAME) or (likely[0],),
             number, round(float(regions.areas_m2[number]), 2), regions.outline(number),
         )  # fmt: skip
-
-
-def _rooms_of_views(
-    names: Sequence[str],
-    share: Float[np.ndarray, "k n"],
-    places: Float[np.ndarray, "k 3"],
-    group: Int[np.ndarray, " k"],
-) -> Iterator[Room]:
-    likeliest = share.argmax(axis=1)
-    for number in np.unique(group):
-        members = np.flatnonzero(group == number)
-        kind = int(likeliest[members[0]])
-        likely = round(float(share[members, kind].mean()), 3)
-        seen = places[members]
-        yield Room(
-            names[kind] if likely >= FOUND_AT else UNKNOWN,
-            likely,
-            plain_point(middle_of(seen)),
-            len(members),
-            seen,
-            ((names[kind], likely),),
-        )
-
-
-def _groups_of_views(
-    points: Float[np.ndarray, "k 2"], share: Float[np.ndarray, "k n"], link_m: float
-) -> Int[np.ndarray, " k"]:
-    likeliest = share.argmax(axis=1)
-    out = np.zeros(len(points), np.int64)
-    count = 0
-    for number in np.unique(likeliest):
-        of_name = np.flatnonzero(likeliest == number)
-        group = modes(points[of_name], share[of_name, number], link_m)
-        out[of_name] = count + group
-        count += int(group.max(initial=-1)) + 1
-    return out

@@ -251,7 +251,7 @@ class Editor:
 
     def _room(self, room: str) -> EditedSpot:
         where = self._map.where
-        if where.regions is None:
+        if not where.rooms:
             raise QueryError("The map has no floor plan, so that its rooms are not known.")
         if is_place(room):
             numbers: list[int] = where.rooms_of(self._in_space(place_given(room))[None]).tolist()
@@ -260,9 +260,9 @@ class Editor:
         if len(numbers) > 1:
             names = ", ".join(where.names[number] for number in numbers[:_MOST_NAMED])
             raise QueryError(f"{len(numbers)} rooms are called {room}; say which: {names}.")
-        found = where.rooms[numbers[0]] if numbers[0] >= 0 else None
-        if found is None or found.region < 0:
-            raise QueryError(f"The floor of the room {room!r} is not mapped, so that it has no extent to name.")
+        if numbers[0] < 0:
+            raise QueryError(f"There is no room at {room!r}; `avlmaps rooms` lists them.")
+        found = where.rooms[numbers[0]]
         spot = EditedSpot(name=found.name, middle=found.position, corners=tuple(map(plain_point, found.outline)))
         return spot.anchored(self._map.data.keyframes)
 

@@ -237,14 +237,14 @@ class MapRooms:
 
     @cached_property
     def votes(self) -> Rooms | None:
-        """The votes on the kind of room of each place; None where the settings score keyframes instead.
+        """The votes on the kind of room of each place.
 
-        A map that has no floor plan (no voxels, no keyframes, kilometres of extent) has none either.
+        None where there is no floor plan: of a map without voxels or keyframes, or with kilometres of extent.
         """
         from avlmaps.maps.storeys import one_storey
 
         settings, avlmap = self._settings, self._map
-        if not settings.by_room or not len(avlmap.data.keyframes):
+        if not len(avlmap.data.keyframes):
             return None
         cameras = self._map.space.level(np.asarray(avlmap.data.keyframes.world_from_camera, np.float64)[:, :3, 3])[:, 2]
         ground = avlmap.data.info.ground

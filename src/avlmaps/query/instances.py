@@ -124,7 +124,7 @@ def _nearest(
     shape = index[rows].max(axis=0) + reach + 1 - low
 
     def key_of(voxels: Int[np.ndarray, "k 3"]) -> Int[np.ndarray, " k"]:
-        return np.ravel_multi_index(tuple((voxels - low).T), tuple(shape))
+        return np.asarray(np.ravel_multi_index(tuple((voxels - low).T), tuple(shape)))
 
     keys = key_of(index[np.concatenate(pieces)])
     order = np.argsort(keys)

@@ -18,7 +18,6 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import coordinates
 from avlmaps.query.factors import NearThings
-from avlmaps.query.modalities.area import area_names, pooled_name_shares
 from avlmaps.query.schema import Frame, Position
 from avlmaps.query.words import VoxelNamer, keyframes_that_saw
 
@@ -193,26 +192,16 @@ def _names(avlmap: "AVLMap", rows: Int[np.ndarray, " m"]) -> list[NameScore]:
 
 
 def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
-    stored = avlmap
-    if not stored.has(Kind.VIEWS) or not len(stored.data.keyframes):
+    field = avlmap.room_field if avlmap.has(Kind.VIEWS) else None
+    if field is None:
         return []
-    encoder = stored.encoders.views
-    field = avlmap.room_field
-    names = area_names(encoder) if field is None else field.kinds
-    places = np.asarray(stored.data.keyframes.centre, np.float64).reshape(-1, 3)
     space = avlmap.space
     here, map_xy = space.level(point)[:2], space.level_centres()[:, :2]
     if (here < map_xy.min(axis=0) - _BESIDE_M).any() or (here > map_xy.max(axis=0) + _BESIDE_M).any():
         return []
-    away = np.linalg.norm(space.level(places)[:, :2] - here, axis=1)
-    near = np.argsort(away, kind="stable")[:_MOST_VIEWS]
-    if field is not None:
-        share = field.at(point[None])[0].astype(np.float64)
-    else:
-        view = np.asarray(stored.data.keyframes.view)
-        share = pooled_name_shares(view, encoder, avlmap.settings.areas, places)[near].mean(axis=0)
+    share = field.at(point[None])[0].astype(np.float64)
     order = np.argsort(-share, kind="stable")[:3]
-    return [{"name": names[i], "confidence": round(float(np.clip(share[i], 0.0, 1.0)), 3)} for i in order]
+    return [{"name": field.kinds[i], "confidence": round(float(np.clip(share[i], 0.0, 1.0)), 3)} for i in order]
 
 
 def _views(avlmap: "AVLMap", row: int) -> list[ViewOfPlace]:

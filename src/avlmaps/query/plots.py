@@ -222,8 +222,7 @@ def _draw_names(ax: "Axes", space: Space, things: "Sequence[Thing]", rooms: "Seq
         if len(corners):
             ax.fill(*corners.T, facecolor=(*colour, 0.12), edgecolor=(*colour, 0.9), linewidth=1.6, zorder=6)
         x, y, _ = space.level(np.array(room.position))
-        area = "" if room.area_m2 is None else f"\n{room.area_m2:.1f} m²"
-        text = plot_text(room.name).upper() + area
+        text = f"{plot_text(room.name).upper()}\n{room.area_m2:.1f} m²"
         ax.text(x, y, text, fontsize=9, color=_PATH, fontweight="bold", zorder=9, **style)
 
 

@@ -7,7 +7,6 @@ beside a passage does not make the passage look wide. Leaves of open doors and p
 that they open into. Parts of an open plan, with an opening wider than ``WIDEST_M`` between them, are one region.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -379,13 +378,6 @@ class RoomRegions:
         """Return the number of the room of each point on its storey, up to 0.6 m away; ``NONE`` beyond."""
         points = np.asarray(points_world, np.float64).reshape(-1, 3)
         return self._of(self.plan.space.level(points)[:, :2], self.plan.storeys_of(points))
-
-    def listed_at(self, listed: Sequence[int], points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
-        """Return the place in a list of rooms of the one that each point lies in; ``NONE`` for a room not in it."""
-        place = np.full(len(self) + 1, NONE, np.int64)
-        place[np.asarray(listed, np.int64)] = np.arange(len(listed))
-        place[-1] = NONE  # no region: of points outside, and of rooms that are groups of views
-        return place[self.at(points_world)]
 
     def shares_of(
         self, middle_world: Float[np.ndarray, "3"], corners_world: Float[np.ndarray, "k 3"]

@@ -111,7 +111,7 @@ _PASSAGES = ("hallway", "corridor", "entrance hall", "staircase")
 # How much less likely a passage is for a room that has none, one, two or more rooms beside it.
 _PASSAGE_ODDS = (0.2, 0.2, 0.4, 1.0)
 _LEAST_SHARE = 0.003  # no view rules a kind of room out by more than this
-_LOOKS = 2.0  # as views that agree count in ``modalities.area.pool_posteriors``
+_LOOKS = 2.0  # looks that agree count as so many independent ones
 FEWEST_VIEWS = 2
 """A room is listed where at least this many keyframes show it."""
 LEAST_PART, _LEAST_PART_M2 = 0.2, 1.0  # of an open plan's floor

@@ -291,7 +291,7 @@ class RoomAnswer(TypedDict):
     storey: NotRequired[Storey]
     probability: Annotated[float, Meta(ge=0.0, le=1.0, description="of the name")]
     names: Annotated[list[RoomName], Meta(description="kinds that it may be, best first; several of an open plan")]
-    area_m2: Annotated[float | None, Meta(description="of its floor; null where no walls are known")]
+    area_m2: Annotated[float, Meta(description="of its floor")]
     outline: Annotated[list[Position], Meta(description="corners on its floor, counter-clockwise from above")]
     edited: NotRequired[Edited]
 

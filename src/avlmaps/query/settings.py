@@ -121,9 +121,6 @@ class AreaSettings:
     same_word_cosine: float = 0.95
     """Another name at least this close to the queried one names the same and does not compete with it. For an encoder
     with a scale it is measured from the middle of all names: its phrases lie in a cone, kitchen beside garage."""
-    pool_m: float = 0.8
-    """Of ``cones``: views whose anchors are within this distance vote together (``pool_posteriors``): an odd one is
-    outvoted. 0 takes each by itself, as the paper does."""
     link_m: float = 1.0
     """Keyframes closer than this to a better one belong to its area."""
     rooms: RoomSettings = field(default_factory=RoomSettings)
@@ -188,7 +185,7 @@ PAPER_HEARING = HearingSettings(
 
 # Heat falls from the camera's place, through walls; cosines are stretched over the keyframes; each view speaks for
 # itself, and things do not.
-PAPER_AREAS = AreaSettings(anchor="camera", extent="cones", score="min-max", pool_m=0.0)
+PAPER_AREAS = AreaSettings(anchor="camera", extent="cones", score="min-max")
 
 
 # Scores are stretched over the sounds of the map; no words change that each is where the robot was.

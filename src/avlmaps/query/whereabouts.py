@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from avlmaps.query.contents import Thing
 
 NOWHERE = -1
-"""The room of a point in a map without rooms."""
+"""The room of a point in no room."""
 _MOST_NAMED = 30
 _UNITS = "m|cm|metres?|meters?|feet|steps?|times|degrees?|seconds?|minutes?"
 # A word and a number behind it, which counts nothing ("the kitchen 2 m ahead"): most sentences hold none.
@@ -38,7 +38,7 @@ class Whereabouts:
     Attributes:
         rooms: those with most views first.
         names: of each room, all different: the kind of room, and a number where there are several of a kind.
-        regions: the floor of each room; None for a map whose rooms are groups of views.
+        regions: the floor of each room; None for a map without a floor plan.
     """
 
     def __init__(self, avlmap: "AVLMap") -> None:
@@ -62,29 +62,17 @@ class Whereabouts:
         return np.zeros(len(points), np.int64) if self._plan is None else self._plan.storeys_of(points)
 
     def rooms_of(self, points: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
-        """Return the number of the room of each point: the one whose region holds it, else the nearest of its storey.
+        """Return the number of the room of each point: the one whose region holds it, else that of the nearest view.
 
-        ``points``: metres, recording frame. Numbers into ``rooms``; ``NOWHERE`` for a map without rooms.
+        ``points``: metres, recording frame. Numbers into ``rooms``; ``NOWHERE`` for a map without rooms, and outside.
         """
         points = np.asarray(points, np.float64).reshape(-1, 3)
-        if not self.rooms or not len(points):
+        field = self._map.room_field if self.rooms and len(points) else None
+        if field is None or self.regions is None:
             return np.full(len(points), NOWHERE, np.int64)
-        number, tree = self._views
-        nearest = number[tree.query(self._by_storey(points))[1]]
-        if self.regions is None:
-            return nearest
-        own = self.regions.listed_at([room.region for room in self.rooms], points)
-        return np.where(own == NOWHERE, nearest, own)
-
-    @cached_property
-    def _views(self):
-        from scipy.spatial import KDTree
-
-        number = np.repeat(np.arange(len(self.rooms)), [len(room.places) for room in self.rooms])
-        return number, KDTree(self._by_storey(np.concatenate([room.places for room in self.rooms])))
-
-    def _by_storey(self, points: Float[np.ndarray, "m 3"]) -> np.ndarray:
-        return np.c_[self._map.space.level(points)[:, :2], 1e4 * self.floors_of(points)]
+        listed = np.full(len(self.regions) + 1, NOWHERE, np.int64)
+        listed[[room.region for room in self.rooms]] = np.arange(len(self.rooms))
+        return listed[field.room_of(points)]
 
     def name_of(self, place: Sequence[float]) -> str | None:
         """Return the name of the room of a place; None in a map without rooms."""
@@ -99,7 +87,7 @@ class Whereabouts:
 
     def areas_m2(self) -> Float[np.ndarray, " r"]:
         """Return the floor area of each room; none for a map without a floor plan."""
-        return np.array([room.area_m2 or 0.0 for room in self.rooms] if self.regions is not None else [], np.float64)
+        return np.array([room.area_m2 for room in self.rooms], np.float64)
 
     def parts_of(self, kind: Callable[[str], bool], points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
         """Return which points lie in a room of a kind: in one of that name, or in the part of an open plan that is.
@@ -164,7 +152,7 @@ class Whereabouts:
         from avlmaps.query.edits import plain_name
 
         rooms = zip(self.names, self.rooms, strict=True)
-        return {plain_name(name): room.region for name, room in rooms if name != room.name and room.region >= 0}
+        return {plain_name(name): room.region for name, room in rooms if name != room.name}
 
 
 def _plain(asked: str) -> str:

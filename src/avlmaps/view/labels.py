@@ -183,20 +183,14 @@ def _thing_labels(count: int, things: "Sequence[Thing]") -> tuple[tuple[str, ...
 def _room_labels(
     avlmap: "AVLMap", rooms: "Sequence[Room]", rows: Int[np.ndarray, " m"]
 ) -> tuple[tuple[str, ...], UInt8[np.ndarray, " m"]]:
-    """Give each of some voxels the room that it lies in; without regions that whose views lie nearest on the ground."""
-    from scipy.spatial import KDTree
-
+    """Give each of some voxels the room that it lies in."""
     names = numbered([room.name for room in rooms])[:_MOST]
-    labels = [1 + k if k < _MOST else NONE for k in range(len(rooms))]
-    if not names or not len(rows):
+    regions = avlmap.room_regions
+    if not names or not len(rows) or regions is None:
         return names, np.zeros(len(rows), np.uint8)
-    space, regions = avlmap.space, avlmap.room_regions
-    if regions is not None and len(regions):
-        number = regions.listed_at([room.region for room in rooms], space.centres_of(rows))
-        return names, np.array([*labels, NONE], np.uint8)[number]  # the last is that of no room
-    places = np.concatenate([space.level(room.places)[:, :2] for room in rooms])
-    label = np.concatenate([np.full(room.views, number, np.uint8) for number, room in zip(labels, rooms, strict=True)])
-    return names, label[KDTree(places).query(space.level(space.centres_of(rows))[:, :2])[1]]
+    label_of = np.full(len(regions) + 1, NONE, np.uint8)  # the last is that of no room
+    label_of[[room.region for room in rooms[:_MOST]]] = 1 + np.arange(len(names))
+    return names, label_of[regions.at(avlmap.space.centres_of(rows))]
 
 
 def _name_labels(

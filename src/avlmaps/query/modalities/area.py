@@ -38,30 +38,20 @@ class ViewShares:
 
 
 def area_scores(
-    view: Float32[np.ndarray, "k d"],
-    encoder: ViewEncoder,
-    name: str,
-    settings: AreaSettings,
-    places: Float[np.ndarray, "k 3"] | None = None,
+    view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, name: str, settings: AreaSettings
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return for each keyframe the posterior of the name among all area names, and its score in [0, 1].
 
     An encoder that distinguishes named kinds of room gives their probabilities. For one of an open vocabulary they
     are the softmax over the names that it was trained with; names that mean the queried area as well do not compete.
 
-    The scores are the posteriors, pooled over what looked at about the same place; they are stretched and each view
-    speaks for itself where the settings ask for the paper's score.
-
-    ``places`` is what each view looked at, metres; None leaves every view for itself.
+    The scores are the posteriors, or stretched cosines where the settings ask for the paper's score.
     """
     shares = view_shares(view, encoder, name, settings)
     posterior = np.clip(shares.share @ shares.weights, 0.0, 1.0)
     if settings.score == "min-max":
         return posterior, stretch_scores(shares.raw)
-    if places is None or not settings.pool_m > 0.0 or not len(shares.share):
-        return posterior, posterior
-    pooled = pool_posteriors(shares.share, places, settings.pool_m)
-    return posterior, np.clip(pooled @ shares.weights, 0.0, 1.0)
+    return posterior, posterior
 
 
 def view_shares(
@@ -95,37 +85,6 @@ def name_shares(
         return share / np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
     words = encoded_words(encoder, AREA_NAMES).astype(np.float64)
     return _softmax(_cosines(view, words), encoder, settings)
-
-
-def pooled_name_shares(
-    view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, settings: AreaSettings, places: Float[np.ndarray, "k 3"]
-) -> Float[np.ndarray, "k n"]:
-    """Return ``name_shares``, pooled over views that looked at about the same place where the settings say so."""
-    share = name_shares(view, encoder, settings)
-    return pool_posteriors(share, places, settings.pool_m) if settings.pool_m > 0.0 and len(share) else share
-
-
-def pool_posteriors(
-    share: Float[np.ndarray, "k n"], places: Float[np.ndarray, "k 3"], pool_m: float
-) -> Float[np.ndarray, "k n"]:
-    """Return the scores of views pooled with those that looked at about the same place.
-
-    That is their mean, weighted by exp(−d² / 2·pool_m²), d the 3D distance: one odd view is outvoted. An average is
-    less confident than views that agree should be; so, where the weights add up to two views or more, it is squared and
-    rescaled, the product of two independent views that say the same. A lone view stays as it is.
-
-    ``places``: what each view looked at, metres. ``pool_m``: over 0.
-    """
-    from scipy.sparse import csr_array
-    from scipy.spatial import KDTree
-
-    tree = KDTree(places)
-    near = tree.sparse_distance_matrix(tree, 3.0 * pool_m, output_type="coo_matrix")
-    weight = np.exp(-np.square(near.data) / (2.0 * pool_m**2))
-    total = csr_array((weight, (near.row, near.col)), shape=near.shape) @ np.c_[share, np.ones(len(share))]
-    mean, views = total[:, :-1] / total[:, -1:], total[:, -1:]
-    sharp = mean ** np.clip(views, 1.0, 2.0)
-    return sharp * (mean.sum(axis=1, keepdims=True) / np.maximum(sharp.sum(axis=1, keepdims=True), 1e-12))
 
 
 def same_place(area: str, asked: str) -> bool:
@@ -219,7 +178,7 @@ def area_factor(
     view = np.asarray(keyframes.view)
     kinds: RoomField | None = None
     if rooms is None or not settings.by_room or not len(keyframes):
-        posterior, scores = area_scores(view, encoder, part.query, settings, anchors)
+        posterior, scores = area_scores(view, encoder, part.query, settings)
         weights = np.zeros(0)
     else:
         shares = view_shares(view, encoder, part.query, settings)
