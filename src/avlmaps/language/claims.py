@@ -28,7 +28,7 @@ from avlmaps.language.intents import (
 )
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import describes, is_entry, sounding_words, sounds_like
-from avlmaps.language.word_classes import filled, pattern_of, table, word_list
+from avlmaps.language.word_classes import filled, listed, pattern_of, table, word_list
 
 _ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
 _MARKS = {TargetKind.AREA: "@", TargetKind.SOUND: "$"}
@@ -70,7 +70,8 @@ def _known() -> Mapping[str, str]:
     book = table("claims")
     known = {name: f"{_BEGIN}(?:{'|'.join(map(re.escape, text.split()))}) " for name, text in book["lists"].items()}
     known |= {name: f"{_BEGIN}(?:{pattern_of(text)})" for name, text in book["phrases"].items()}
-    known["colours"] = f"{_BEGIN}(?:{'|'.join(map(re.escape, lexicon().colours))}) "
+    also = {"colours": lexicon().colours, "choices": listed("choices")}
+    known |= {name: f"{_BEGIN}(?:{'|'.join(map(re.escape, words))}) " for name, words in also.items()}
     for name, text in book["patterns"].items():
         known[name] = filled(text, known)
     return known
@@ -164,6 +165,13 @@ def unmet_by(tokens: Sequence[Token], inquiry: Inquiry, used: frozenset[int]) ->
         facts.add("whether")
     found = _first("question", marked, frozenset(facts))
     return None if found is None else getattr(found, "question", "A map cannot answer this.")
+
+
+def lacking(tokens: Sequence[Token], named: frozenset[int]) -> Clarify:
+    """Return the question for what an unclear command lacks; ``named`` are the words of known names."""
+    found = _first("unclear", _Marked(tokens, named, {}), frozenset())
+    assert isinstance(found, Clarify)  # the last row fits all
+    return found
 
 
 def in_direction(tokens: Sequence[Token], intents: Sequence[Intent]) -> tuple[Intent, ...] | Clarify:

@@ -178,7 +178,6 @@ def _asked(closed: NoOrder, intents: Sequence[Intent]) -> Clarify:
 
 
 def _read(text: str, given: Attachments | None) -> Command:
-    """Return the meaning of a command, taken as an order."""
     stand = stand_ins(text, () if given is None else given.own, orders=True)
     if stand.own:
         read = _read(stand.text, replace(given or Attachments(), own=()))
@@ -271,7 +270,6 @@ def _lost_sides(intents: Sequence[Intent], sentence: Sentence) -> tuple[str, ...
 
 
 def _check_length(text: str) -> None:
-    """Refuse a command without a word, or one that is too long."""
     if not any(mark.isalnum() for mark in text):
         raise LanguageError(f"The command is empty; say it like: {EXAMPLE}.")
     if len(text) > MOST_CHARACTERS:

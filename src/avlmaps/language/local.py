@@ -306,7 +306,6 @@ class LocalModel:
 
 
 def _served(file: Path) -> Any:
-    """Return a server of llama.cpp in this process."""
     try:
         with file.open("rb") as opened:
             is_gguf = opened.read(4) == b"GGUF"

@@ -5,7 +5,6 @@ letter away; where several are, it stays as it is, and its name leads to a quest
 """
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
@@ -80,7 +79,6 @@ def may_name(name: str) -> bool:
 
 
 def _is_spelt(word: str) -> bool:
-    """Return whether a word is spelt right: English, or a noun that people have used as a name."""
     return any(is_word(one) or one in _words_of("nouns") or _is_compound(one) for one in (word, *singulars_of(word)))
 
 
@@ -286,18 +284,13 @@ def _heard() -> dict[str, str]:
     return dict(pair.split("=") for pair in load_word_classes().lists["heard_as"].split())
 
 
-def _neighbours(word: str) -> Iterator[str]:
-    """Yield the words that are one letter away: one more, one less, one other, or two in the other order."""
-    for at in range(len(word) + 1):
-        before, after = word[:at], word[at:]
-        if after:
-            yield before + after[1:]
-        if len(after) > 1:
-            yield before + after[1] + after[0] + after[2:]
-        for letter in ascii_lowercase:
-            yield before + letter + after
-            if after:
-                yield before + letter + after[1:]
+def _neighbours(word: str) -> set[str]:
+    """Return the words that are one letter away: one more, one less, one other, or two in the other order."""
+    cuts = [(word[:at], word[at:]) for at in range(len(word) + 1)]
+    swapped = {before + after[1] + after[0] + after[2:] for before, after in cuts if len(after) > 1}
+    lost = {before + after[1:] for before, after in cuts if after}
+    put = {before + letter + after[cut:] for before, after in cuts for letter in ascii_lowercase for cut in (0, 1)}
+    return swapped | lost | put
 
 
 @cache

@@ -207,18 +207,14 @@ def language_of(text: str) -> str | None:
     if letters and len(strange) * 2 > len(letters):
         return _ANOTHER
     found = re.findall(r"[^\W\d_]+", text.lower())
-    counted = {
-        language: sum(word in sure | also for word in found) for language, (sure, also) in _foreign_words().items()
-    }
-    plainly = [
-        language
-        for language, (sure, _) in _foreign_words().items()
-        if counted[language] * 2 >= len(found) and not sure.isdisjoint(found)
-    ]
-    if not plainly:
+    counted = {name: sum(word in sure | also for word in found) for name, (sure, also) in _foreign_words().items()}
+    plainly = (2 * counted[name] >= len(found) and sure & set(found) for name, (sure, _) in _foreign_words().items())
+    if not any(plainly):
         return _ANOTHER if _is_unknown(found) else None
-    most = [language for language in counted if counted[language] == max(counted.values())]
-    return most[0] if len(most) == 1 and not _its_own(most[0]).isdisjoint(found) else _ANOTHER
+    first, second = sorted(counted, key=lambda name: -counted[name])[:2]
+    others = frozenset[str]().union(*(sure | also for name, (sure, also) in _foreign_words().items() if name != first))
+    sure, also = _foreign_words()[first]
+    return first if counted[first] > counted[second] and (sure | also) & set(found) - others else _ANOTHER
 
 
 def _is_unknown(found: list[str]) -> bool:
@@ -232,12 +228,6 @@ def _is_unknown(found: list[str]) -> bool:
         return True
     strange = any(not word.isascii() for word in several if word not in usual)
     return strange and 2 * len(usual) < len(several)
-
-
-@cache
-def _its_own(language: str) -> frozenset[str]:
-    book = {name: sure | also for name, (sure, also) in _foreign_words().items()}
-    return book[language].difference(*(words for name, words in book.items() if name != language))
 
 
 @cache

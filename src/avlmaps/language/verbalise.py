@@ -4,18 +4,16 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from avlmaps.language import intents as act
-from avlmaps.language.claims import claimed_words
+from avlmaps.language.claims import claimed_words, lacking
 from avlmaps.language.intents import Clarify, Intent, Pick, Refuse, Side, Target, TargetKind
-from avlmaps.language.lexer import Token, is_amount
+from avlmaps.language.lexer import Token
 from avlmaps.language.names import class_words, is_known, may_name, near_names
-from avlmaps.language.word_classes import listed
 from avlmaps.perception.embedded.words import is_word
 
 _FILES = {
     TargetKind.IMAGE: "Which picture? Attach it, or name its file in the sentence.",
     TargetKind.CLIP: "Which recording? Attach it, or name its file in the sentence.",
 }
-_PRONOUNS = ("it", "there", "that", "them", "this")
 _SHORT = 3  # letters; shorter words are spelt like too many others
 _COMPASS = {0: "north", 45: "north-east", 90: "east", 135: "south-east", 180: "south", 225: "south-west", 270: "west",
             315: "north-west"}  # fmt: skip
@@ -166,29 +164,7 @@ def strange_word(tokens: Sequence[Token]) -> str | None:
 
 def unclear(tokens: Sequence[Token]) -> Clarify:
     """Return the question for a command that lacks something: what it lacks, where its words show that."""
-    file = lacks_file(tokens)
-    if file is not None:
-        return file
-    words = [token.text for token in tokens]
-    for at, word in enumerate(words):
-        of_these = at > 0 and words[at - 1] in claimed_words("these")
-        named = words[at + 1] if at + 1 < len(words) else ""
-        if of_these and word in listed("choices") and (named == "one" or is_known(named) or may_name(named)):
-            return Clarify(f"I cannot choose the {word} {named} from the map. Say what it is near.")
-    strange = strange_word(tokens)
-    if strange is not None:
+    file, strange = lacks_file(tokens), strange_word(tokens)
+    if file is None and strange is not None:
         return unknown(strange)
-    names = any(is_known(word) for word in words)
-    if (
-        not names
-        and not claimed_words("straight_on").isdisjoint(words)
-        and not any(is_amount(tokens, at) for at in range(len(tokens)))
-    ):
-        return Clarify("How far? Say it like: go forward 2 metres.")
-    if not names and not claimed_words("turn_verbs").isdisjoint(words):
-        choices = ("left", "right", "around")
-        return Clarify("Turn which way? Say left, right, around, or an angle.", choices)
-    pronoun = next((word for word in _PRONOUNS if word in words), None)
-    if not names and pronoun is not None:
-        return Clarify(f"What does '{pronoun}' refer to? Name the thing.")
-    return Clarify("This is not clear enough to drive. Name each place, and say how far.")
+    return file or lacking(tokens, frozenset(at for at, token in enumerate(tokens) if is_known(token.text)))

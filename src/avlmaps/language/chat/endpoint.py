@@ -348,7 +348,6 @@ class Endpoint:
             return ()
 
     def _asked(self, path: str, deadline: float, parameters: Mapping[str, Any] | None = None) -> bytes:
-        """Return the body of one request's answer; raises _Fault where none came before the deadline."""
         headers = {"Authorization": f"Bearer {self._settings.api_key or 'none'}", "Content-Type": "application/json"}
         body = None if parameters is None else msgspec.json.encode(parameters)
         request = Request(f"{self._settings.base_url.rstrip('/')}/{path}", body, headers)
@@ -399,7 +398,6 @@ class Endpoint:
 
 
 def _read(response: Any, deadline: float) -> bytes:
-    """Return a body; one that is too long, torn, or slower than the deadline raises _Fault."""
     body = bytearray()
     while chunk := response.read1(1 << 16):
         body += chunk

@@ -154,8 +154,6 @@ def run_program(
 
 
 class _SkillFailedError(Exception):
-    """A skill raised an error that ends the program."""
-
     def __init__(self, line: int, what: str, fault: AvlmapsError) -> None:
         asks = isinstance(fault, SeveralFitError)  # a question to the person, who sees no line
         super().__init__(str(fault) if asks else f"Line {line}, {what}: {fault}")
@@ -163,8 +161,6 @@ class _SkillFailedError(Exception):
 
 
 class _LeftError(Exception):
-    """A `break` or a `continue` on its way to its loop."""
-
     def __init__(self, *, loop: bool) -> None:
         super().__init__()
         self.loop = loop
