@@ -6,11 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from avlmaps.cli.verb import Reading as GivenReading
 from avlmaps.cli.verbs import CONFIG
@@ -22,20 +19,19 @@ from avlmaps.recordings.channels import level_faults
 from avlmaps.recordings.conformance import example_truth, see
 from avlmaps.recordings.consistency.agreement import NOTHING
 from avlmaps.recordings.consistency.check import Grade, Reason, Verdict, check_recording
-from avlmaps.recordings.consistency.flats import Flats
-from avlmaps.recordings.consistency.readings import Reading, cause_of, rig_of
-from avlmaps.recordings.consistency.sample import Sample, choose_pairs, draw_sample
-from avlmaps.recordings.consistency.suspicions import examine_recording, find_edges
-from avlmaps.recordings.corrections import Corrections, PoseKind, opencv_from_axes
+from avlmaps.recordings.consistency.readings import Reading, rig_of
+from avlmaps.recordings.consistency.sample import choose_pairs
+from avlmaps.recordings.consistency.suspicions import examine_recording
+from avlmaps.recordings.corrections import Corrections, opencv_from_axes
 from avlmaps.recordings.memory import MemoryRecording, is_of_program
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.types import Frame
 from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
 from avlmaps_sim.bench.recordings.outcomes import Judge, Outcome
 from avlmaps_sim.bench.recordings.situations import situations
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")  # none reaches a user
-CAMERA, WIDE = Pinhole(48.0, 48.0, 32.0, 24.0, 64, 48), Pinhole(96.0, 96.0, 64.0, 48.0, 128, 96)
+CAMERA = Pinhole(48.0, 48.0, 32.0, 24.0, 64, 48)
 EVERY = {one.name: one for one in situations()}
 
 
@@ -114,13 +110,9 @@ MISTAKES: list[tuple[str, Reason, str]] = [
     ("poses turn by 20 degrees", Reason.GEOMETRY, ""),
     ("positions x0.5", Reason.GEOMETRY, ""),
     ("principal point off by a sixteenth", Reason.GEOMETRY, ""),
-    ("half of the pictures BGR", Reason.COLOUR, ""),
     ("all pictures BGR", Reason.COLOUR, ""),
-    ("colour camera 0.3 m beside", Reason.COLOUR, ""),
-    ("colour shifted by a sixteenth", Reason.COLOUR, ""),
     ("poses jump by 2.5 m", Reason.MOTION, ""),
     ("a third of the pictures black", Reason.COLOUR, ""),
-    ("depth in cm, of which 8 bits are stored", Reason.DEPTH, ""),
     ("frames sorted as text", Reason.GEOMETRY, ""),
     ("every second pose is the one before", Reason.GEOMETRY, ""),
     ("all poses the same", Reason.GEOMETRY, "All poses are the same"),
@@ -162,7 +154,6 @@ def frozen_poses(draft: Draft) -> Draft:
 OTHERS: list[tuple[str, Callable[[Draft], Draft], str]] = [
     ("depth a frame late", late(1), r"epth pictures look 1 frame\(s\) late"),
     ("depth two early", late(-2), r"epth pictures look 2 frame\(s\) early"),
-    ("depth 0.15 m short", with_depth(lambda z: z - 150.0), "m too small everywhere|do not agree"),
     ("few poses", posed(12), "Only 40% of the frames have a pose"),
     ("enough poses", posed(24), "^$"),
     ("poses froze", frozen_poses, "pose is the same although|do not agree|far off"),
@@ -179,18 +170,15 @@ def test_what_field_recordings_have_is_said(
 
 
 @pytest.mark.parametrize(
-    ("round_rad_s", "times", "farther_m", "said"),
+    ("round_rad_s", "times", "said"),
     [
-        (0.5, 1.15, 0.0, "The depth looks 1.15 times too large, or the positions 1.15 times too small"),
-        (0.5, 0.87, 0.0, "The depth looks 1.15 times too small, or the positions 1.15 times too large"),
-        (0.0, 1.0, 0.3, "The depth looks 0.3 m too large everywhere: write the depth from the camera's centre (-0.3"),
+        (0.5, 1.15, "The depth looks 1.15 times too large, or the positions 1.15 times too small"),
+        (0.5, 0.87, "The depth looks 1.15 times too small, or the positions 1.15 times too large"),
     ],
 )  # fmt: skip
-def test_depth_that_is_a_little_off_is_named(
-    round_rad_s: float, times: float, farther_m: float, said: str, tmp_path: Path
-) -> None:
+def test_depth_that_is_a_little_off_is_named(round_rad_s: float, times: float, said: str, tmp_path: Path) -> None:
     walk = RoomWalk("turn", seed=57, frames=30, round_rad_s=round_rad_s).draft(CAMERA)
-    found = verdict(with_depth(lambda z: z * times + 1000.0 * farther_m)(walk), tmp_path)
+    found = verdict(with_depth(lambda z: z * times)(walk), tmp_path)
     assert found.grade is Grade.SUSPICIOUS and said in " ".join(found.sentences())
 
 
@@ -201,12 +189,8 @@ def test_a_program_is_told_what_to_give_instead() -> None:
         for i, pose in enumerate(walk.world_from_camera)
     ]
     said = " ".join(check_recording(MemoryRecording(frames)).sentences())
-    matrix = opengl[:3, :3].astype(int).tolist()
-    assert f"give frames with poses of OpenCV's axes, world_from_camera[:3, :3] @ {matrix}" in said
+    assert "an OpenGL camera" in said and "give frames with world_from_camera of an OpenCV camera" in said
     assert "Corrections" not in said
-    inverted = Reading(Corrections(poses=(PoseKind.CAMERA_FROM_WORLD,)), scale=0.001)
-    said = cause_of(inverted, MemoryRecording(frames), 2000.0)
-    assert "give frames with the inverse of each pose and depth_m times 0.001." in said
     with asked_as(Spelling.FLAG):  # of a live map that plays a recording
         assert not is_of_program(MemoryRecording(frames))
 
@@ -229,10 +213,10 @@ def test_two_cameras_that_take_turns_are_compared_each_with_itself(tmp_path: Pat
 SPOTS = {
     "keyframes": (RoomWalk("keyframes", seed=52, frames=4, rate_hz=0.2, turn_rad_s=0.3), {"hardly any two frames"}),
     "stands and turns evenly": (RoomWalk("turn", seed=57, frames=30, round_rad_s=0.0, even=True),
-                                {"twice as far", "clock of"}),
+                                {"twice as far", "15% too large", "clock of"}),
     "hardly moves": (RoomWalk("still", seed=58, frames=30, round_rad_s=0.02, turn_rad_s=0.02, noise=0.0019, even=True),
-                     {"twice as far", "clock of", "focal"}),
-    "mostly turns": (RoomWalk("walk", seed=51, frames=30), {"15% or 0.3 m too large"}),
+                     {"twice as far", "15% too large", "clock of", "focal"}),
+    "mostly turns": (RoomWalk("walk", seed=51, frames=30), {"15% too large"}),
     "walks": (RoomWalk("turn", seed=57, frames=30, round_rad_s=0.5), set[str]()),
 }  # fmt: skip
 
@@ -243,56 +227,11 @@ def test_what_would_not_show_is_said(name: str, tmp_path: Path) -> None:
     walk, spots = SPOTS[name]
     found = verdict(walk.draft(CAMERA), tmp_path)
     assert found.grade is (Grade.UNCHECKED if name == "keyframes" else Grade.FINE) and not found.sentences()
-    every = ("hardly any two frames", "twice as far", "15% or 0.3 m too large", "clock of", "focal", "the ray")
+    every = ("hardly any two frames", "twice as far", "15% too large", "clock of", "focal", "along the ray")
     assert {spot for spot in every if spot in " ".join(found.unchecked)} == spots
 
 
-def parts(recording: Recording, moved: np.ndarray) -> Recording:
-    """Return a recording whose second half begins ten minutes later, elsewhere."""
-    late = [
-        replace(frame, stamp_s=frame.stamp_s + 600.0, world_from_camera=moved @ frame.world_from_camera)
-        for frame in recording
-    ]
-    return MemoryRecording([*list(recording)[:15], *late[15:]])
-
-
-@pytest.mark.parametrize(("degrees", "by_m", "said"), [(0, 0.0, ""), (0, 0.8, "origins|jump"), (180, 0.0, "origins")])
-@pytest.mark.nightly
-def test_a_second_part_with_another_origin_is_doubted(
-    degrees: int, by_m: float, said: str, right: Draft, tmp_path: Path
-) -> None:
-    recording = open_recording(right.write(tmp_path / "walk"))
-    middle, turn = recording.world_from_camera[:, :3, 3].mean(axis=0), np.eye(4)
-    turn[:2, :2] = np.round([[np.cos(a := np.radians(degrees)), -np.sin(a)], [np.sin(a), np.cos(a)]])
-    turn[:3, 3] = middle - turn[:3, :3] @ middle + (by_m, by_m, 0.0)
-    sentences = examine_recording(parts(recording, turn)).sentences()
-    assert any(re.search(f"{said}|do not agree", one) for one in sentences) if said else not sentences
-
-
-def test_a_second_part_that_sees_nothing_of_the_first_is_said_to_be_unchecked(right: Draft, tmp_path: Path) -> None:
-    away = np.eye(4)
-    away[0, 3] = 40.0
-    found = examine_recording(parts(open_recording(right.write(tmp_path / "walk")), away))
-    assert any("one origin before and after the gap of 600 s between 000014 and 000015" in it for it in found.unchecked)
-
-
 # Sound
-
-LENGTHS = {
-    "as long": (16_000, 1.0, 0.0, ""), "begins before, ends after": (16_000, 1.3, -2.0, ""),
-    "twice the rate": (8_000, 2.0, 0.0, "16000 samples a second were called 8000"),
-    "48 for 16 kHz": (16_000, 3.0, 0.05, "48000 samples a second were called 16000"),
-    "44.1 for 48 kHz": (48_000, 44.1 / 48.0, 0.0, ""), "goes on": (16_000, 2.0, -8.0, ""),
-}  # fmt: skip
-
-
-def test_a_track_of_another_rate_is_doubted(right: Draft, tmp_path: Path) -> None:
-    recording = open_recording(right.write(tmp_path / "walk"))
-    for rate_hz, longer, start_s, said in LENGTHS.values():
-        recording.audio = AudioTrack(tmp_path / "sound.wav", rate_hz, longer * recording.duration_s, start_s)
-        found = [one for one in check_recording(recording).findings if one.reason is Reason.SOUND]
-        assert [said in str(one) for one in found] == [True] * bool(said)
-
 
 SILENCES = {
     "all of it": (lambda n: np.zeros(n), "is silent throughout: every sample is 0"),
@@ -329,70 +268,6 @@ def test_a_clipped_track_is_doubted(gain: float, doubted: bool, right: Draft, tm
     assert all("is clipped in" in one and "audio.flac" in one for one in found.sentences())
 
 
-# Flat surfaces, edges and pairs
-
-
-@pytest.fixture(scope="module")
-def wide(tmp_path_factory: pytest.TempPathFactory) -> Sample:
-    walk = RoomWalk("right round", seed=59, frames=24, rate_hz=2.5, noise=0.0019).draft(WIDE)
-    return draw_sample(open_recording(walk.write(tmp_path_factory.mktemp("wide") / "walk")))
-
-
-def behind_a_lens(sample: Sample, k1: float) -> Sample:
-    seen = np.moveaxis(np.mgrid[:96, :128][::-1], 0, -1).astype(np.float32).reshape(-1, 1, 2)
-    matrix = WIDE.matrix - [[0.0, 0.0, 0.5], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]]
-    at = cv2.undistortPoints(seen, matrix, np.array([k1, 0.0, 0.0, 0.0]), P=matrix).reshape(96, 128, 2)
-    bent = [cv2.remap(one, at[..., 0], at[..., 1], cv2.INTER_NEAREST) for one in sample.depth_m]
-    return replace(sample, depth_m=np.stack(bent))
-
-
-@pytest.mark.few(2)
-@pytest.mark.parametrize(("k1", "is_lens"), [(-0.3, True), (-0.15, True), (0.0, False), (-0.04, False), (0.3, False)])
-def test_a_wide_lens_is_found_with_its_strength(k1: float, is_lens: bool, wide: Sample) -> None:
-    flats = Flats.of(behind_a_lens(wide, k1) if k1 else wide)
-    found = flats.lens()
-    assert (found is not None) == is_lens
-    assert found is None or found[0] == pytest.approx(k1, rel=0.25)
-    assert k1 or flats.lens_would_show
-
-
-@pytest.mark.few(2)
-@pytest.mark.parametrize(("axis", "degrees"), [(0, 6.0), (0, -6.0), (2, 6.0), (2, -6.0), (0, 14.0)])
-def test_floors_show_how_a_camera_sits_in_its_mount(wide: Sample, axis: int, degrees: float) -> None:
-    half = np.radians(degrees) / 2.0
-    off = poses.from_quaternion(np.zeros((1, 3)), np.array([[*(np.sin(half) * np.eye(3)[axis]), np.cos(half)]]))[0]
-    found = Flats.of(replace(wide, world_from_camera=wide.world_from_camera @ off)).levels().tilt
-    assert found is not None and found.left_deg < 1.5 < found.off_deg
-    expected = (degrees, 0.0) if axis == 0 else (0.0, -degrees)
-    assert (found.down_deg, found.right_deg) == pytest.approx(expected, abs=1.5)
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize("degrees", [0.0, 5.0, 12.0])
-def test_a_slope_is_no_tilt_of_the_camera(wide: Sample, degrees: float) -> None:
-    half = np.radians(degrees) / 2.0
-    slope = poses.from_quaternion(np.zeros((1, 3)), np.array([[np.sin(half), 0.0, 0.0, np.cos(half)]]))[0]
-    levels = Flats.of(replace(wide, world_from_camera=slope @ wide.world_from_camera)).levels()
-    assert levels.tilt is None
-
-
-@pytest.mark.parametrize("size", [(16, 12), (8, 8), (128, 96)])
-def test_small_pictures_and_no_depth_have_no_surfaces(size: tuple[int, int], wide: Sample) -> None:
-    small = WIDE.resized(*size)
-    empty = replace(wide, depth_m=np.zeros((len(wide), *size[::-1]), np.float32), rig=Rig(small, small))
-    flats = Flats.of(empty)
-    assert len(flats.frame) == 0 and not flats.lens_would_show and flats.levels().tilt is None
-
-
-@given(st.integers(-16, 16), st.integers(-16, 16))
-def test_edges_of_colour_are_found_where_they_were_moved_to(wide: Sample, x: int, y: int) -> None:
-    found = find_edges(replace(wide, grey=np.roll(wide.grey, (y, x), axis=(1, 2)))).shift()
-    if np.hypot(x, y) <= 1.0:
-        assert found is None
-    elif np.hypot(x, y) >= 8.0:
-        assert found is not None and np.hypot(found[0] - x, found[1] - y) <= 3.0
-
-
 @pytest.mark.parametrize("count", [2, 7, 5000])
 def test_pairs_are_of_the_recording_in_the_order_of_time(count: int) -> None:
     pose = np.tile(np.eye(4), (count, 1, 1))
@@ -400,21 +275,6 @@ def test_pairs_are_of_the_recording_in_the_order_of_time(count: int) -> None:
     pairs, follows = choose_pairs(pose)
     assert len(pairs) == len(follows) and 1 <= len(pairs) <= 60
     assert (pairs[:, 0] < pairs[:, 1]).all() and pairs.min() >= 0 and pairs.max() < count
-
-
-@pytest.mark.parametrize(
-    ("name", "cause"),
-    [
-        ("lenses as they are, by a pinhole's numbers", "behind a wide lens"),
-        ("camera tilted by 8 degrees in its mount", "mount|Floors"),
-        ("cut to 16:9, with the old middle", "cy"),
-    ],
-)
-@pytest.mark.nightly
-def test_flat_surfaces_of_a_recording_say_it(name: str, cause: str, tmp_path: Path) -> None:
-    walk = RoomWalk("right round", seed=59, frames=24, rate_hz=2.5, noise=0.0019).draft(WIDE)
-    found = verdict(EVERY[name].change(walk, walk, np.random.default_rng(0)), tmp_path)
-    assert re.search(cause, " ".join(found.sentences())), found.sentences()
 
 
 @pytest.mark.nightly

@@ -220,8 +220,6 @@ HARDLY_ANY = 0.2
 LEAST_LIKENESS = 0.75
 BAD_LIKENESS = 0.4
 IMPOSSIBLE_LIKENESS = 0.3
-# Correlation of their red less blue, in pairs of which one has both exchanged; right pairs: 0.4 and more.
-OPPOSITE, SURELY_OPPOSITE = -0.5, -0.8
 # Nothing is said of a recording with fewer pairs or points.
 FEWEST_PAIRS = 2
 FEWEST_IN_ALL = 150
@@ -258,9 +256,3 @@ def unlike(found: Agreement) -> bool:
         return False
     bad = int((found.alike < BAD_LIKENESS).sum())
     return found.likeness < LEAST_LIKENESS or (bad >= 2 and bad > MOST_BAD_PAIRS * np.isfinite(found.alike).sum())
-
-
-def opposite_pairs(alike: Float[np.ndarray, " p"]) -> int:
-    """Return in how many pairs red and blue are exchanged, given how their red less blue correlates."""
-    count = int((alike < OPPOSITE).sum())
-    return count if count > 1 or bool((alike < SURELY_OPPOSITE).any()) else 0

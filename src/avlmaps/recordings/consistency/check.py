@@ -19,8 +19,7 @@ from avlmaps.core.wording import option
 from avlmaps.recordings.channels import level_faults
 from avlmaps.recordings.consistency import agreement as limits
 from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, Agreement, compare, without_occluded
-from avlmaps.recordings.consistency.flats import Flats
-from avlmaps.recordings.consistency.readings import LEAST_OFF, Reading, Trial, Trials, cause_of, find_cause, find_closer
+from avlmaps.recordings.consistency.readings import LEAST_OFF, Trial, Trials, cause_of, find_cause, find_closer
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.memory import is_of_program
 from avlmaps.recordings.types import Recording
@@ -153,9 +152,6 @@ MOST_SPEED_M_S, _LEAST_JUMP_M = 4.0, 0.5
 _NEAR_IN_TIME_S = 1.0
 # With poses of fewer frames, or on several clocks, much of the drive is not in the map.
 _LEAST_POSED = 0.75
-_RATES_HZ = (8_000, 11_025, 16_000, 22_050, 24_000, 32_000, 44_100, 48_000, 96_000)
-# How far a ratio of lengths may be off one of rates; lengths within a fifth say nothing of it.
-_AS_LONG, _LIKE_ONE, _SHORTEST_DRIVE_S = 0.02, 0.8, 1.0
 _CENTRE_MARGIN, _FOCAL_RANGE, _MOST_ASPECT, _AS_IF_EXCHANGED = 0.2, (0.25, 4.0), 1.15, 0.04
 _WORTH_A_TRIAL = 0.75  # of the least differences that another reading explains: those of all points are smaller
 _STANDS = 0.01  # steps between poses that are one
@@ -231,11 +227,6 @@ class Evidence:
             return (), ()
 
     @cached_property
-    def flats(self) -> Flats:
-        """Flat surfaces of single frames, where lenses show."""
-        return Flats.of(self.sample)
-
-    @cached_property
     def trials(self) -> Trials:
         """Tries other readings."""
         return Trials(self.recording, self.sample)
@@ -251,9 +242,6 @@ class Evidence:
         best = self.cause
         if best is None:
             return ""
-        if best.reading == Reading(focal=best.reading.focal):
-            for lens in findings_of((LENS,), self):  # another focal length moves what it bends; flat stays flat
-                return str(lens)
         return cause_of(best.reading, self.recording, self.median_m, self._gain(best))
 
     def _explains(self, trial: Trial) -> bool:
@@ -277,24 +265,6 @@ class Evidence:
             )
         then = best.after if unlike is self.after else best.apart
         return f"(correlation {unlike.likeness:.2f} -> {then.likeness:.2f})"
-
-
-def _lens(evidence: Evidence) -> Iterator[Said]:
-    if (found := evidence.flats.lens()) is not None:
-        k1, corner = found
-        yield Said(
-            "Flat surfaces are curved in the depth of single frames as behind a wide lens: things lie about "
-            f"{corner:.0%} farther out at the corners of the pictures than a pinhole's numbers say, by "
-            f"{len(evidence.flats.bend)} surfaces (k1 about {k1:.2g})."
-        )
-
-
-LENS = Suspicion(
-    Reason.INTRINSICS,
-    _lens,
-    "Take the distortion of the lens out of the colour and the depth pictures, and give the intrinsics of the new "
-    "pictures; else walls are bent in the map.",
-)
 
 
 def _unlike(after: Agreement, apart: Agreement) -> Agreement | None:
@@ -449,19 +419,6 @@ def _pace(evidence: Evidence) -> Iterator[Said]:
         )
 
 
-def _other_rate(evidence: Evidence) -> Iterator[Said]:
-    track, drive_s = evidence.recording.audio, evidence.recording.duration_s
-    if track is None or drive_s < _SHORTEST_DRIVE_S or _LIKE_ONE < track.duration_s / drive_s < 1.0 / _LIKE_ONE:
-        return
-    longer, late_s = track.duration_s / drive_s, track.start_s - float(evidence.recording.stamps_s[0])
-    meant = [hz for hz in _RATES_HZ if hz != track.rate_hz and abs(longer * track.rate_hz / hz - 1.0) < _AS_LONG]
-    if meant and abs(late_s) < _AS_LONG * drive_s:
-        as_if = f"as if {meant[0]} samples a second were called {track.rate_hz}"
-        again = f"write {track.label or track.path.name} again with its true rate"
-        remedy = f"If so, {again}; else its sounds lie at wrong places."
-        yield Said(f"The sound lasts {track.duration_s:.1f} s and the drive {drive_s:.1f} s, {as_if}.", remedy)
-
-
 def _silent(evidence: Evidence) -> Iterator[Said]:
     return map(Said, evidence.level_faults[0])
 
@@ -565,7 +522,6 @@ _DOOR = (
         "What they show is not in the map: check that pictures and poses are of one drive and one clock.",
     ),
     Suspicion(Reason.MOTION, _pace, "Check the poses, the intrinsics and the depth unit."),
-    Suspicion(Reason.SOUND, _other_rate),
     Suspicion(
         Reason.SOUND,
         _silent,

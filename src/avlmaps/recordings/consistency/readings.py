@@ -11,7 +11,7 @@ from jaxtyping import Float
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.consistency.agreement import APART_SAME_M, NOTHING, SAME_M, Agreement, compare
-from avlmaps.recordings.consistency.sample import Sample, Surfaces, small_frame
+from avlmaps.recordings.consistency.sample import Sample, Surfaces, small_depth
 from avlmaps.recordings.corrections import (
     NAMED,
     NONE,
@@ -20,7 +20,6 @@ from avlmaps.recordings.corrections import (
     GivenCamera,
     PoseKind,
     all_axes,
-    opencv_from_axes,
     reread_poses,
     uncorrected,
 )
@@ -40,7 +39,6 @@ TURNS: dict[Turn, str] = {
 }
 UNITS = (0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.1, 10.0, 0.01, 100.0, 0.001, 1000.0)
 _SCALES = (0.87, 1.15, 0.8, 1.25, 0.63, 1.6, 0.4, 2.5, *UNITS)
-_FARTHER_M = (-0.3, -0.15, 0.15, 0.3)
 _OFF_CENTRE, _BESIDE_CENTRE = (-0.12, -0.06, 0.06, 0.12), (-0.03, 0.0, 0.03)
 _FOCAL = (0.5, 0.67, 0.8, 0.9, 1.12, 1.25, 1.5, 2.0)
 _DELAYS_S = tuple(sign * step / 20.0 for step in range(1, 21) for sign in (1.0, -1.0))
@@ -71,10 +69,9 @@ class Reading:
         focal: factor of the focal lengths.
         off_centre: by how much the principal point lies to the right and below, as shares of the picture.
         centred: whether the principal point is put into the middle, with the focal length in proportion.
-        turn_colour: how colour pictures are turned.
-        turn_depth: how depth pictures are turned.
+        turn: how pictures are turned.
+        turned: which.
         along_ray: whether the depth is the distance along the ray.
-        farther_m: what is added to the depth before it is scaled.
         depth_late: by how many frames depth pictures come after what they belong to.
     """
 
@@ -83,14 +80,16 @@ class Reading:
     focal: float = 1.0
     off_centre: tuple[float, float] = (0.0, 0.0)
     centred: bool = False
-    turn_colour: Turn | None = None
-    turn_depth: Turn | None = None
+    turn: Turn = (False, 0)
+    turned: tuple[str, ...] = ()
     along_ray: bool = False
-    farther_m: float = 0.0
     depth_late: int = 0
 
 
 AS_IT_IS = Reading()
+_SCALED = tuple(Reading(scale=scale) for scale in _SCALES)
+_FOCUSED = tuple(Reading(focal=factor) for factor in _FOCAL)
+_SHIFTED = tuple(Reading(off_centre=at) for by in _OFF_CENTRE for at in ((by, 0.0), (0.0, by)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,12 +127,12 @@ class Trials:
         self.recording, self.sample = recording, sample.only(np.concatenate(few))
         self.given = recording.given if isinstance(recording, CorrectedRecording) else NONE
         self.pace_s = float(np.median(np.diff(recording.stamps_s))) if len(recording) > 1 else 0.0
-        self._delayed, self._late = cache(self._poses_at), cache(self._depths_of)
-        self._measured, self._pairs = cache(self._measured_so), cache(self._pairs_of)
+        # what is the same for many readings is kept
+        self._delayed, self._late, self._pictures = cache(self._poses_at), cache(self._depths_of), cache(self._read_so)
         known = sample.depth_m[sample.depth_m > 0.0]
         self.median_m = float(np.median(known)) if len(known) else 1.0
-        depth = self._measured(AS_IT_IS)
-        self._points = max(int(depth[1].there[self.sample.pairs[:, 0]].sum()), 1) if depth else 1
+        there = Surfaces.of(self.sample.depth_m, _POINTS).there
+        self._points = max(int(there[self.sample.pairs[:, 0]].sum()), 1)
         self._compared = int(_LEAST_COMPARED * self._points)
         as_it_is = self.run(AS_IT_IS, colour=False)
         seen = int(as_it_is.after.points.sum() + as_it_is.apart.points.sum())
@@ -148,15 +147,13 @@ class Trials:
         """
         given = reading.given.over(self.given)
         pose, rig = self._delayed(given.pose_delay_s or 0.0), rig_of(self.sample.rig, reading)
-        # what is the same for many readings is kept
-        stored = replace(AS_IT_IS, **{name: getattr(reading, name) for name in _OF_PICTURES})
-        pairs, depth = self._pairs(stored), self._measured(replace(stored, turn_colour=None))
-        if rig is None or pose is None or pairs is None or depth is None:
+        seen = self._pictures(replace(AS_IT_IS, **{name: getattr(reading, name) for name in _OF_PICTURES}))
+        if rig is None or pose is None or seen is None:
             return Trial(reading, NOTHING, NOTHING, 0.0)
-        pose, median_m = reread_poses(pose, given), self.median_m * reading.scale
+        (sample, surfaces), pose, median_m = seen, reread_poses(pose, given), self.median_m * reading.scale
         after, apart = (
-            compare(kind, depth[1], pose, rig, reading.scale, floor * median_m, colour=colour)
-            for kind, floor in zip(pairs, (_FLOOR_SHARE, _APART_FLOOR_SHARE), strict=True)
+            compare(sample.only(kind), surfaces, pose, rig, reading.scale, floor * median_m, colour=colour)
+            for kind, floor in ((sample.follows, _FLOOR_SHARE), (~sample.follows, _APART_FLOOR_SHARE))
         )
         return Trial(reading, after, apart, self._score(after, apart))
 
@@ -174,32 +171,24 @@ class Trials:
         if len(np.unique(rows)) < 0.5 * len(rows):
             return None
         try:
-            depths = [small_frame(self.recording.frame(int(row)), self.sample.rig)[0] for row in rows]
+            depths = [small_depth(self.recording.frame(int(row)), self.sample.rig) for row in rows]
         except RecordingError:
             return None
         depths_m: Float[np.ndarray, "f h w"] = np.stack(depths)
         depths_m[self.sample.index + late != rows] = 0.0  # beyond the ends nothing is known
         return depths_m
 
-    def _measured_so(self, reading: Reading) -> tuple[Float[np.ndarray, "f h w"], Surfaces] | None:
-        depth_m = self._late(reading.depth_late)
+    def _read_so(self, reading: Reading) -> tuple[Sample, Surfaces] | None:
+        depth_m, grey = self._late(reading.depth_late), self.sample.grey
         if depth_m is None:
             return None
-        if reading.turn_depth is not None:
-            depth_m = _turned(depth_m, reading.turn_depth)
+        if "depth" in reading.turned:
+            depth_m = _turned(depth_m, reading.turn)
         if reading.along_ray:
             depth_m = (depth_m / np.linalg.norm(self.sample.rig.depth.rays(), axis=2)).astype(np.float32)
-        if reading.farther_m:
-            depth_m = np.where(depth_m > 0.0, depth_m + np.float32(reading.farther_m), depth_m)
-        return depth_m, Surfaces.of(depth_m, _POINTS)
-
-    def _pairs_of(self, reading: Reading) -> tuple[Sample, Sample] | None:
-        depth, grey = self._measured(replace(reading, turn_colour=None)), self.sample.grey
-        if depth is None:
-            return None
-        grey = grey if reading.turn_colour is None else _turned(grey, reading.turn_colour)
-        sample = replace(self.sample, depth_m=depth[0], grey=grey)
-        return sample.only(sample.follows), sample.only(~sample.follows)
+        if "colour" in reading.turned:
+            grey = _turned(grey, reading.turn)
+        return replace(self.sample, depth_m=depth_m, grey=grey), Surfaces.of(depth_m, _POINTS)
 
     def _score(self, after: Agreement, apart: Agreement) -> float:
         compared = max(int(after.points.sum() + apart.points.sum()), self._compared, 1)
@@ -209,7 +198,7 @@ class Trials:
         return score
 
 
-_OF_PICTURES = ("turn_colour", "turn_depth", "along_ray", "farther_m", "depth_late")
+_OF_PICTURES = ("turn", "turned", "along_ray", "depth_late")
 
 
 def _turned(pictures: Float[np.ndarray, "f h w"], turn: Turn) -> Float[np.ndarray, "f h w"]:
@@ -246,7 +235,7 @@ def rig_of(rig: Rig, reading: Reading) -> Rig | None:
 
 
 def find_closer(trials: Trials) -> Trial | None:
-    """Return the scale, offset, delay or camera with which depths differ clearly less; None without one.
+    """Return the scale, delay or camera with which depths differ clearly less; None without one.
 
     With a slow camera, points stay within the tolerance of a surface in spite of such a mistake; their differences show
     it, and people who walk by do not change that.
@@ -254,7 +243,7 @@ def find_closer(trials: Trials) -> Trial | None:
     as_it_is = trials.run(AS_IT_IS, colour=False)
     if not LEAST_OFF < as_it_is.off < float("inf"):
         return None
-    readings = (*_scales(), *_farther(), *_delays(trials.pace_s), *_focal(), *_off_centre())
+    readings = (*_SCALED, *_delays(trials.pace_s), *_FOCUSED, *_SHIFTED)
     tried = (trials.run(reading, colour=False) for reading in readings)
     closer = [trial for trial in tried if _is_less_off(trial, as_it_is)]
     if not closer:
@@ -334,23 +323,12 @@ def _single(trials: Trials) -> Iterator[Reading]:
         yield Reading(Corrections(camera_axes="opencv"))
     yield from (Reading(Corrections(poses=kinds)) for kinds in _POSES)
     yield from (Reading(Corrections(camera_axes=name)) for name in NAMED if name != "opencv")
-    yield from _scales()
-    yield Reading(centred=True)
-    yield from _focal()
+    yield from (*_SCALED, Reading(centred=True), *_FOCUSED)
     yield from _delays(trials.pace_s)
     yield from (Reading(Corrections(camera_axes=axes)) for axes in all_axes() if axes not in NAMED.values())
     yield Reading(along_ray=True)
-    yield from (Reading(turn_colour=turn) for turn in TURNS)
-    yield from (Reading(turn_depth=turn) for turn in TURNS)
-    yield from (Reading(turn_colour=turn, turn_depth=turn) for turn in TURNS)
-
-
-def _scales() -> Iterator[Reading]:
-    return (Reading(scale=scale) for scale in _SCALES)
-
-
-def _farther() -> Iterator[Reading]:
-    return (Reading(farther_m=by_m) for by_m in _FARTHER_M)
+    for turned in (("colour",), ("depth",), ("colour", "depth")):
+        yield from (Reading(turn=turn, turned=turned) for turn in TURNS)
 
 
 def _delays(pace_s: float) -> Iterator[Reading]:
@@ -359,16 +337,8 @@ def _delays(pace_s: float) -> Iterator[Reading]:
     return (Reading(Corrections(pose_delay_s=round(delay_s, 3))) for delay_s in delays_s)
 
 
-def _focal() -> Iterator[Reading]:
-    return (Reading(focal=factor) for factor in _FOCAL)
-
-
-def _off_centre() -> Iterator[Reading]:
-    return (Reading(off_centre=at) for by in _OFF_CENTRE for at in ((by, 0.0), (0.0, by)))
-
-
 def _refined(trials: Trials, best: Trial) -> Trial:
-    """Return the delay, scale, camera or offset near the best at which depths differ least."""
+    """Return the delay, scale or camera near the best at which depths differ least."""
     reading, tried = best.reading, list[Reading]()
     if delay_s := reading.given.pose_delay_s:
         around_s = (round(float(s), 3) for s in delay_s + np.arange(-4, 5) / 100.0)
@@ -378,8 +348,6 @@ def _refined(trials: Trials, best: Trial) -> Trial:
         tried = [replace(reading, scale=float(scale)) for scale in (*_SCALES, *fine.tolist())]
     elif reading.focal != 1.0:
         tried = [replace(reading, focal=float(reading.focal * factor)) for factor in np.geomspace(0.88, 1.14, 9)]
-    elif reading.farther_m:
-        tried = [replace(reading, farther_m=reading.farther_m + by_m) for by_m in (-0.1, -0.05, 0.05, 0.1)]
     elif any(reading.off_centre):
         at_x, at_y = reading.off_centre
         tried = [replace(reading, off_centre=(at_x + x, at_y + y)) for x, y in product(_BESIDE_CENTRE, repeat=2)]
@@ -397,12 +365,15 @@ USUAL_DEPTH_M = (0.4, 7.0)
 _CLOSE = 0.06
 # Depth cameras that are not calibrated are off by this factor; more is another unit, or positions without a scale.
 _SLIGHT = 1.2
-# What poses look like, and what a program gives in their place.
 _KINDS = {
-    PoseKind.WXYZ: ("the quaternions look written w first (wxyz)", "poses of quaternions x, y, z, w"),
-    PoseKind.CAMERA_FROM_WORLD: ("the poses look like camera_from_world", "the inverse of each pose"),
-    PoseKind.WORLD_FROM_CAMERA: ("the poses look like world_from_camera", "each pose as it is"),
+    PoseKind.WXYZ: "the quaternions look written w first (wxyz)",
+    PoseKind.CAMERA_FROM_WORLD: "the poses look like camera_from_world",
+    PoseKind.WORLD_FROM_CAMERA: "the poses look like world_from_camera",
 }
+_OF_PROGRAM = (
+    "give frames with world_from_camera of an OpenCV camera (x right, y down, z forward), depth_m in metres along its "
+    "axis, the camera of these pictures, and stamps of one clock"
+)
 _CAMERAS = {"opengl": "an OpenGL camera (y up, z back)", "ros": "a body (x forward)", "opencv": "an OpenCV camera"}
 
 
@@ -419,7 +390,7 @@ def cause_of(reading: Reading, recording: Recording, median_m: float, gain: str 
     looks, todo = " and ".join(look for look, _ in told), [by_hand for _, by_hand in told if by_hand]
     if options := _options(reading, recording, median_m):
         if is_of_program(recording):
-            todo.insert(0, f"give frames with {' and '.join(_in_arrays(options, reading.scale))}")
+            todo.insert(0, _OF_PROGRAM)
         else:
             todo.insert(0, f"build again with {options.words()}")
     return f"{looks[:1].upper()}{looks[1:]}{' ' * bool(gain)}{gain}: {', '.join(todo)}."
@@ -428,7 +399,7 @@ def cause_of(reading: Reading, recording: Recording, median_m: float, gain: str 
 def _told(reading: Reading, rig: Rig, median_m: float) -> Iterator[tuple[str, str]]:
     """Yield what a recording looks like, and what is to be done where no option does it."""
     given, camera = reading.given, rig.depth
-    yield from ((_KINDS[kind][0], "") for kind in given.poses)
+    yield from ((_KINDS[kind], "") for kind in given.poses)
     if (axes := given.camera_axes) is not None:
         other = f"a camera with the axes {axes} (turned pictures, or another convention)"
         yield f"the poses look like those of {_CAMERAS.get(axes, other)}", ""
@@ -449,23 +420,15 @@ def _told(reading: Reading, rig: Rig, median_m: float) -> Iterator[tuple[str, st
 
 
 def _told_of_pictures(reading: Reading) -> Iterator[tuple[str, str]]:
-    if farther_m := reading.farther_m:
-        large = "large" if farther_m < 0.0 else "small"
-        by_hand = f"write the depth from the camera's centre ({farther_m:+.2g} m)"
-        yield f"the depth looks {abs(farther_m):.2g} m too {large} everywhere", by_hand
     if late := reading.depth_late:
         by_hand = f"pair each frame with the depth picture {abs(late)} {'later' if late > 0 else 'earlier'}"
         yield f"the depth pictures look {abs(late)} frame(s) {_late(late)}", by_hand
     if reading.along_ray:
         by_hand = "write the depth along the camera's axis (z)"
         yield "the depth looks like the distance along the ray, not along the camera's axis", by_hand
-    colour, depth = reading.turn_colour, reading.turn_depth
-    if colour is not None and colour == depth:
-        yield f"the pictures look {TURNS[colour]}", "turn the pictures as the poses have them"
-        return
-    for what, turn, as_is in (("colour", colour, "depth"), ("depth", depth, "colour")):
-        if turn is not None:
-            yield f"the {what} pictures look {TURNS[turn]}", f"turn the {what} pictures as the {as_is} is"
+    if reading.turned:
+        what = " and ".join(reading.turned)
+        yield f"the {what} pictures look {TURNS[reading.turn]}", f"turn the {what} pictures back"
 
 
 def _late(by: float) -> str:
@@ -508,19 +471,3 @@ def _options(reading: Reading, recording: Recording, median_m: float) -> Correct
     axes = next((name for name, letters in NAMED.items() if letters == given.camera_axes), given.camera_axes)
     unit_m = recording.stored_depth_unit_m * reading.scale if of_depth else None
     return replace(given, depth_unit_m=unit_m, intrinsics=cameras, camera_axes=axes)
-
-
-def _in_arrays(options: Corrections, scale: float) -> list[str]:
-    said = [_KINDS[kind][1] for kind in options.poses]
-    if options.depth_unit_m is not None:
-        said.append(f"depth_m times {scale:.3g}")
-    if options.intrinsics:
-        words = Corrections(intrinsics=options.intrinsics).words(lambda _, value: value)
-        said.append(f"a camera of fx, fy, cx, cy {words}")
-    if options.camera_axes is not None:
-        turn = opencv_from_axes(options.camera_axes).T.astype(int).tolist()
-        said.append(f"poses of OpenCV's axes, world_from_camera[:3, :3] @ {turn}")
-    if options.pose_delay_s:
-        when = "later" if options.pose_delay_s > 0.0 else "earlier"
-        said.append(f"the pose of {abs(options.pose_delay_s):.2g} s {when}")
-    return said

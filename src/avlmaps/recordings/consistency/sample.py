@@ -1,6 +1,5 @@
 """A few frames of a recording at low resolution, and which of them see the same place: what the check looks at."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,12 +23,8 @@ NO_STEP = 5.0
 APART = 12
 APART_M, APART_RAD = 0.7, np.radians(25.0)
 JUMPS = 4
-# Of pairs across a place where a recording is parted: a point this far ahead of each camera lies in the other's view.
-ACROSS, AHEAD_M, VIEW_RAD, ACROSS_RAD = 8, 2.0, np.radians(22.0), np.radians(70.0)
 # A step this many times the usual one is a jump that is looked at.
 JUMP_RATIO = 4.0
-# Where a recording is parted: the longest times without a frame, this many times the usual pace and this long.
-_MOST_GAPS, _GAP, _GAP_S = 3, 10.0, 2.0
 # A step of the poses this many times the usual one, and beyond this, is odd.
 _ODD_STEP, _ODD_STEP_M, _ODD_STEP_RAD = 4.0, 0.15, np.radians(8.0)
 # Red differs from blue by more than this share of the brightest of the three, or of this brightness (of 255).
@@ -52,7 +47,6 @@ class Sample:
         world_from_camera: (f, 4, 4) poses as they are read.
         depth_m: (f, h, w) z-depth, 0 where there is none.
         grey: (f, hc, wc) brightness, 0 to 255.
-        redness: (f, hc, wc) red less blue, -255 to 255.
         warmth: (f,) share of pixels that are redder than blue less the share that are bluer than red.
         rig: the cameras at these sizes.
         pairs: (p, 2) rows of frames that should see the same place, the earlier first.
@@ -65,7 +59,6 @@ class Sample:
     world_from_camera: Float[np.ndarray, "f 4 4"]
     depth_m: Float32[np.ndarray, "f h w"]
     grey: Float32[np.ndarray, "f hc wc"]
-    redness: Float32[np.ndarray, "f hc wc"]
     warmth: Float[np.ndarray, " f"]
     rig: Rig
     pairs: Int[np.ndarray, "p 2"]
@@ -96,11 +89,7 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
     index = np.unique(pairs) if len(pairs) else np.arange(min(len(recording), 1))
     whole = recording.rig
     rig = Rig(_small(whole.rgb), _small(whole.depth), whole.rgb_from_depth)
-    read: list[int] = []
-    depth: list[np.ndarray] = []
-    grey: list[np.ndarray] = []
-    redness: list[np.ndarray] = []
-    warmth: list[float] = []
+    seen: dict[int, tuple[np.ndarray, np.ndarray, float]] = {}
     fault: RecordingError | None = None
     for number in index.tolist():
         try:
@@ -108,33 +97,31 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
         except RecordingError as error:
             fault = error
             continue
-        read.append(number)
-        depth.append(_nearest(frame.depth_m, rig.depth))
-        bright, red, warm = _colour(frame.rgb, rig.rgb)
-        grey.append(bright)
-        redness.append(red)
-        warmth.append(warm)
-    if not read:
+        seen[number] = small_depth(frame, rig), *_colour(frame.rgb, rig.rgb)
+    if not seen:
         raise fault or RecordingError(f"{recording.path} has no frame; there is nothing to check.")
+    read, (depth, grey, warmth) = np.array(list(seen)), zip(*seen.values(), strict=True)
     kept = np.isin(pairs, read).all(axis=1)
     return Sample(
-        index=np.array(read),
+        index=read,
         stamps_s=recording.stamps_s[read],
         world_from_camera=recording.world_from_camera[read],
         depth_m=np.stack(depth),
         grey=np.stack(grey),
-        redness=np.stack(redness),
         warmth=np.array(warmth),
         rig=rig,
-        pairs=np.searchsorted(np.array(read), pairs[kept]),
+        pairs=np.searchsorted(read, pairs[kept]),
         follows=follows[kept],
         unread=len(index) - len(read),
     )
 
 
-def small_frame(frame: Frame, rig: Rig) -> tuple[Float32[np.ndarray, "h w"], Float32[np.ndarray, "hc wc"]]:
-    """Return the depth and the brightness of a frame at the size of a sample's cameras."""
-    return _nearest(frame.depth_m, rig.depth), _colour(frame.rgb, rig.rgb)[0]
+def small_depth(frame: Frame, rig: Rig) -> Float32[np.ndarray, "h w"]:
+    """Return the depth of a frame at the size of a sample's cameras."""
+    camera, (rows, columns) = rig.depth, frame.depth_m.shape
+    row = ((np.arange(camera.height) + 0.5) * rows / camera.height).astype(int)
+    column = ((np.arange(camera.width) + 0.5) * columns / camera.width).astype(int)
+    return frame.depth_m[row[:, None], column]
 
 
 def choose_pairs(pose: Float[np.ndarray, "n 4 4"]) -> tuple[Int[np.ndarray, "p 2"], Bool[np.ndarray, " p"]]:
@@ -186,34 +173,12 @@ def _apart(pose: Float[np.ndarray, "n 4 4"]) -> list[tuple[int, int]]:
         off = np.abs(np.log(away_m / APART_M))
     off[(ahead < least) | (upright < least) | np.tri(len(rows), dtype=bool)] = np.inf
     off += 0.2 * np.abs(np.subtract.outer(rows, rows)) / len(pose)  # of pairs as far apart, the sooner ones
-    near = max(1, len(rows) // (3 * APART))
-    return [(int(rows[a]), int(rows[b])) for a, b in _least(off, APART, near, len(rows))]
-
-
-def _least(off: Float[np.ndarray, "a b"], count: int, near_a: int, near_b: int) -> Iterator[tuple[int, int]]:
-    """Yield where a table is least, each time beyond so many rows and columns around those before; it is changed."""
-    for _ in range(count if off.size else 0):
+    near, found = max(1, len(rows) // (3 * APART)), list[tuple[int, int]]()
+    while len(found) < APART and np.isfinite(off).any():  # each time beyond the rows around those before
         a, b = (int(i) for i in np.unravel_index(int(np.argmin(off)), off.shape))
-        if not np.isfinite(off[a, b]):
-            return
-        yield a, b
-        off[max(0, a - near_a) : a + near_a + 1, max(0, b - near_b) : b + near_b + 1] = np.inf
-
-
-def pairs_across(pose: Float[np.ndarray, "n 4 4"], at: int) -> Int[np.ndarray, "p 2"]:
-    """Return pairs of a frame up to ``at`` and a later one that look at one place, as far as poses say so."""
-    rows = [np.unique(np.linspace(*ends, min(ends[1] - ends[0] + 1, 120)).round().astype(int)) for ends in
-            ((0, at), (at + 1, len(pose) - 1))]  # fmt: skip
-    (place, ahead), (others, others_ahead) = ((pose[some, :3, 3], pose[some, :3, 2]) for some in rows)
-    spot, others_spot = place + AHEAD_M * ahead, others + AHEAD_M * others_ahead
-    off_m = np.linalg.norm(spot[:, None] - others_spot[None], axis=-1)
-    to_other, to_one = others_spot[None] - place[:, None], spot[:, None] - others[None]
-    seen = np.einsum("abi,ai->ab", to_other, ahead) >= np.cos(VIEW_RAD) * np.linalg.norm(to_other, axis=-1)
-    seen &= np.einsum("abi,bi->ab", to_one, others_ahead) >= np.cos(VIEW_RAD) * np.linalg.norm(to_one, axis=-1)
-    off_m[~seen | (ahead @ others_ahead.T < np.cos(ACROSS_RAD))] = np.inf
-    near = [max(1, len(some) // (2 * ACROSS)) for some in rows]
-    found = [(rows[0][a], rows[1][b]) for a, b in _least(off_m, ACROSS, *near)]
-    return np.array(found, np.int64).reshape(-1, 2)
+        found.append((int(rows[a]), int(rows[b])))
+        off[max(0, a - near) : a + near + 1, :] = np.inf
+    return found
 
 
 def steps_between(one: Float[np.ndarray, "4 4"], others: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, " n"]:
@@ -226,22 +191,6 @@ def steps_between_all(pose: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, " m
     """Return how far each camera is from the one before, in steps."""
     away_m = np.linalg.norm(np.diff(pose[:, :3, 3], axis=0), axis=1)
     return away_m / STEP_M + rotation_angle_rad(pose[:-1], pose[1:]) / STEP_RAD
-
-
-def gaps(recording: Recording) -> list[int]:
-    """Return the last frames before the longest times without any, the longest first."""
-    apart_s = np.diff(recording.stamps_s)
-    if not len(apart_s):
-        return []
-    long = np.flatnonzero(apart_s > max(_GAP_S, _GAP * float(np.median(apart_s))))
-    return long[np.argsort(-apart_s[long], kind="stable")][:_MOST_GAPS].tolist()
-
-
-def seams(recording: Recording) -> list[int]:
-    """Return the last frames before gaps, and before the step of the poses that is oddest."""
-    odd, step = odd_steps(recording), steps_between_all(recording.world_from_camera)
-    oddest = [int(np.argmax(np.where(odd, step, 0.0)))] if odd.any() else []
-    return list(dict.fromkeys([*gaps(recording), *oddest]))
 
 
 def odd_steps(recording: Recording) -> Bool[np.ndarray, " m"]:
@@ -260,23 +209,14 @@ def _small(camera: Pinhole) -> Pinhole:
     return camera.resized(width, max(1, round(camera.height * width / camera.width)))
 
 
-def _nearest(depth_m: Float32[np.ndarray, "h w"], camera: Pinhole) -> Float32[np.ndarray, "hs ws"]:
-    row = ((np.arange(camera.height) + 0.5) * depth_m.shape[0] / camera.height).astype(int)
-    column = ((np.arange(camera.width) + 0.5) * depth_m.shape[1] / camera.width).astype(int)
-    return depth_m[row[:, None], column]
-
-
-def _colour(
-    rgb: np.ndarray, camera: Pinhole
-) -> tuple[Float32[np.ndarray, "hs ws"], Float32[np.ndarray, "hs ws"], float]:
+def _colour(rgb: np.ndarray, camera: Pinhole) -> tuple[Float32[np.ndarray, "hs ws"], float]:
     import cv2
 
     small = cv2.resize(rgb, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
     colours = small.astype(np.float32)
-    redness = colours[..., 0] - colours[..., 2]
-    hue = redness / np.maximum(colours.max(axis=2), _DIM)
+    hue = (colours[..., 0] - colours[..., 2]) / np.maximum(colours.max(axis=2), _DIM)
     warmth = float((hue > _COLOURED).mean() - (hue < -_COLOURED).mean())
-    return cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32), redness, warmth
+    return cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32), warmth
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,19 +260,11 @@ class Surfaces:
 
 
 def _around(depth_m: Float32[np.ndarray, "f h w"]) -> tuple[np.ndarray, np.ndarray]:
-    near, far = np.zeros_like(depth_m), np.zeros_like(depth_m)
-    height, width = depth_m.shape[1:]
-    if min(height, width) < 3:
-        return near, far
-    low, high = np.full((len(depth_m), height - 2, width - 2), np.inf, np.float32), np.zeros(1, np.float32)
-    count = np.zeros(low.shape, np.uint8)
-    for i in (-1, 0, 1):
-        for j in (-1, 0, 1):
-            one = depth_m[:, 1 + i : height - 1 + i, 1 + j : width - 1 + j]
-            low = np.minimum(low, np.where(one > 0.0, one, np.inf))
-            high = np.maximum(high, one)
-            count += one > 0.0
-    enough = count >= _FEWEST_AROUND
-    near[:, 1:-1, 1:-1] = np.where(enough, low, 0.0)
-    far[:, 1:-1, 1:-1] = np.where(enough, high, 0.0)
-    return near, far
+    from scipy.ndimage import maximum_filter, minimum_filter, uniform_filter
+
+    size, known = (1, 3, 3), depth_m > 0.0
+    share = uniform_filter(known.astype(np.float32), size, mode="constant")
+    enough = np.rint(9.0 * share) >= _FEWEST_AROUND
+    enough[:, [0, -1]] = enough[:, :, [0, -1]] = False
+    low = minimum_filter(np.where(known, depth_m, np.float32(np.inf)), size)
+    return np.where(enough, low, np.float32(0.0)), np.where(enough, maximum_filter(depth_m, size), np.float32(0.0))
