@@ -31,7 +31,7 @@ CHUNK_S = 0.1
 
 def clock(apart_s: float = 0.0, start_s: float = 100.0) -> PictureClock:
     received_s = np.arange(start_s, start_s + 10.0, 0.1)
-    return PictureClock(received_s, received_s + apart_s, start_s + apart_s)
+    return PictureClock.of(received_s * 1e9, received_s + apart_s, start_s + apart_s)
 
 
 def beep_at(times_s: np.ndarray, content: np.ndarray, header: bool = False) -> SoundTopic:

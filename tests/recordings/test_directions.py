@@ -80,13 +80,13 @@ def test_directions_without_a_sound_are_left_out_with_a_notice(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("stamp_s,azimuth_rad\n0,0.1\n0,0.2\n", "row 2 has the stamp 0 s after 0 s; stamps must rise"),
+        ("stamp_s,azimuth_rad\n0,0.1\n0,0.2\n", "stamp of row 2 is 0, not after the one before; stamps must rise"),
         ("stamp_s,azimuth_rad\n1,0.1\n0.5,0.2\n", "stamps must rise"),
-        ("stamp_s,azimuth_rad\n0,nan\n", "azimuth of row 1 is NaN"),
-        ("stamp_s,azimuth_rad\ninf,0\n", "stamp of row 1 is NaN or infinite"),
+        ("stamp_s,azimuth_rad\n0,nan\n", "azimuth of row 1 is nan, which is NaN"),
+        ("stamp_s,azimuth_rad\ninf,0\n", "stamp of row 1 is inf, which is NaN or infinite"),
         ("stamp_s,azimuth_rad\n0,1\n1,270\n", "azimuth of row 2 is 270, .* look like degrees"),
         ("stamp_s,azimuth_rad,elevation_rad\n0,1,30\n", "elevation of row 1 is 30, .* look like degrees"),
-        ("stamp_s,azimuth_rad,confidence\n0,1,1.5\n", "confidence of row 1 is 1.5; it must be from 0 to 1"),
+        ("stamp_s,azimuth_rad,confidence\n0,1,1.5\n", "confidence of row 1 is 1.5, and it must be from 0 to 1"),
         ("stamp_s,azimuth_rad\n0,x\n", "row 1: '0,x' is not 2 numbers"),
         ("stamp_s,azimuth_rad\n0.7\n", "row 1: '0.7' is not 2 numbers"),
         ("stamp_s,azimuth_rad\n0,1,2\n", "row 1: '0,1,2' is not 2 numbers"),

@@ -11,7 +11,7 @@ from recording_scenes import CAMERA, pose_line, save_depth, shot, shots, write_f
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.formats.file_recording import natural_key
-from avlmaps.recordings.formats.tables import POSE, named_order, read_table, split_header
+from avlmaps.recordings.formats.tables import POSE, named_order, read_table, split_fields
 from avlmaps.recordings.open import open_recording
 
 # How others call the eight columns of a pose.
@@ -51,8 +51,8 @@ def test_a_comment_that_names_no_columns_is_none(tmp_path: Path) -> None:
 
 
 def test_units_in_a_header_are_followed() -> None:
-    order = named_order(split_header("#timestamp [ns],tx_mm,ty_mm,tz [cm],qx,qy,qz,qw"), POSE)
-    assert order.applied(np.ones((1, 8)))[0] == pytest.approx([1e-9, 1e-3, 1e-3, 1e-2, 1, 1, 1, 1])
+    _, factors = named_order(split_fields("#timestamp [ns],tx_mm,ty_mm,tz [cm],qx,qy,qz,qw"), POSE)
+    assert factors == pytest.approx([1e-9, 1e-3, 1e-3, 1e-2, 1, 1, 1, 1])
 
 
 def test_semicolons_and_decimal_commas_are_read(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from test_kinds import write_tone
 
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.recordings import images
-from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
+from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.open import open_recording
 
 
@@ -126,17 +126,6 @@ def test_a_broken_sound_file_is_an_error_and_not_silence(tmp_path: Path, kind: s
         open_recording(path)
 
 
-@pytest.mark.parametrize("suffix", ["wav", "flac", "ogg", "m4a"])
-def test_channels_that_cancel_are_told_and_one_is_used(tmp_path: Path, suffix: str) -> None:
-    file = stereo(tmp_path / f"a.{suffix}", -1.0)
-    track = AudioTrack.open(file)
-    assert "cancel one another" in track.notices[0] and track.channel in (0, 1)
-    assert 0.2 < float(np.abs(track.read(0.5, 1.0).samples).max()) < 0.4
-    assert 0.2 < max(float(np.abs(block.samples).max()) for block in track.blocks()) < 0.4
-    for factor in (1.0, 0.0, 0.5):
-        assert not AudioTrack.open(stereo(tmp_path / f"b.{suffix}", factor)).notices
-
-
 def stereo(path: Path, factor: float) -> Path:
     """Write a tone of two seconds whose second channel is the first one times a factor."""
     import av
@@ -155,14 +144,6 @@ def stereo(path: Path, factor: float) -> Path:
         for packet in [*stream.encode(frame), *stream.encode(None)]:
             container.mux(packet)
     return path
-
-
-def test_the_notice_of_a_track_is_one_of_the_recording(tmp_path: Path) -> None:
-    path = write_folder(tmp_path / "walk")
-    other = stereo(tmp_path / "other.wav", -1.0)
-    assert "cancel" in open_recording(path, audio=other).notices[-1]
-    shutil.copy(other, path / "audio.wav")
-    assert "cancel" in open_recording(path).notices[-1]
 
 
 def test_halved_depth_of_the_same_size_is_another_recording(tmp_path: Path) -> None:
@@ -208,35 +189,6 @@ def test_a_sentence_does_not_quote_a_whole_file(tmp_path: Path) -> None:
     with pytest.raises(RecordingError) as fault:
         open_recording(path)
     assert len(str(fault.value)) < 500 and "does not hold numbers only" in str(fault.value)
-
-
-def test_a_flac_with_far_more_bytes_than_its_samples_take_is_a_sentence(tmp_path: Path) -> None:
-    """A seek in it kept a processor busy for ever: libsndfile looked for samples in all that followed."""
-    path = tmp_path / "audio.flac"
-    write_flac(path, Sound(np.zeros(16_000, np.float32), 16_000))
-    os.truncate(path, (100 << 20) - 1)
-    with path.open("ab") as stream:
-        stream.write(b"x")
-    with pytest.raises(AudioError, match="its length does not fit the sound"):
-        AudioTrack.open(path, 0.0)
-
-
-@pytest.mark.parametrize("suffix", ["flac", "ogg", "mp3", "mka", "webm"])
-def test_a_sound_that_ends_in_zeros_is_a_sentence(tmp_path: Path, suffix: str) -> None:
-    """Their decoders look for the next packet in whatever follows, in 20 GB for minutes."""
-    path = tmp_path / f"a.{suffix}"
-    write_tone(path)
-    assert AudioTrack.open(path).duration_s == pytest.approx(1.0, abs=0.1)
-    os.truncate(path, 20_000_000_000)
-    with pytest.raises(AudioError, match="its end holds zeros only"):
-        AudioTrack.open(path)
-
-
-@pytest.mark.parametrize("suffix", ["wav", "aiff", "caf", "m4a"])
-def test_a_sound_that_says_where_its_samples_lie_may_end_in_zeros(tmp_path: Path, suffix: str) -> None:
-    path = stereo(tmp_path / f"a.{suffix}", 1.0)
-    os.truncate(path, 100 << 20)
-    assert AudioTrack.open(path).duration_s == pytest.approx(2.0, abs=0.1)
 
 
 def test_a_sound_that_ends_in_a_few_zeros_is_read(tmp_path: Path) -> None:

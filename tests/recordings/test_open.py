@@ -48,7 +48,7 @@ def test_a_bag_is_known_by_its_name(tmp_path: Path, name: str):
 def test_a_named_format_is_taken_at_its_word(tmp_path: Path):
     path = write_folder(tmp_path / "walk")
     assert open_recording(path, format="folder").format == "folder"
-    with pytest.raises(RecordingError, match=r"no frame with all of its three files"):
+    with pytest.raises(RecordingError, match=r"no frame with all of colour, depth, pose"):
         open_recording(path, format="7scenes")
 
 
@@ -126,14 +126,13 @@ def test_a_map_is_told_from_a_recording(tmp_path: Path):
 @pytest.mark.parametrize(
     ("names", "sentence"),
     [
-        (("mav0/imu0/data.csv",), "holds measurements of an IMU and no pictures, from which no map can be built"),
-        (("imu0/data.csv", "cam0/data.csv"), "an IMU and cameras without depth, from which no map is built"),
+        (("mav0/imu0/data.csv",), "or measurements of an IMU alone: there is no depth"),
+        (("imu0/data.csv", "cam0/data.csv"), "is of EuRoC's layout"),
         (
             ("frame-000000.color.jpg", "frame-000000.depth.pgm", "_info.txt"),
             "or unpacked by ScanNet's C++ reader: its .depth.pgm is not read",
         ),
         (("images/0.jpg", "sparse/0/cameras.bin"), "is a reconstruction of COLMAP"),
-        (("scene_00_0000.depth", "scene_00_0000.png"), "is ICL-NUIM in POV-Ray's own files"),
     ],
 )
 def test_what_is_recognised_and_not_read_says_why(tmp_path: Path, names: tuple[str, ...], sentence: str):
@@ -145,7 +144,7 @@ def test_what_is_recognised_and_not_read_says_why(tmp_path: Path, names: tuple[s
     ("name", "sentence"),
     [
         ("x.sens", "is ScanNet's packed recording; unpack it with ScanNet's SensReader"),
-        ("x.svo2", "is a recording of a ZED camera, which its own SDK alone reads"),
+        ("x.svo2", "is a packed recording that its own software alone reads"),
         ("x.db", "is no database of RTAB-Map (it is no SQLite file)"),
         ("x.ply", "is a finished model, without the pictures that a map is built from"),
     ],

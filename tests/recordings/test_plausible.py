@@ -4,38 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from recording_scenes import write_folder
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault, plausible_walk, repeat_fault
+from avlmaps.recordings.plausible import date_fault, pace_fault, plausible_walk, repeat_fault
 
 FRAMES_S = np.arange(150) / 30.0
-
-
-@pytest.mark.few(4)
-@pytest.mark.parametrize("rate_hz", [10.0, 30.0, 100.0, 1000.0])
-@pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
-def test_poses_in_another_unit_are_named(rate_hz: float, factor: float, unit: str) -> None:
-    poses_s = np.arange(0.0, 5.0, 1.0 / rate_hz)
-    fault = clock_fault(FRAMES_S, "frames", poses_s * factor, "poses")
-    assert unit in fault and ("the stamps of the poses look like" in fault or "since 1970" in fault)
-    assert not clock_fault(FRAMES_S, "frames", poses_s, "poses")
-
-
-def test_frames_in_milliseconds_are_named_as_well() -> None:
-    fault = clock_fault(FRAMES_S * 1e3, "frames", np.arange(500) / 100, "poses")
-    assert "the stamps of the frames look like milliseconds" in fault
-
-
-@given(st.floats(0.0, 1e9), st.floats(1.0, 3000.0), st.floats(0.5, 1000.0), st.floats(2.0, 3600.0))
-def test_streams_in_seconds_are_never_refused(start_s: float, rate_hz: float, pose_hz: float, length_s: float) -> None:
-    """Whatever the rates, and though the poses go on for minutes before and after the frames."""
-    frames_s = start_s + np.arange(0.0, length_s, max(1.0 / rate_hz, length_s / 500))
-    poses_s = start_s + np.arange(-60.0, length_s + 60.0, max(1.0 / pose_hz, length_s / 500))
-    assert not clock_fault(frames_s, "frames", poses_s, "poses")
 
 
 def test_dates_are_seconds() -> None:

@@ -55,7 +55,7 @@ def test_frames_that_lack_a_file_are_left_out_and_told(tmp_path: Path):
     (path / "frame-000006.pose.txt").unlink()
     recording = open_recording(path)
     assert len(recording) == 3
-    assert recording.notices == ("2 frame(s) lack one of colour, depth and pose and are left out.",)
+    assert recording.notices == ("2 frame(s) lack one of colour, depth, pose and are left out.",)
 
 
 def test_intrinsics_may_lie_in_the_folder_above(tmp_path: Path):

@@ -57,17 +57,17 @@ FAULTS: list[tuple[Callable[[Path], object], str, str, int | None, bool]] = [
     ),
     (
         lambda p: _replace_line(p / "poses.csv", 3, "0.1,nan,0,0,0,0,0,1"),
-        "poses.csv, line 3: the pose is NaN or infinite; it is not used.",
+        "poses.csv, line 3: this is no pose, and not used; it is NaN or infinite.",
         "poses.csv",
         3,
         False,
     ),
     (
         lambda p: _replace_line(p / "poses.csv", 4, "0.2,0,0,0,0,0,0,1.5"),
-        "poses.csv, line 4: the quaternion has length 1.5, so this is not a rotation;",
+        "poses.csv, line 4: this is no pose, and not used; the quaternion has length 1.5, where 1 belongs.",
         "poses.csv",
         4,
-        True,
+        False,
     ),
     (
         lambda p: _replace_line(p / "poses.csv", 5, "0.15,0,0,0,0,0,0,1"),

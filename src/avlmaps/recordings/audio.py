@@ -62,8 +62,7 @@ class AudioTrack:
     """An audio file, or the audio stream of a video, placed on a recording's clock.
 
     WAV, FLAC and OGG are read by libsndfile, everything else (mp4, mkv, m4a, mp3) by FFmpeg; several channels
-    become one, their mean; where they cancel one another in it, the loudest is read alone. Nothing is read before it is
-    read before it is needed, so a track may be hours long.
+    become one, their mean. Nothing is read before it is needed, so a track may be hours long.
 
     Attributes:
         path: the file.
@@ -108,23 +107,12 @@ class AudioTrack:
             raise AudioError(
                 f"{path} has {rate_hz} samples a second, too few for sounds; at least {LOWEST_RATE_HZ} are needed."
             )
-        channel = containers.cancelling_channel(path, count, rate_hz)
-        return cls(path, rate_hz, count / rate_hz, start_s, channel, label=label)
+        return cls(path, rate_hz, count / rate_hz, start_s, label=label)
 
     @property
     def name(self) -> str:
         """What sentences call it."""
         return self.label or str(self.path)
-
-    @property
-    def notices(self) -> tuple[str, ...]:
-        """A sentence for each thing worth knowing of the track."""
-        if self.channel is None or self.microphones is not None:
-            return ()
-        return (
-            f"The channels of {self.name} cancel one another when they are mixed (one is wired the other way round); "
-            f"channel {self.channel + 1} is used alone.",
-        )
 
     @property
     def end_s(self) -> float:

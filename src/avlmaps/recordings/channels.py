@@ -19,7 +19,6 @@ from avlmaps.recordings.microphones import Microphones
 _LOOKS, _LOOK_S = 24, 0.5
 _DEAD_DB = 40.0  # a channel this much below the loudest holds nothing of use
 _QUIET = 0.01  # share of the loudest's power; a fainter channel is not the one that is heard
-_PAUSE_S, _PAUSES = 0.05, 200  # of digital silence; the number that is read at once
 _FULL_SCALE, _CLIPPED = 0.999, 1e-3
 
 
@@ -70,20 +69,16 @@ def with_microphones(track: AudioTrack, microphones: Microphones, files: tuple[P
             f"The recording has {len(files)} files of channels, but {len(microphones)} microphone(s) are described; "
             "give one position for each."
         )
+    for path in files[1:]:
+        other = AudioTrack.open(path, track.start_s)
+        if (track.rate_hz, track.duration_s) != (other.rate_hz, other.duration_s):
+            raise AudioError(
+                f"The channels disagree: {track.path} has {track.rate_hz} samples a second for {track.duration_s:g} s, "
+                f"{path} {other.rate_hz} for {other.duration_s:g} s; export them together, from one clock."
+            )
     if files:
-        for path in files[1:]:
-            other = AudioTrack.open(path, track.start_s)
-            for name, here, there in (
-                ("samples a second", track.rate_hz, other.rate_hz),
-                ("samples", round(track.duration_s * track.rate_hz), round(other.duration_s * other.rate_hz)),
-            ):
-                if here != there:
-                    raise AudioError(
-                        f"The channels disagree: {track.path} has {here} {name}, {path} has {there}; export them "
-                        "together, from one clock."
-                    )
         return replace(track, channel=0, microphones=microphones, files=files)
-    power, _ = channel_power(track.path, round(track.duration_s * track.rate_hz), track.rate_hz)
+    power = channel_power(track.path, round(track.duration_s * track.rate_hz), track.rate_hz)
     used = microphones.channels or range(len(power))
     if len(used) != len(microphones) or max(used) >= len(power):
         raise RecordingError(
@@ -180,22 +175,15 @@ def _number(track: AudioTrack, channel: int) -> int:
 
 
 def _silent(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str) -> list[str]:
-    """Find that no sample differs from the others, throughout or in one stretch of half of the track and more.
-
-    A track that is digitally silent at other times as well, between its sounds, is of a gate (or was put together so).
-    """
+    """Find that no sample differs from the others, throughout or in one stretch of half of the track and more."""
     if samples.shape[2] < 2:
         return []
     still = np.ptp(samples, axis=2).max(axis=1) == 0.0
     if still.all() and not any(np.ptp(block.samples) for block in track.blocks()):
         return [f"{name or track.name} is silent throughout: every sample is {samples[0, 0, 0]:g}."]
     where = np.flatnonzero(still)
+    # Digital silence between sounds as well is of a gate, or of a track that was put together so.
     if still.all() or len(where) < len(still) / 2 or where[-1] - where[0] >= len(where):
-        return []
-    look_s = min(_LOOK_S, track.duration_s)
-    begins_s = np.linspace(0.0, track.duration_s - look_s, len(still))
-    before_s, behind_s = np.r_[0.0, begins_s][where[0]], np.r_[begins_s, track.duration_s][where[-1] + 1] + look_s
-    if _has_pauses(track, float(before_s), float(behind_s)):
         return []
     edges_s = track.start_s + np.linspace(0.0, track.duration_s, len(still) + 1)
     from_s, to_s = edges_s[[where[0], where[-1] + 1]].tolist()
@@ -203,16 +191,6 @@ def _silent(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str) -
         f"{name or track.name} is silent in one piece from about {from_s:.0f} to {to_s:.0f} s "
         f"({len(where) / len(still):.0%}): every sample is {samples[where[0], 0, 0]:g} there, and not elsewhere."
     ]
-
-
-def _has_pauses(track: AudioTrack, before_s: float, behind_s: float) -> bool:
-    size = round(_PAUSE_S * track.rate_hz)
-    for number, block in enumerate(track.blocks(_PAUSES * _PAUSE_S)):
-        begin_s = _PAUSE_S * (number * _PAUSES + np.arange(len(block.samples) // size))
-        pieces = block.samples[: len(begin_s) * size].reshape(-1, size)
-        if (np.ptp(pieces, axis=1)[(begin_s + _PAUSE_S < before_s) | (begin_s > behind_s)] == 0.0).any():
-            return True
-    return False
 
 
 def _dead(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str = "") -> list[str]:

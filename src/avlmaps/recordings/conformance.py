@@ -196,11 +196,8 @@ def _check_camera(own: Pinhole, true: Pinhole, what: str) -> None:
     focal = np.abs(np.array([own.fx / true.fx, own.fy / true.fy]) - 1.0).max() <= _FOCAL_SHARE
     centre = np.abs(np.array([own.cx - true.cx, own.cy - true.cy])).max() <= _CENTRE_PIXELS
     hold(focal, f"the {what} camera's focal length is {own.fx}, {own.fy}; it must be {true.fx}, {true.fy}")
-    hold(
-        centre,
-        f"the {what} camera's centre is {own.cx}, {own.cy}; it must be {true.cx}, {true.cy} (the centre of the first "
-        "pixel lies at 0.5, 0.5)",
-    )
+    wanted = f"{true.cx}, {true.cy} (the centre of the first pixel lies at 0.5, 0.5)"
+    hold(centre, f"the {what} camera's centre is {own.cx}, {own.cy}; it must be {wanted}")
 
 
 def _check_poses(recording: Recording, truth: Truth) -> None:
@@ -212,9 +209,7 @@ def _check_poses(recording: Recording, truth: Truth) -> None:
     own_from_true = own[0] @ poses.inverse(truth.world_from_camera[0])
     expected = own_from_true @ truth.world_from_camera
     off_m = float(np.abs(own[:, :3, 3] - expected[:, :3, 3]).max())
-    hold(
-        off_m <= _POSITION_M, f"the camera moves otherwise than it did, by up to {off_m:.3g} m from the first frame on"
-    )
+    hold(off_m <= _POSITION_M, f"the camera moves otherwise than it did from the first frame on, by {off_m:.3g} m")
     off_rad = float(poses.rotation_angle_rad(own, expected).max())
     hold(off_rad <= _ANGLE_RAD, f"the camera turns otherwise than it did, by up to {np.rad2deg(off_rad):.3g} degrees")
     up = recording.up_in_world
@@ -231,9 +226,8 @@ def _check_frame(
     hold(frame.index == index and frame.name == name, f"frame {index} says that it is {frame.index}, {frame.name!r}")
     hold(frame.stamp_s == recording.stamps_s[index], f"frame {name} has another stamp than the recording says")
     true = truth.depth_m[index]
-    hold(
-        np.isfinite(frame.depth_m).all() and (frame.depth_m >= 0.0).all(), "depth must be finite, 0 where there is none"
-    )
+    known = np.isfinite(frame.depth_m) & (frame.depth_m >= 0.0)
+    hold(known.all(), "depth must be finite, and 0 where there is none")
     false = frame.valid & (true == 0.0)
     hold(not false.any(), f"frame {name} has a depth at {false.sum()} pixels where nothing was measured")
     both = frame.valid & (true > 0.0)
@@ -299,10 +293,8 @@ def _check_told(copy: Path, open_it: Callable[[Path], Recording], what: str) -> 
             hold(np.isfinite(frame.world_from_camera).all(), f"{what}: frame {frame.name} has a pose that is none")
     except AvlmapsError as error:
         sentence = str(error)
-        hold(
-            copy.name in sentence or any(c.name in sentence for c in copy.rglob("*")),
-            f"{what}: {sentence!r} names no file",
-        )
+        is_named = copy.name in sentence or any(c.name in sentence for c in copy.rglob("*"))
+        hold(is_named, f"{what}: {sentence!r} names no file")
     except NonConformanceError:
         raise
     except Exception as error:

@@ -8,7 +8,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import AudioError, NoAudioStreamError
-from avlmaps.core.files import SOUND_BYTES, RefusedFileError, checked_size
+from avlmaps.core.files import SOUND_BYTES, checked_size
 from avlmaps.core.wording import option
 
 if TYPE_CHECKING:
@@ -25,27 +25,8 @@ _UNKNOWN = 1 << 48  # a FLAC that was written to a pipe may say that it has this
 _STREAMED_BYTES = 0xFFFFFFFF - 0xFFFF  # of a WAV that says nothing of its length
 _PREROLL_S = 1.0  # a decoder that starts in the middle needs a while until its output is right
 _RESYNC_S = 0.05  # stamps are rounded (to 1 ms in mkv); only a larger jump is a gap
-_LOOKS, _LOOK_S = 20, 0.25  # of a file, to find out whether its channels cancel
-_CANCELLED = 0.01
-_AUDIBLE_POWER = 1e-8
+_LOOKS, _LOOK_S = 20, 0.25  # of a file, to find out which of its channels are heard
 _SLACK_S = 0.5  # containers round their durations, encoders drop or pad a few hundred samples
-
-
-# Formats that say where their samples lie; the decoders of others look for the next packet in all that follows: 20 GB
-# of zeros, as a full disk or a broken copy leaves them, keep a processor busy for minutes.
-_INDEXED = {".wav", ".w64", ".aif", ".aiff", ".caf", ".m4a", ".mp4", ".mov"}
-_LARGE_BYTES, _END_BYTES = 64 << 20, 1 << 20
-_SAMPLE_BYTES = 5  # no FLAC takes more for a sample
-
-
-def checked_media(path: Path) -> None:
-    """Refuse a file of sound or video that is too large, or ends in zeros as after a copy that broke off."""
-    size = checked_size(path, SOUND_BYTES)
-    if size >= _LARGE_BYTES and path.suffix.lower() not in _INDEXED:
-        with path.open("rb") as stream:
-            stream.seek(-_END_BYTES, 2)
-            if not any(stream.read()):
-                raise RefusedFileError(path, "its end holds zeros only, as after a copy that broke off")
 
 
 def self_contained_suffix(content: bytes) -> str | None:
@@ -67,7 +48,7 @@ def truncation_error(path: Path, found_s: float, promised_s: float) -> AudioErro
 def examine(path: Path) -> tuple[int, int]:
     """Return samples a second and the number of samples."""
     try:
-        checked_media(path)
+        checked_size(path, SOUND_BYTES)
     except OSError as error:
         what = "does not exist"
         if path.is_dir():
@@ -114,30 +95,12 @@ def stream(path: Path, count: int, rate_hz: int, channel: int | None = None) -> 
             yield _mono(piece, channel)
 
 
-def cancelling_channel(path: Path, count: int, rate_hz: int) -> int | None:
-    """Return the loudest channel of a file whose channels cancel one another when they are mixed, else None.
-
-    Channels cancel where their mean has less than a hundredth of their own power, as with two wires of one microphone,
-    or a plug that is wired wrongly.
-    """
-    power, mixed = channel_power(path, count, rate_hz)
-    if len(power) < 2 or not np.isfinite(power).all() or power.max() <= _AUDIBLE_POWER:
-        return None
-    return int(np.argmax(power)) if mixed < _CANCELLED * power.max() else None
-
-
-def channel_power(path: Path, count: int, rate_hz: int) -> tuple[Float[np.ndarray, " c"], float]:
-    """Return the mean power of each channel, and of their mean, in ``_LOOKS`` pieces spread over a file."""
-    power, mixed = np.zeros(0), 0.0
+def channel_power(path: Path, count: int, rate_hz: int) -> Float[np.ndarray, " c"]:
+    """Return the mean power of each channel in ``_LOOKS`` pieces spread over a file."""
     length = min(count, round(_LOOK_S * rate_hz))
-    for begin in np.linspace(0, count - length, min(_LOOKS, max(1, count // max(length, 1)))).astype(int).tolist():
-        piece = read_all_channels(path, begin, begin + length, rate_hz)
-        if piece.shape[1] < 2:
-            return (piece**2).mean(axis=0), 0.0
-        power = (power if len(power) == piece.shape[1] else np.zeros(piece.shape[1])) + (piece**2).sum(axis=0)
-        mixed += float((piece.mean(axis=1) ** 2).sum())
-    looked_at = _LOOKS * max(length, 1)
-    return power / looked_at, mixed / looked_at
+    begins = np.linspace(0, count - length, min(_LOOKS, max(1, count // max(length, 1)))).astype(int).tolist()
+    pieces = [read_all_channels(path, begin, begin + length, rate_hz) for begin in begins]
+    return np.mean([(piece**2).mean(axis=0) for piece in pieces if piece.shape == pieces[0].shape], axis=0)
 
 
 def read_all_channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, "n channels"]:
@@ -189,15 +152,10 @@ def _opened_plain(path: Path) -> "soundfile.SoundFile":
 def _examine_plain(path: Path) -> tuple[int, int]:
     with _opened_plain(path) as file:
         rate_hz, count = int(file.samplerate), int(file.frames)
+        if _is_short_wav(path):
+            raise AudioError(f"{path} is truncated: it is shorter than its header promises; copy or convert it again.")
         if 0 < count < _UNKNOWN:
-            most = count * file.channels * _SAMPLE_BYTES + _LARGE_BYTES  # a seek looks for samples in all there is
-            padded = file.format == "FLAC" and path.stat().st_size > most
-            if not padded and not _is_short_wav(path) and _reaches(file, count):
-                return rate_hz, count
-            raise AudioError(
-                f"{path} is truncated or damaged: its length does not fit the sound that its header promises; "
-                "copy or convert it again."
-            )
+            return rate_hz, count
         whole: Any = file
         whole.seek(0)
         return rate_hz, sum(len(piece) for piece in whole.blocks(_PIECE_SAMPLES, dtype="float32"))
@@ -210,14 +168,6 @@ def _is_short_wav(path: Path) -> bool:
     promised = int.from_bytes(head[4:8], "little")
     streamed = promised == 0 or promised >= _STREAMED_BYTES
     return head[:4] == b"RIFF" and head[8:] == b"WAVE" and not streamed and promised + 7 > path.stat().st_size
-
-
-def _reaches(file: "soundfile.SoundFile", count: int) -> bool:
-    try:
-        file.seek(count - 1)
-        return len(file.read(1, dtype="float32")) == 1
-    except RuntimeError:
-        return False
 
 
 def _examine_video(path: Path) -> tuple[int, int]:
@@ -241,7 +191,7 @@ def _examine_video(path: Path) -> tuple[int, int]:
                 end_s = _end_of_packets(container, audio) - zero_s
     except FFmpegError as error:
         raise _unreadable(path, error) from None
-    if next(_decoded(path, 0.0), None) is None:
+    if next(_frames(path, 0.0), None) is None:
         end_s = 0.0
     return rate_hz, round(end_s * rate_hz)
 
@@ -252,13 +202,6 @@ def _end_of_packets(container: Any, audio: Any) -> float:
         if packet.pts is not None:
             end = max(end, packet.pts + (packet.duration or 0))
     return float(end * audio.time_base)
-
-
-def _decoded(
-    path: Path, from_s: float, channel: int | None = None
-) -> Iterator[tuple[float, Float32[np.ndarray, " _"]]]:
-    for time_s, samples in _frames(path, from_s):
-        yield time_s, _mono(samples, channel)
 
 
 def _frames(path: Path, from_s: float) -> Iterator[tuple[float, Float32[np.ndarray, "n channels"]]]:
@@ -286,8 +229,8 @@ def _placed(
 ) -> Iterator[Float32[np.ndarray, " _"]]:
     """Yield the samples ``begin:end`` without holes: gaps between the container's stamps are filled with silence."""
     at, started = begin, False
-    for time_s, samples in _decoded(path, begin / rate_hz, channel):
-        index = round(time_s * rate_hz)
+    for time_s, every in _frames(path, begin / rate_hz):
+        samples, index = _mono(every, channel), round(time_s * rate_hz)
         if started and abs(index - at) < _RESYNC_S * rate_hz:
             index = at
         while at < min(index, end):

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cache, cached_property
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -63,13 +64,9 @@ def opencv_from_axes(name: str) -> Float[np.ndarray, "3 3"]:
 @cache
 def all_axes() -> tuple[str, ...]:
     """Return every right-handed convention by its letters, the named ones first."""
-    every = [a + b + c for a in _DIRECTIONS for b in _DIRECTIONS for c in _DIRECTIONS]
-    right = [letters for letters in every if _determinant(letters) > 0.5]
+    every = map("".join, product(_DIRECTIONS, repeat=3))
+    right = [letters for letters in every if np.linalg.det([_DIRECTIONS[letter] for letter in letters]) > 0.5]
     return tuple(sorted(right, key=lambda letters: letters not in NAMED.values()))
-
-
-def _determinant(letters: str) -> float:
-    return float(np.linalg.det(np.array([_DIRECTIONS[letter] for letter in letters])))
 
 
 UP_IN_WORLD = np.array([0.0, 1.0, 0.0])  # of phones: ARKit's world has y up, against gravity

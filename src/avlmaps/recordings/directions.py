@@ -6,6 +6,7 @@ elsewhere has an offset, which a build finds along the walk (``avlmaps.maps.sour
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -43,13 +44,7 @@ class DirectionTrack:
     known_rad: tuple[float, float] | None = None
 
     @classmethod
-    def of(
-        cls,
-        stamp_s: Sequence[float] | Float[np.ndarray, " n"],
-        azimuth_rad: Sequence[float] | Float[np.ndarray, " n"],
-        elevation_rad: Float[np.ndarray, " n"] | None = None,
-        confidence: Float[np.ndarray, " n"] | None = None,
-    ) -> "DirectionTrack":
+    def of(cls, stamp_s: Any, azimuth_rad: Any, elevation_rad: Any = None, confidence: Any = None) -> "DirectionTrack":
         """Return a track; what is not given is not known, or counts wholly."""
         stamps = np.asarray(stamp_s, np.float64)
         unknown, whole = np.full(len(stamps), np.nan), np.ones(len(stamps))
@@ -67,27 +62,22 @@ class DirectionTrack:
 
     def _fault(self) -> str:
         """Return what is wrong, beginning in small letters, with the row from 1; or nothing."""
-        for name, value in (("stamp", self.stamp_s), ("azimuth", self.azimuth_rad), ("confidence", self.confidence)):
-            bad = np.flatnonzero(~np.isfinite(value))
-            if len(bad):
-                return f"the {name} of row {bad[0] + 1} is NaN or infinite; leave such rows out"
-        back = np.flatnonzero(np.diff(self.stamp_s) <= 0.0)
-        if len(back):
-            before, after = self.stamp_s[back[0]], self.stamp_s[back[0] + 1]
-            return f"row {back[0] + 2} has the stamp {after:g} s after {before:g} s; stamps must rise"
-        for name, value, most in (
-            ("azimuth", self.azimuth_rad, _TURN_RAD),
-            ("elevation", np.nan_to_num(self.elevation_rad), np.pi / 2 + 1e-3),
-        ):
-            far = np.flatnonzero(np.abs(value) > most)
-            if len(far):
-                return (
-                    f"the {name} of row {far[0] + 1} is {value[far[0]]:g}, more than any angle in radians, so they "
-                    "look like degrees; multiply them by pi/180"
-                )
-        unsure = np.flatnonzero((self.confidence < 0.0) | (self.confidence > 1.0))
-        if len(unsure):
-            return f"the confidence of row {unsure[0] + 1} is {self.confidence[unsure[0]]:g}; it must be from 0 to 1"
+        stamp, azimuth, elevation, sure = self.stamp_s, self.azimuth_rad, self.elevation_rad, self.confidence
+        degrees = "more than any angle in radians, so they look like degrees; multiply them by pi/180"
+        checks = (
+            *(
+                (name, value, np.isfinite(value), "which is NaN or infinite; leave such rows out")
+                for name, value in (("stamp", stamp), ("azimuth", azimuth), ("confidence", sure))
+            ),
+            ("stamp", stamp, np.diff(stamp, prepend=-np.inf) > 0.0, "not after the one before; stamps must rise"),
+            ("azimuth", azimuth, np.abs(azimuth) <= _TURN_RAD, degrees),
+            ("elevation", elevation, np.abs(np.nan_to_num(elevation)) <= np.pi / 2 + 1e-3, degrees),
+            ("confidence", sure, (sure >= 0.0) & (sure <= 1.0), "and it must be from 0 to 1"),
+        )
+        for name, value, fine, what in checks:
+            if not fine.all():
+                row = int(np.argmin(fine))
+                return f"the {name} of row {row + 1} is {value[row]:g}, {what}"
         return ""
 
     @classmethod
@@ -125,10 +115,9 @@ def given_directions(stamp_s: Any, azimuth_rad: Any, elevation_rad: Any, confide
     Raises:
         RecordingError: they are no numbers, of different length, or no directions.
     """
-    names = ("stamp_s", "azimuth_rad", "elevation_rad", "confidence")
     column: dict[str, np.ndarray] = {}
-    for name, given in zip(names, (stamp_s, azimuth_rad, elevation_rad, confidence), strict=True):
-        if given is None and name in names[2:]:
+    for name, given in zip(COLUMNS, (stamp_s, azimuth_rad, elevation_rad, confidence), strict=True):
+        if given is None and name in COLUMNS[2:]:
             continue
         try:
             array = np.atleast_1d(np.asarray(given))
@@ -138,12 +127,10 @@ def given_directions(stamp_s: Any, azimuth_rad: Any, elevation_rad: Any, confide
             fits = False
         if not fits:
             raise RecordingError(
-                f"Directions are a number, or as many numbers as there are stamps, for each of {', '.join(names)} "
+                f"Directions are a number, or as many numbers as there are stamps, for each of {', '.join(COLUMNS)} "
                 f"(the last two may be left out); {name} is {repr(given)[:_SHOWN]}."
             )
-    return DirectionTrack.of(
-        column["stamp_s"], column["azimuth_rad"], column.get("elevation_rad"), column.get("confidence")
-    )
+    return DirectionTrack.of(*map(column.get, COLUMNS))
 
 
 def read_directions(path: Path) -> DirectionTrack:
@@ -157,45 +144,32 @@ def read_directions(path: Path) -> DirectionTrack:
             lines = read_regular(path, TABLE_BYTES).decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:
         raise RecordingError(f"{path} is not UTF-8 text; save the file as UTF-8.") from None
-    rows = [line.strip() for line in lines if line.strip() and not line.startswith("#")]
-    names = [name.strip() for name in rows[0].split(",")] if rows else []
-    unknown = [name for name in names if name not in COLUMNS]
-    if unknown or len(set(names)) < len(names) or not {"stamp_s", "azimuth_rad"} <= set(names):
+    rows = [line.strip().split(",") for line in lines if line.strip() and not line.startswith("#")]
+    names = [name.strip() for name in rows[0]] if rows else []
+    if not {*COLUMNS[:2]} <= set(names) <= set(COLUMNS) or len(set(names)) < len(names):
         raise RecordingError(
             f"{path} begins with {','.join(names)[:_SHOWN]!r}; its first line names the columns: stamp_s,azimuth_rad, "
             "and perhaps elevation_rad and confidence."
         )
     values = np.full((len(rows) - 1, len(names)), np.nan)
-    for number, row in enumerate(rows[1:]):
-        words = row.split(",")
+    for number, words in enumerate(rows[1:]):
         try:
             if len(words) != len(names):  # NumPy would repeat a single number
                 raise ValueError
             values[number] = [float(word) if word.strip() else np.nan for word in words]
         except ValueError:
-            raise RecordingError(
-                f"{path}, row {number + 1}: {row[:_SHOWN]!r} is not {len(names)} numbers ({', '.join(names)}); fix it."
-            ) from None
-    column = dict(zip(names, values.T, strict=True))
+            row = f"{path}, row {number + 1}: {','.join(words)[:_SHOWN]!r}"
+            raise RecordingError(f"{row} is not {len(names)} numbers ({', '.join(names)}); fix it.") from None
     try:
-        return DirectionTrack.of(
-            column["stamp_s"], column["azimuth_rad"], column.get("elevation_rad"), column.get("confidence")
-        )
+        return DirectionTrack.of(*map(dict(zip(names, values.T, strict=True)).get, COLUMNS))
     except RecordingError as error:
         raise RecordingError(f"{path}: {str(error).partition(': ')[2]}") from None
 
 
 def write_directions(path: Path, track: DirectionTrack) -> None:
     """Write a track as ``read_directions`` reads it; all or nothing."""
-    columns = [track.stamp_s, track.azimuth_rad]
-    names: list[str] = ["stamp_s", "azimuth_rad"]
-    if np.isfinite(track.elevation_rad).any():
-        columns.append(track.elevation_rad)
-        names.append("elevation_rad")
-    if (track.confidence != 1.0).any():
-        columns.append(track.confidence)
-        names.append("confidence")
-    rows = [
-        ",".join("" if np.isnan(value) else repr(float(value)) for value in row) for row in zip(*columns, strict=True)
-    ]
+    told = (True, True, np.isfinite(track.elevation_rad).any(), (track.confidence != 1.0).any())
+    names = [name for name, is_told in zip(COLUMNS, told, strict=True) if is_told]
+    columns = [getattr(track, name).tolist() for name in names]
+    rows = [",".join("" if isnan(value) else repr(value) for value in row) for row in zip(*columns, strict=True)]
     write_bytes_atomically(path, ("\n".join([",".join(names), *rows]) + "\n").encode())

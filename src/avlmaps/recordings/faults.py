@@ -1,12 +1,15 @@
 """Faults of a recording and their reports: opening stops at the first fault, the validator lists them all."""
 
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from avlmaps.core.errors import RecordingError
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,25 +64,23 @@ def note(*sentences: str) -> None:
 
 
 @contextmanager
-def noted() -> Generator[list[str]]:
+def _gathered(where: ContextVar[list[T] | None]) -> Generator[list[T]]:
+    found: list[T] = []
+    token = where.set(found)
+    try:
+        yield found
+    finally:
+        where.reset(token)
+
+
+def noted() -> AbstractContextManager[list[str]]:
     """Gather what is noted within."""
-    found: list[str] = []
-    token = _noted.set(found)
-    try:
-        yield found
-    finally:
-        _noted.reset(token)
+    return _gathered(_noted)
 
 
-@contextmanager
-def listed() -> Generator[list[Fault]]:
+def listed() -> AbstractContextManager[list[Fault]]:
     """List every fault that is reported within, in place of stopping at the first."""
-    found: list[Fault] = []
-    token = _listed.set(found)
-    try:
-        yield found
-    finally:
-        _listed.reset(token)
+    return _gathered(_listed)
 
 
 @contextmanager

@@ -20,10 +20,9 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32, UInt8, UInt16
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import PICTURE_BYTES, checked_size, open_regular, read_regular
+from avlmaps.core.files import PICTURE_BYTES, SOUND_BYTES, checked_size, open_regular, read_regular
 from avlmaps.core.poses import apply
 from avlmaps.core.rvl import decode_rvl
-from avlmaps.recordings.containers import checked_media
 from avlmaps.recordings.faults import note, readable
 
 COLOUR_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp")
@@ -122,8 +121,6 @@ def read_bytes(path: Path) -> bytes:
 def check_whole(path: Path, content: bytes) -> None:
     """Refuse a picture that is cut off or damaged as far as its outside shows it, and files that are no pictures."""
     again = f"({len(content)} bytes); copy it again or leave that frame out."
-    if not content:
-        raise RecordingError(f"{path} is empty {again}")
     # Within a JPEG's scan 0xFF is always followed by 0x00, so the end marker is found only where the picture ends.
     cut = content.startswith(_JPEG) and content.rfind(b"\xff\xd9") <= content.rfind(b"\xff\xda")
     if cut or (content.startswith(_PNG) and b"IEND\xaeB`\x82" not in content):
@@ -140,6 +137,8 @@ def check_whole(path: Path, content: bytes) -> None:
 
 
 def _unknown_kind(path: Path, content: bytes) -> str:
+    if not content:
+        return f"{path} is empty (0 bytes); copy it again or leave that frame out."
     if content[4:8] == b"ftyp" and content[8:12] in _HEIF_KINDS:
         return (
             f"{path} is a HEIC picture, which needs another package: pip install 'avlmaps[heic]', or convert all of "
@@ -154,14 +153,13 @@ def _unknown_kind(path: Path, content: bytes) -> str:
 def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
     """Return (width, height) of a picture or an NPY file from its header alone."""
     if path.suffix == ".npy":
-        with _whole_npy(path):
-            height, width = _depth_shape(path, _mapped(path))
+        height, width = _read_npy(path).shape
         size: tuple[int, int] | None = (width, height)
     else:
         content = _head(path) if content is None else content
         size = encoded_size(content)
         if size is None:
-            raise RecordingError(_unknown_kind(path, content) if content else f"{path} is empty; copy it again.")
+            raise RecordingError(_unknown_kind(path, content))
     if size[0] < 1 or size[1] < 1 or size[0] * size[1] > MOST_PIXELS:
         raise RecordingError(
             f"{path} says that it is {size[0]}x{size[1]}; pictures have 1 to {MOST_PIXELS:,} pixels, so copy it again."
@@ -294,7 +292,9 @@ def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.nd
         units_per_m: units of whole numbers in a metre.
     """
     if path.suffix == ".npy":
-        return _npy_depth(path, camera)
+        stored = _read_npy(path)
+        _check_size(path, stored.shape, camera)
+        return metres(stored if stored.dtype.kind == "f" else stored.astype(np.float32), 1.0)
     import cv2
 
     raw = _decoded(path, read_bytes(path), camera, cv2.IMREAD_UNCHANGED)
@@ -328,38 +328,22 @@ def decode_rvl_depth(path: Path, content: bytes, head: int) -> UInt16[np.ndarray
         raise RecordingError(f"{path} is cut off or damaged: {error}.") from None
 
 
-def _depth_shape(path: Path, stored: np.ndarray) -> tuple[int, int]:
+def _read_npy(path: Path) -> np.ndarray:
+    """Return the depth of an NPY file, (h, w), mapped into memory."""
+    with readable(path, _RESTORE):
+        checked_size(path, PICTURE_BYTES)
+        try:
+            stored = np.load(path, mmap_mode="r", allow_pickle=False)
+        except (ValueError, EOFError, SyntaxError, TypeError, OverflowError) as error:
+            reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is empty"
+            raise RecordingError(f"{path} is not a whole NPY file ({reason}); copy it again.") from None
     shape = stored.shape[:2] if stored.ndim == 3 and stored.shape[2] == 1 else stored.shape
     if len(shape) != 2 or stored.dtype.kind not in "fiu":
         raise RecordingError(
             f"{path} holds {stored.dtype} of {tuple(shape)}; depth must be numbers of (height, width): save it in that "
             "shape."
         )
-    return shape
-
-
-def _npy_depth(path: Path, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
-    with _whole_npy(path):
-        mapped = _mapped(path)
-        shape = _depth_shape(path, mapped)
-        _check_size(path, shape, camera)
-        raw = np.array(mapped).reshape(shape)
-    return metres(raw if raw.dtype.kind == "f" else raw.astype(np.float32), 1.0)
-
-
-def _mapped(path: Path) -> np.ndarray:
-    checked_size(path, PICTURE_BYTES)
-    return np.load(path, mmap_mode="r", allow_pickle=False)
-
-
-@contextmanager
-def _whole_npy(path: Path) -> Generator[None]:
-    with readable(path, _RESTORE):
-        try:
-            yield
-        except (ValueError, EOFError, SyntaxError, TypeError, OverflowError) as error:
-            reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is empty"
-            raise RecordingError(f"{path} is not a whole NPY file ({reason}); copy it again.") from None
+    return stored.reshape(shape)
 
 
 def _check_size(path: Path, shape: tuple[int, ...], camera: Pinhole) -> None:
@@ -373,8 +357,7 @@ def _check_size(path: Path, shape: tuple[int, ...], camera: Pinhole) -> None:
 def check_picture(path: Path, camera: Pinhole) -> None:
     """Check a picture's wholeness and size without decoding it."""
     if path.suffix == ".npy":
-        width, height = picture_size(path)
-        _check_size(path, (height, width), camera)
+        _check_size(path, _read_npy(path).shape, camera)
     else:
         content = read_bytes(path)
         check_whole(path, content)
@@ -487,7 +470,7 @@ class VideoFrames:
         import av
 
         with self._told(), readable(self.path, "give the video"):
-            checked_media(self.path)
+            checked_size(self.path, SOUND_BYTES)
             container = av.open(str(self.path))
         if not container.streams.video:
             raise RecordingError(f"{self.path} has no video stream.")

@@ -88,7 +88,8 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         poses: how poses.csv is to be read (``--poses``).
         camera_axes: where the axes of the poses' camera point (``--camera-axes``); OpenCV's if None.
         pose_delay_s: by how much the stamps of poses.csv are later than the pictures' (``--pose-delay``).
-        microphones: where those of the track's channels are; None where that is not known.
+        microphones: where those of the track's channels are; a recording without them does not have the key, so that
+            older readers open it.
         begins_s: what the clock said at time 0, seconds since 1970; stamps that are dates say it themselves.
         base_height: where the robot's base is under the camera in the first frame.
     """
@@ -110,11 +111,6 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     begins_s: float | msgspec.UnsetType = msgspec.UNSET
     base_height: BaseHeight | msgspec.UnsetType = msgspec.UNSET
 
-    @property
-    def placed(self) -> MicrophoneNumbers | None:
-        """The microphones; a recording without them does not have the key, so that older readers open it."""
-        return self.microphones or None
-
     def corrections(self) -> Corrections:
         """Return how the poses are to be read."""
         kinds = (self.poses,) if isinstance(self.poses, PoseKind) else self.poses
@@ -127,12 +123,7 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         if self.intrinsics.rgb_from_depth is None:
             return Rig(rgb, depth)
         rgb_from_depth = np.array(self.intrinsics.rgb_from_depth, np.float64)
-        if rgb_from_depth.shape != (4, 4):
-            raise ValueError(f"rgb_from_depth has shape {rgb_from_depth.shape}; it must be 4x4")
-        try:
-            poses.orthonormalize(rgb_from_depth, "the depth camera in the colour camera, rgb_from_depth,")
-        except RecordingError as error:
-            raise ValueError(str(error)) from None
+        poses.orthonormalize(rgb_from_depth, "the depth camera in the colour camera, rgb_from_depth,")
         return Rig(rgb, depth, rgb_from_depth)
 
 
@@ -175,9 +166,9 @@ def decode_description(path: Path) -> Description:
         if unknown := re.search("unknown field `([^`]*)`", message):
             message = f"the key {unknown.group(1)!r} is not known; known there are {_known_keys(where)}"
         at = f" at {where.strip('`').removeprefix('$.')}" if where else ""
-        raise RecordingError(f"{path}{at}: {_lower(message)}; fix the file.") from None
+        raise RecordingError(f"{path}{at}: {message}; fix the file.") from None
     except msgspec.DecodeError as error:
-        raise RecordingError(f"{path} is not JSON ({_lower(str(error))}); fix the file.") from None
+        raise RecordingError(f"{path} is not JSON ({error}); fix the file.") from None
 
 
 def _known_keys(where: str) -> str:
@@ -186,30 +177,21 @@ def _known_keys(where: str) -> str:
     return ", ".join(kind.__struct_fields__)
 
 
-def _lower(message: str) -> str:
-    return message if message[1:2].isupper() else message[:1].lower() + message[1:]
-
-
 def impossible(description: Description) -> str:
     """Return the impossible value of a well-formed description, or an empty string."""
     try:
         description.rig()
         description.corrections()
-        if description.placed is not None:
-            description.placed.microphones()
-    except ValueError as error:
-        return str(error)
-    except RecordingError as error:
+        if description.microphones:
+            description.microphones.microphones()
+    except (ValueError, RecordingError) as error:
         return str(error).rstrip(".")
-    if not 0.0 < description.depth_units_per_m <= _MOST_DEPTH_UNITS:
-        return (
-            f"depth_units_per_m is {description.depth_units_per_m:g}; it must be positive and at most "
-            f"{_MOST_DEPTH_UNITS:g}, 1000 for millimetres"
-        )
-    if description.rgb_rate_hz is not None and not description.rgb_rate_hz > 0.0:
-        return f"rgb_rate_hz is {description.rgb_rate_hz}; it must be positive"
-    if description.up_in_world is not None and not 0.99 < float(np.linalg.norm(description.up_in_world)) < 1.01:
-        return (
-            f"up_in_world is {list(description.up_in_world)}; it must be a unit vector, or null where up is not known"
-        )
+    units, rate_hz, up = description.depth_units_per_m, description.rgb_rate_hz, description.up_in_world
+    if not 0.0 < units <= _MOST_DEPTH_UNITS:
+        most = f"{_MOST_DEPTH_UNITS:g}, 1000 for millimetres"
+        return f"depth_units_per_m is {units:g}; it must be positive and at most {most}"
+    if rate_hz is not None and not rate_hz > 0.0:
+        return f"rgb_rate_hz is {rate_hz}; it must be positive"
+    if up is not None and not 0.99 < float(np.linalg.norm(up)) < 1.01:
+        return f"up_in_world is {list(up)}; it must be a unit vector, or null where up is not known"
     return ""

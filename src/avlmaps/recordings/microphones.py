@@ -46,20 +46,17 @@ class MicrophoneNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True,
         Raises:
             RecordingError: the positions or the transform cannot be.
         """
-        if not all(len(position) == 3 for position in self.positions_m):
-            raise RecordingError("microphones.positions_m needs three numbers, x, y and z in metres, for each channel.")
         for name in self.files or ():
             if not name or Path(name).name != name or "\0" in name:
                 raise RecordingError(f"microphones.files names {name!r}; name files that lie beside recording.json.")
-        given = self.camera_from_robot
-        if given is not None and (len(given) != 4 or any(len(row) != 4 for row in given)):
-            raise RecordingError("microphones.camera_from_robot must be a matrix of 4x4 numbers.")
-        position_m = np.array(self.positions_m, np.float64).reshape(-1, 3)
-        if self.files is not None and len(self.files) != len(position_m):
+        position_m, turn = _numbers(self.positions_m, "positions_m"), LEVEL_CAMERA_FROM_ROBOT
+        if self.camera_from_robot is not None:
+            turn = _numbers(self.camera_from_robot, "camera_from_robot")
+        if position_m.shape[1:] != (3,) or turn.shape != (4, 4):
             raise RecordingError(
-                f"microphones.files names {len(self.files)} files for {len(position_m)} positions; give one for each."
+                "microphones.positions_m are three numbers, x, y and z in metres, for each channel, and "
+                "microphones.camera_from_robot is a matrix of 4x4."
             )
-        turn = LEVEL_CAMERA_FROM_ROBOT if given is None else np.array(given, np.float64)
         late_s = None if self.delays_s is None else np.array(self.delays_s, np.float64)
         return Microphones(position_m, turn, late_s, tuple(number - 1 for number in self.channels or ()))
 
@@ -101,13 +98,9 @@ class Microphones:
             given = getattr(self, name)
             if name != "delay_s" or given is not None:
                 object.__setattr__(self, name, _numbers(given, name))
-        place = self.position_m
-        if (
-            place.ndim != 2
-            or place.shape[1] != 3
-            or not 1 <= len(place) <= MOST_CHANNELS
-            or not np.isfinite(place).all()
-        ):
+        place, known = self.position_m, set(self.channels)
+        fits = place.ndim == 2 and place.shape[1] == 3 and 1 <= len(place) <= MOST_CHANNELS
+        if not fits or not np.isfinite(place).all():
             raise RecordingError(
                 f"The microphones' positions have shape {place.shape}; give three finite numbers, metres, for each of "
                 f"1 to {MOST_CHANNELS} channels."
@@ -118,7 +111,12 @@ class Microphones:
                 f"The delays of the channels are {late.tolist()} s; give one for each of the {len(place)}, at most "
                 f"{MOST_DELAY_S:g} s either way, or align the files of the channels first."
             )
-        self._require_channels()
+        if known and not (len(known) == len(self.channels) == len(place) and min(known) >= 0):
+            numbers = ", ".join(str(channel + 1) for channel in self.channels)
+            raise RecordingError(
+                f"microphones.channels are {numbers}; name {len(place)} different ones, counted from 1, one for each "
+                "position."
+            )
         poses.orthonormalize(self.camera_from_robot, "the robot's frame in the camera, microphones.camera_from_robot,")
         for one, other in itertools.combinations(range(len(place)), 2):
             apart_m = float(np.linalg.norm(place[one] - place[other]))
@@ -127,15 +125,6 @@ class Microphones:
                     f"The microphones of channels {one + 1} and {other + 1} are {apart_m:.3g} m apart, and those of a "
                     f"robot that show a direction {LEAST_APART_M:g} to {MOST_APART_M:g} m; give their places in metres."
                 )
-
-    def _require_channels(self) -> None:
-        known = set(self.channels)
-        if known and not (len(known) == len(self.channels) == len(self) and min(known) >= 0):
-            numbers = ", ".join(str(channel + 1) for channel in self.channels)
-            raise RecordingError(
-                f"microphones.channels are {numbers}; name {len(self)} different ones, counted from 1, one for each "
-                "position."
-            )
 
     def __len__(self) -> int:
         return len(self.position_m)

@@ -9,7 +9,6 @@ import importlib
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from fnmatch import fnmatch
 from functools import cache
 from itertools import islice
@@ -19,7 +18,6 @@ from typing import Any
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import lasting_path, user_path
 from avlmaps.core.registry import entry_points
-from avlmaps.core.timeline import is_in_future
 from avlmaps.core.wording import option
 from avlmaps.core.words import did_you_mean, near_path
 from avlmaps.recordings import layout
@@ -34,7 +32,6 @@ ENTRY_POINT_GROUP = "avlmaps.formats"
 LOOKED_AT = 2000
 # A sound track that covers a smaller share of the frames is worth a notice.
 _LEAST_SHARED = 0.5
-_YEAR_9999_S = 253_402_300_799.0
 _HERE = "avlmaps.recordings.formats"
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 
@@ -81,10 +78,6 @@ class Format:
         else:
             recording = opener(path)
         settle_sound(recording)
-        if is_in_future(recording.begins_s):
-            when = datetime.fromtimestamp(min(recording.begins_s, _YEAR_9999_S), UTC).date()
-            notice = f"The stamps begin on {when}, in the future: the clock was wrong, and no day is taken from it."
-            recording.notices = (*recording.notices, notice)
         return recording
 
 
@@ -93,7 +86,7 @@ def settle_sound(recording: Recording) -> None:
     track = recording.audio
     if track is None:
         return
-    notices, name = track.notices, track.label or track.path.name
+    name = track.label or track.path.name
     if len(recording):
         first_s, last_s = float(recording.stamps_s[0]), float(recording.stamps_s[-1])
         span = f"from {track.start_s:.2f} to {track.end_s:.2f} s, and the frames from {first_s:.2f} to {last_s:.2f} s"
@@ -105,8 +98,7 @@ def settle_sound(recording: Recording) -> None:
                 f"{begins}another track ({option('audio')}), or none."
             )
         if shared_s < _LEAST_SHARED * (last_s - first_s):
-            notices = (*notices, f"The sound track {name} goes {span}; the rest has no sound.")
-    recording.notices = (*recording.notices, *notices)
+            recording.notices = (*recording.notices, f"The sound track {name} goes {span}; the rest has no sound.")
 
 
 def holds(*names: str) -> Callable[[Path], bool]:
@@ -126,9 +118,10 @@ def _is_folder(path: Path) -> bool:
     return (path / layout.DESCRIPTION).exists() or (path / layout.UNFINISHED).exists()
 
 
-def _called(target: str, path: Path) -> Any:
+def _by(target: str) -> Callable[[Path], Any]:
+    """Return a test that is a function of a reader's module, which is loaded when it is first asked."""
     module, _, function = target.partition(":")
-    return getattr(importlib.import_module(f".{module}", _HERE), function)(path)
+    return lambda path: getattr(importlib.import_module(f".{module}", _HERE), function)(path)
 
 
 def _is_rosbag(path: Path) -> bool:
@@ -149,18 +142,9 @@ FORMATS: tuple[Format, ...] = (
     Format("tum", "rgb.txt, depth.txt and groundtruth.txt", holds("rgb.txt", "depth.txt"), ".listed:open_tum"),
     Format("replica", "traj.txt and results/", holds("traj.txt", "results"), ".layouts:replica"),
     Format("scannet", "color/, depth/, pose/ and intrinsic/", holds("color", "depth", "pose"), ".layouts:scannet"),
-    Format(
-        "avlmaps", "poses.txt and rgb/ (with depth/ of .npy)", holds("poses.txt", "rgb"), ".avlmaps_layout:open_avlmaps"
-    ),
-    Format(
-        "rosbag", "a .bag, .mcap or .db3 file, or a folder of them", _is_rosbag, ".rosbag:open_rosbag", has_topics=True
-    ),
-    Format(
-        "record3d",
-        "a .r3d file, or EXR_RGBD/metadata.json with rgb/ and depth/",
-        lambda path: _called("scans:is_record3d", path),
-        ".scans:open_record3d",
-    ),
+    Format("avlmaps", "poses.txt, rgb/ (and depth/)", holds("poses.txt", "rgb"), ".avlmaps_layout:open_avlmaps"),
+    Format("rosbag", "a .bag, .mcap or .db3 file, or a folder of them", _is_rosbag, ".rosbag:open_rosbag", True),
+    Format("record3d", "a .r3d file, or its export", _by("scans:is_record3d"), ".scans:open_record3d"),
     Format(
         "stray-scanner",
         "odometry.csv, camera_matrix.csv, rgb.mp4 and depth/",
@@ -168,45 +152,18 @@ FORMATS: tuple[Format, ...] = (
         ".scans:open_stray_scanner",
     ),
     Format("nerfstudio", "transforms.json with depth_file_path", holds("transforms.json"), ".scans:open_nerfstudio"),
-    Format(
-        "polycam",
-        "keyframes/ with images/, depth/ and cameras/",
-        lambda path: _called("scans:is_polycam", path),
-        ".scans:open_polycam",
-    ),
-    Format(
-        "redwood",
-        "trajectory.log (or NAME-traj.txt), color/ and depth/",
-        lambda path: (path / "depth").is_dir() and _called("layouts:find_redwood_log", path),
-        ".layouts:redwood",
-    ),
-    Format(
-        "hov-sg",
-        "rgb/, depth/ and pose/ of numbered files (VLMaps, HOV-SG)",
-        holds("rgb", "depth", "pose"),
-        ".layouts:hov-sg",
-    ),
-    Format(
-        "orb-slam",
-        "associations.txt and CameraTrajectory.txt, or another trajectory with stamps",
-        lambda path: bool(_called("listed:find_associations", path) and _called("listed:find_trajectory", path)),
-        ".listed:open_orb_slam",
-    ),
+    Format("polycam", "keyframes/ with images/, depth/, cameras/", _by("scans:is_polycam"), ".scans:open_polycam"),
+    Format("redwood", "trajectory.log, color/ and depth/", _by("layouts:find_redwood_log"), ".layouts:redwood"),
+    Format("hov-sg", "rgb/, depth/ and pose/ of numbers", holds("rgb", "depth", "pose"), ".layouts:hov-sg"),
+    Format("orb-slam", "associations.txt and a trajectory", _by("listed:is_orb_slam"), ".listed:open_orb_slam"),
     Format(
         "icl-nuim",
         "associations.txt, rgb/, depth/ and a .gt.freiburg",
         holds("associations.txt", "rgb", "depth"),
         ".listed:open_icl_nuim",
     ),
-    Format(
-        "rtabmap-export",
-        "NAME_rgb/, NAME_depth/, NAME_calib/ and NAME_poses.txt of rtabmap-export",
-        lambda path: bool(_called("listed:export_of", path)),
-        ".listed:open_rtabmap_export",
-    ),
-    Format(
-        "rtabmap", "a .db file of RTAB-Map", lambda path: _called("rtabmap:is_rtabmap", path), ".rtabmap:open_rtabmap"
-    ),
+    Format("rtabmap-export", "NAME_rgb/, NAME_depth/ ...", _by("listed:export_of"), ".listed:open_rtabmap_export"),
+    Format("rtabmap", "a .db file of RTAB-Map", _by("rtabmap:is_rtabmap"), ".rtabmap:open_rtabmap"),
 )
 _BUILT_IN = frozenset(known.name for known in FORMATS)
 _registered: dict[str, Format] = {}
@@ -259,22 +216,12 @@ def _euroc(path: Path) -> bool:
     return some_name(inside, "imu[0-9]*", "imu.csv") and not (inside / "depth").exists()
 
 
-def _euroc_cameras(path: Path) -> bool:
-    inside = path / "mav0" if (path / "mav0").is_dir() else path
-    return _euroc(path) and some_name(inside, "cam[0-9]*")
-
-
 # What is recognised and not read: a test, and what it is, what is missing and what to do, without its subject.
 _UNREADABLE: tuple[tuple[Callable[[Path], bool], str], ...] = (
     (
-        _euroc_cameras,
-        "is a recording of EuRoC's layout: an IMU and cameras without depth, from which no map is built; compute depth "
-        "from the stereo pair first, and give a folder of recording.json, rgb/, depth/ and poses.csv.",
-    ),
-    (
         _euroc,
-        "holds measurements of an IMU and no pictures, from which no map can be built; record colour and depth "
-        "beside it.",
+        "is of EuRoC's layout, or measurements of an IMU alone: there is no depth, from which a map is built; record "
+        f"depth too, or compute it from the stereo pair, and {_EXPORT}.",
     ),
     (
         _suffix(".sens"),
@@ -287,18 +234,13 @@ _UNREADABLE: tuple[tuple[Callable[[Path], bool], str], ...] = (
         "or unpack the .sens with the Python reader (color/, depth/, pose/, intrinsic/).",
     ),
     (
-        _suffix(".svo", ".svo2"),
-        f"is a recording of a ZED camera, which its own SDK alone reads; {_EXPORT} with it, or record a ROS bag.",
+        _suffix(".svo", ".svo2", ".oni", ".klg", ".rrf", ".rrd", ".xef"),
+        f"is a packed recording that its own software alone reads; {_EXPORT} with it, or record a ROS bag.",
     ),
-    (_suffix(".oni", ".klg", ".rrf", ".rrd", ".xef"), f"is a packed recording that is not read; {_EXPORT}."),
     (_suffix(".db"), "is no database of RTAB-Map (it is no SQLite file); copy it again."),
     (
         _suffix(".ply", ".pcd", ".las", ".laz", ".obj", ".glb", ".usdz", ".splat"),
         "is a finished model, without the pictures that a map is built from; give the recording it was made of.",
-    ),
-    (
-        lambda path: some_name(path, "scene_*_*.depth"),
-        "is ICL-NUIM in POV-Ray's own files; download its TUM RGB-D compatible PNGs and open those.",
     ),
     (
         _suffix(".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz", ".7z", ".rar"),

@@ -31,9 +31,6 @@ _DATES_S = 1e9, 4e9
 SLOWEST_PACE_S = 10.0
 _USUAL_PACE_S = 0.1  # cameras take 1 to 120 pictures a second
 _UNITS = ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
-# Spans of two clocks in one unit differ by less than this factor, with a unit of 1000 between them by more.
-_ALIKE = 4.0
-_SPARSE = 30.0
 _SHOWN = 3
 _FEWEST_STAMPS = 4
 _SINGLE_S = float(1 << 24)  # beyond it single precision has no whole seconds
@@ -71,46 +68,16 @@ def repeat_fault(stamps_s: Float[np.ndarray, " n"], what: str) -> str:
     )
 
 
-def clock_fault(a_s: Float[np.ndarray, " n"], a: str, b_s: Float[np.ndarray, " m"], b: str) -> str:
-    """Return a sentence where two streams of one walk can be on one clock only if their units differ, else nothing.
-
-    One clock runs a thousand times (or a million, or 1e9 times) as fast where, in seconds, the streams would last as
-    long as one another only then, and where the faster has hardly a sample for each of the other's.
-
-    Args:
-        a_s: rising stamps of the one stream.
-        a: what they are, in the plural (``frames``).
-        b_s: rising stamps of the other.
-        b: what they are.
-    """
-    for stamps_s, what in ((a_s, a), (b_s, b)):
-        if fault := date_fault(stamps_s, what):
-            return fault
-    if len(a_s) < 2 or len(b_s) < 2:
-        return ""
-    for (slow_s, slow), (fast_s, fast) in (((a_s, a), (b_s, b)), ((b_s, b), (a_s, a))):
-        length_s, long_s = float(slow_s[-1] - slow_s[0]), float(fast_s[-1] - fast_s[0])
-        unit = next((name for f, name in _UNITS if 1 / _ALIKE < long_s / max(length_s, 1e-12) / f < _ALIKE), None)
-        pace_s, fast_pace_s = float(np.median(np.diff(slow_s))), float(np.median(np.diff(fast_s)))
-        if unit is not None and fast_pace_s > _SPARSE * pace_s:
-            return (
-                f"The {len(fast_s)} {fast} go from {fast_s[0]:.6g} to {fast_s[-1]:.6g} s and the {len(slow_s)} {slow} "
-                f"from {slow_s[0]:.6g} to {slow_s[-1]:.6g} s: the stamps of the {fast} look like {unit}; write them in "
-                "seconds."
-            )
-    return ""
-
-
 def pace_fault(stamps_s: Float[np.ndarray, " n"], what: str, expected_s: float | None = None) -> str:
-    """Return a sentence where frames come at an even pace that is far too slow for a walk, else nothing.
+    """Return a sentence where stamps are dates in another unit, or follow at an even pace too slow for a walk.
 
     Args:
         stamps_s: rising.
-        what: the frames, in the plural.
+        what: what they are of, in the plural (``frames``).
         expected_s: the interval that the recording itself promises, where it does.
     """
-    if len(stamps_s) < 3:
-        return ""
+    if (fault := date_fault(stamps_s, what)) or len(stamps_s) < 3:
+        return fault
     interval_s = np.diff(stamps_s)
     pace_s = float(np.median(interval_s))
     if expected_s is not None:
@@ -210,33 +177,26 @@ def _reachable(
     """Return the frames that belong together, notices of shifts between them, and a fault or nothing."""
     stretches = [np.arange(int(a), int(b)) for a, b in pairwise(edges)]
     longest = int(np.argmax(np.diff(edges)))
-    kept, fault = [stretches[longest]], ""
-    shifts: list[str] = []
-    few = max(MAX_STRAYS, int(MAX_STRAY_SHARE * len(stamps_s)))
-    left = 0
-    for order in (range(longest + 1, len(stretches)), range(longest - 1, -1, -1)):
-        end, at = (-1, 0) if order.step > 0 else (0, -1)
-        last = int(stretches[longest][end])
-        for number in order:
-            stretch = stretches[number]
-            first = int(stretch[at])
+    kept, shifts, fault = [stretches[longest]], list[str](), ""
+    few, left = max(MAX_STRAYS, int(MAX_STRAY_SHARE * len(stamps_s))), 0
+    for order, step in ((stretches[longest + 1 :], 1), (stretches[:longest][::-1], -1)):
+        last = int(stretches[longest][::step][-1])
+        for stretch in order:
+            first, end = (int(stretch[::step][at]) for at in (0, -1))
             away_m = float(np.linalg.norm(positions_m[first] - positions_m[last]))
-            within_m = max(MAX_JUMP_M, MAX_SPEED_M_S * abs(float(stamps_s[first] - stamps_s[last])))
-            if away_m > within_m and left + len(stretch) <= few and 2 * len(stretch) < len(stamps_s):
-                left += len(stretch)
-                continue
-            if away_m > within_m:
-                apart_s = abs(float(stamps_s[first] - stamps_s[last]))
-                jump = (
-                    f"The camera jumps by {away_m:,.4g} m within {apart_s:.3g} s between frames {names[last]} and "
-                    f"{names[first]}"
-                )
+            apart_s = abs(float(stamps_s[first] - stamps_s[last]))
+            if away_m > max(MAX_JUMP_M, MAX_SPEED_M_S * apart_s):
+                if left + len(stretch) <= few and 2 * len(stretch) < len(stamps_s):
+                    left += len(stretch)
+                    continue
+                between = f"within {apart_s:.3g} s between frames {names[last]} and {names[first]}"
+                jump = f"The camera jumps by {away_m:,.4g} m {between}"
                 if away_m > MAX_SHIFT_M:
                     fault = fault or f"{jump}; fix those poses, or cut the recording there."
                 else:
                     shifts.append(f"{jump}; if tracking began again there, the map shows the place twice.")
             kept.append(stretch)
-            last = int(stretch[end])
+            last = end
     return np.sort(np.concatenate(kept)), shifts[:_SHOWN], fault
 
 

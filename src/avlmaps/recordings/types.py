@@ -87,18 +87,14 @@ class Frame:
     ground: Ground | None = None
 
     def __post_init__(self) -> None:
-        rgb_size, depth_size = (
-            (self.rig.rgb.height, self.rig.rgb.width),
-            (self.rig.depth.height, self.rig.depth.width),
-        )
-        if self.rgb.shape != (*rgb_size, 3) or self.rgb.dtype != np.uint8:
-            raise ValueError(f"rgb is {self.rgb.dtype} of {self.rgb.shape}; the rig says uint8 of {(*rgb_size, 3)}")
-        if self.depth_m.shape != depth_size or self.depth_m.dtype != np.float32:
+        rgb, depth = self.rig.rgb, self.rig.depth
+        wanted = (rgb.height, rgb.width, 3), (depth.height, depth.width), (4, 4)
+        given = self.rgb.shape, self.depth_m.shape, self.world_from_camera.shape
+        if given != wanted or (self.rgb.dtype, self.depth_m.dtype) != (np.uint8, np.float32):
             raise ValueError(
-                f"depth is {self.depth_m.dtype} of {self.depth_m.shape}; the rig says float32 of {depth_size}"
+                f"rgb, depth_m and world_from_camera are {self.rgb.dtype} and {self.depth_m.dtype} of {given}; the rig "
+                f"says uint8 and float32 of {wanted}"
             )
-        if self.world_from_camera.shape != (4, 4):
-            raise ValueError(f"world_from_camera has shape {self.world_from_camera.shape}; it must be (4, 4)")
 
     def copy(self) -> "Frame":
         """Return the frame with arrays of its own: an encoder may write into what it is given."""

@@ -285,15 +285,9 @@ def _make_empty(path: Path) -> None:
     if path.is_dir() and (path / layout.UNFINISHED).exists() and not (path / layout.DESCRIPTION).exists():
         for folder in ("rgb", "depth"):
             shutil.rmtree(path / folder, ignore_errors=True)
-        for name in (
-            layout.POSES,
-            layout.FRAMES,
-            DIRECTIONS,
-            *(f.name for f in path.glob("audio.*")),
-            layout.UNFINISHED,
-        ):
-            with suppress(FileNotFoundError):
-                (path / name).unlink()
+        for file in (*(path / name for name in (layout.POSES, layout.FRAMES, DIRECTIONS)), *path.glob("audio.*")):
+            file.unlink(missing_ok=True)
+        (path / layout.UNFINISHED).unlink()
     try:
         path.mkdir(parents=True, exist_ok=True)
         taken = next(path.iterdir(), None)

@@ -34,9 +34,9 @@ from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.faults import note, report
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, left_out, list_names, open_audio, opener
-from avlmaps.recordings.formats.tables import POSE, pinhole, read_table, rigid
+from avlmaps.recordings.faults import note
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, opener, whole_frames
+from avlmaps.recordings.formats.tables import pinhole, read_poses
 from avlmaps.recordings.images import first_picture_size
 
 RATE_HZ = 25.0
@@ -78,17 +78,7 @@ def reference_map_from_world(first_habitat_from_base: Float[np.ndarray, "4 4"]) 
 
 def read_habitat_poses(path: Path) -> Float[np.ndarray, "n 4 4"]:
     """Read ``poses.txt``: a line holds px py pz qx qy qz qw, or a 4x4 matrix row by row."""
-    table = read_table(path, (7, 16), names=POSE[1:])
-    values = table.values
-    if values.shape[1] == 16:
-        return values.reshape(-1, 4, 4)
-    norm = np.linalg.norm(values[:, 3:], axis=1)
-    wild = np.isfinite(norm) & (np.abs(norm - 1.0) > poses.MAX_ROTATION_FAULT)
-    for row in np.flatnonzero(wild):
-        line = int(table.lines[row])
-        sentence = f"{path}, line {line}: the quaternion has length {norm[row]:.3g}, so this is not a rotation."
-        report(sentence, path, line)
-    return rigid(values[:, :3], values[:, 3:])
+    return read_poses(path, (7, 16)).pose
 
 
 @opener
@@ -100,7 +90,10 @@ def open_avlmaps(path: Path) -> FileRecording:
     habitat_from_body = read_habitat_poses(path / "poses.txt")
     colour = _numbered(path / "rgb", (".png", ".jpg"))
     depth = _numbered(path / "depth", (".npy", ".png")) if (path / "depth").is_dir() else {}
-    numbers = _complete(path, colour, depth, len(habitat_from_body))
+    lines = dict(enumerate(habitat_from_body))
+    numbers = whole_frames(path, colour=colour, **({"depth": depth} if depth else {}), line_of_poses=lines)
+    if not depth:
+        note("There is no depth, so only sounds and views can be mapped.")
     world_from_camera = camera_poses(habitat_from_body[numbers], given)
     shots = Shots(
         names=[f"{number:06d}" for number in numbers],
@@ -116,22 +109,6 @@ def open_avlmaps(path: Path) -> FileRecording:
         path, "avlmaps", rig, shots, lambda _: path / "poses.txt",
         up_in_world=np.array([0.0, 0.0, 1.0]), audio=audio,
     )  # fmt: skip
-
-
-def _complete(path: Path, colour: dict[int, str], depth: dict[int, str], poses_count: int) -> list[int]:
-    numbers = [n for n in sorted(colour) if n < poses_count and (not depth or n in depth)]
-    if not numbers:
-        raise RecordingError(
-            f"{path} has {len(colour)} pictures in rgb/, {len(depth)} in depth/ and {poses_count} lines in poses.txt, "
-            "but no number is in all of them; line 1 belongs to 000000."
-        )
-    partial = len(colour.keys() | depth.keys() | set(range(poses_count))) - len(numbers)
-    lost = f"{partial} frame(s) lack their picture, their depth or their line in poses.txt; left out."
-    if partial:
-        left_out(path, lost)
-    if not depth:
-        note("There is no depth, so only sounds and views can be mapped.")
-    return numbers
 
 
 def _numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, str]:

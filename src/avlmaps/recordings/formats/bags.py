@@ -67,7 +67,7 @@ def stamp_s(message: Any) -> float:
 def to_ros(schema: str, message: Any) -> Any:
     """Return a message as that of ROS."""
     kind = ros_type(schema)
-    return _ADAPTED[kind](message, kind)
+    return SimpleNamespace(__msgtype__=kind, **_ADAPTED[kind](message))
 
 
 def _stamp(stamp: Any) -> SimpleNamespace:
@@ -76,8 +76,8 @@ def _stamp(stamp: Any) -> SimpleNamespace:
     return SimpleNamespace(sec=int(seconds), nanosec=int(nanoseconds))
 
 
-def _header(message: Any, frame: str) -> SimpleNamespace:
-    return SimpleNamespace(stamp=_stamp(getattr(message, "timestamp", None)), frame_id=frame)
+def _header(message: Any, frame: str = "") -> SimpleNamespace:
+    return SimpleNamespace(stamp=_stamp(getattr(message, "timestamp", None)), frame_id=frame or message.frame_id)
 
 
 def _bytes(data: Any) -> np.ndarray:
@@ -85,70 +85,53 @@ def _bytes(data: Any) -> np.ndarray:
     return np.asarray(raw, np.uint8) if isinstance(raw, np.ndarray) else np.frombuffer(bytes(raw), np.uint8)
 
 
-def _image(m: Any, kind: str) -> SimpleNamespace:
-    return SimpleNamespace(
-        __msgtype__=kind, header=_header(m, m.frame_id), height=int(m.height), width=int(m.width), encoding=m.encoding,
-        is_bigendian=0, step=int(m.step), data=_bytes(m.data),
-    )  # fmt: skip
-
-
-def _compressed(m: Any, kind: str) -> SimpleNamespace:
-    return SimpleNamespace(__msgtype__=kind, header=_header(m, m.frame_id), format=m.format, data=_bytes(m.data))
-
-
-def _calibration(m: Any, kind: str) -> SimpleNamespace:
-    def matrix(name: str) -> np.ndarray:
-        value = getattr(m, name, None)
-        return np.array(getattr(m, name.lower(), ()) if value is None else value, np.float64)
-
-    d, k, r, p = (matrix(name) for name in "DKRP")
-    return SimpleNamespace(
-        __msgtype__=kind, header=_header(m, m.frame_id), height=int(m.height), width=int(m.width),
-        distortion_model=getattr(m, "distortion_model", ""), d=d, k=k, r=r if r.shape == (9,) else np.eye(3).ravel(),
-        p=p if p.shape == (12,) else np.zeros(12),
-    )  # fmt: skip
-
-
-def _transforms(m: Any, kind: str) -> SimpleNamespace:
-    several = m.transforms if hasattr(m, "transforms") else [m]
-    return SimpleNamespace(
-        __msgtype__=kind,
-        transforms=[
-            SimpleNamespace(
-                header=_header(t, t.parent_frame_id),
-                child_frame_id=t.child_frame_id,
-                transform=SimpleNamespace(
-                    translation=_numbers(t.translation, "xyz"), rotation=_numbers(t.rotation, "xyzw")
-                ),
-            )
-            for t in several
-        ],
-    )
-
-
-def _pose(m: Any, kind: str) -> SimpleNamespace:
-    pose = SimpleNamespace(position=_numbers(m.pose.position, "xyz"), orientation=_numbers(m.pose.orientation, "xyzw"))
-    return SimpleNamespace(__msgtype__=kind, header=_header(m, m.frame_id), pose=pose)
-
-
 def _numbers(value: Any, names: str) -> SimpleNamespace:
     return SimpleNamespace(**{name: float(getattr(value, name)) for name in names})
 
 
-def _cloud(m: Any, kind: str) -> SimpleNamespace:
+def _image(m: Any) -> dict[str, Any]:
+    size = {name: int(getattr(m, name)) for name in ("height", "width", "step")}
+    return {"header": _header(m), **size, "encoding": m.encoding, "is_bigendian": 0, "data": _bytes(m.data)}
+
+
+def _compressed(m: Any) -> dict[str, Any]:
+    return {"header": _header(m), "format": m.format, "data": _bytes(m.data)}
+
+
+def _calibration(m: Any) -> dict[str, Any]:
+    def matrix(name: str) -> np.ndarray:
+        value = getattr(m, name, None)
+        return np.array(getattr(m, name.lower(), ()) if value is None else value, np.float64)
+
+    size = {name: int(getattr(m, name)) for name in ("height", "width")}
+    return {"header": _header(m), **size, **{name.lower(): matrix(name) for name in "DKRP"}}
+
+
+def _transforms(m: Any) -> dict[str, Any]:
+    return {"transforms": [_transform(one) for one in (m.transforms if hasattr(m, "transforms") else [m])]}
+
+
+def _transform(m: Any) -> SimpleNamespace:
+    moved = SimpleNamespace(translation=_numbers(m.translation, "xyz"), rotation=_numbers(m.rotation, "xyzw"))
+    header = _header(m, m.parent_frame_id)
+    return SimpleNamespace(header=header, child_frame_id=m.child_frame_id, transform=moved)
+
+
+def _pose(m: Any) -> dict[str, Any]:
+    pose = SimpleNamespace(position=_numbers(m.pose.position, "xyz"), orientation=_numbers(m.pose.orientation, "xyzw"))
+    return {"header": _header(m), "pose": pose}
+
+
+def _cloud(m: Any) -> dict[str, Any]:
     data, stride = _bytes(m.data), int(m.point_stride)
     fields = [
-        SimpleNamespace(name=f.name, offset=int(f.offset), datatype=_FIELD_TYPES.get(int(f.type), 0), count=1)
-        for f in m.fields
+        SimpleNamespace(name=f.name, offset=int(f.offset), datatype=_FIELD_TYPES.get(int(f.type), 0)) for f in m.fields
     ]
-    count = len(data) // stride if stride > 0 else 0
-    return SimpleNamespace(
-        __msgtype__=kind, header=_header(m, m.frame_id), height=1, width=count, fields=fields, is_bigendian=False,
-        point_step=stride, row_step=stride * count, data=data, origin=getattr(m, "pose", None),
-    )  # fmt: skip
+    size = {"height": 1, "width": len(data) // stride if stride > 0 else 0, "point_step": stride}
+    return {"header": _header(m), **size, "fields": fields, "is_bigendian": False, "data": data}
 
 
-_ADAPTED: dict[str, Callable[[Any, str], SimpleNamespace]] = {
+_ADAPTED: dict[str, Callable[[Any], dict[str, Any]]] = {
     _IMAGE: _image,
     _COMPRESSED: _compressed,
     "sensor_msgs/msg/CameraInfo": _calibration,

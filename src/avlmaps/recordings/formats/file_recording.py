@@ -5,7 +5,6 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from decimal import Decimal
 from functools import wraps
 from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar, runtime_checkable
@@ -27,6 +26,7 @@ from avlmaps.recordings.types import BaseHeight, Frame, Recording
 P = ParamSpec("P")
 Opened = TypeVar("Opened", bound=Recording)
 R = TypeVar("R", bound="ShotsRecording")
+K = TypeVar("K")
 _SHOWN = 3
 _TRACKS = ("audio", "sound")
 _SOUNDS = (
@@ -111,9 +111,6 @@ def settle(path: Path, shots: Shots, pose_file: Callable[[int], Path] | None) ->
     shots = shots.take(kept)
     if pose_file is not None:
         shots = _orthonormal(shots, [pose_file(int(i)) for i in kept])
-    # Names of files; the numbers of a database's nodes have no dot.
-    if twins := sorted(name for name in set(shots.colour) & set(shots.depth) if "." in name):
-        report(f"{path} names {twins[0]} as colour and as depth; each frame needs a picture of both.", path)
     if fault := date_fault(shots.stamps_s, "frames") or repeat_fault(shots.stamps_s, "frames"):
         report(f"{path}: {fault}", path)
     order = timeline.in_order(shots.stamps_s, "frames")
@@ -335,6 +332,25 @@ def left_out(path: Path, sentence: str, file: Path | None = None) -> None:
     note(sentence)
 
 
+def whole_frames(path: Path, **found: Mapping[K, Any]) -> list[K]:
+    """Return the keys of frames of which everything was found, in the order of the first; others are left out.
+
+    Args:
+        path: the recording, for sentences.
+        found: files, rows or poses by frame; the name says what.
+    """
+    first, *others = found.values()
+    whole = [key for key in first if all(key in other for other in others)]
+    names = ", ".join(name.replace("_", " ") for name in found)
+    if not whole:
+        counts = ", ".join(f"{len(of)} of {name.replace('_', ' ')}" for name, of in found.items())
+        raise RecordingError(f"{path} has no frame with all of {names} (there are {counts}); check their names.")
+    every: set[K] = set()
+    if lost := len(every.union(*found.values())) - len(whole):
+        left_out(path, f"{lost} frame(s) lack one of {names} and are left out.")
+    return whole
+
+
 def sizes(path: Path, shots: Shots) -> tuple[tuple[int, int], tuple[int, int]]:
     """Return (width, height) of colour and of depth."""
     rgb_size = images.first_picture_size(path, shots.colour)
@@ -359,14 +375,10 @@ def list_names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
     return sorted((name for name in names if not name.startswith(".")), key=natural_key)
 
 
-def natural_key(name: str) -> tuple[tuple[str | int | Decimal, ...], str]:
+def natural_key(name: str) -> tuple[tuple[str | float, ...], str]:
     """Return a key that sorts file names as people count: ``frame_2`` before ``frame_10``, ``7.05`` before ``7.5``."""
     parts = _NUMBER.split(name.rsplit(".", 1)[0])
-    return tuple(_counted(part) if at % 2 else part for at, part in enumerate(parts)), name
-
-
-def _counted(digits: str) -> int | Decimal:
-    return Decimal(digits) if "." in digits else int(digits)
+    return tuple(float(part) if at % 2 else part for at, part in enumerate(parts)), name
 
 
 def open_audio(folder: Path, start_s: float = 0.0) -> AudioTrack | None:
@@ -375,10 +387,11 @@ def open_audio(folder: Path, start_s: float = 0.0) -> AudioTrack | None:
     A file that is called ``audio`` or ``sound``, in any case and container, is the track; else the only sound file that
     is there, also in a folder ``audio`` or ``sound``.
     """
-    named, others = _sound_files(folder)
-    for inside in sorted(folder.iterdir()) if not named and not others and folder.is_dir() else ():
-        if inside.name.casefold() in _TRACKS and inside.is_dir():
-            named, others = _sound_files(inside)
+    if not folder.is_dir():
+        return None
+    inside = [sub for sub in sorted(folder.iterdir()) if sub.name.casefold() in _TRACKS and sub.is_dir()]
+    places = ([sub / file.name for file in sorted(sub.iterdir())] for sub in (folder, *inside))
+    named, others = next((found for files in places if any(found := _sounds(files))), ((), ()))
     if named:
         return AudioTrack.open(named[0], start_s=start_s)
     if len(others) == 1:
@@ -394,25 +407,18 @@ def open_audio(folder: Path, start_s: float = 0.0) -> AudioTrack | None:
     return None
 
 
-def _sound_files(folder: Path) -> tuple[list[Path], list[Path]]:
-    try:
-        files = sorted(folder.iterdir())
-    except OSError:
-        return [], []
-    sounds = [file for file in files if file.suffix.lower() in _SOUNDS and not file.name.startswith(".")]
-    named = [file for file in files if file.stem.casefold() in _TRACKS and file.suffix.lower() in (*_SOUNDS, *_FILMS)]
-    # A broken link or a folder of that name is found as well, and is then an error, not a recording without sound.
-    return sorted(named, key=_likeliness), [file for file in sounds if file not in named]
-
-
 def likeliest_sound(names: Iterable[str]) -> str | None:
     """Return which of some names of files in an archive is that of its sound track."""
-    files = [Path(name) for name in names]
-    named = [f for f in files if f.stem.casefold() in _TRACKS and f.suffix.lower() in (*_SOUNDS, *_FILMS)]
-    others = [f for f in files if f.suffix.lower() in _SOUNDS]
-    found = sorted(named, key=_likeliness)[:1] or (others if len(others) == 1 else [])
+    named, others = _sounds([Path(name) for name in names])
+    found = named or (others if len(others) == 1 else [])
     return found[0].as_posix() if found else None
 
 
-def _likeliness(file: Path) -> tuple[int, int]:
-    return _TRACKS.index(file.stem.casefold()), (*_SOUNDS, *_FILMS).index(file.suffix.lower())
+def _sounds(files: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    """Return the files that are called a sound track, the likeliest first, and those of other sounds."""
+    every = (*_SOUNDS, *_FILMS)
+    # A broken link or a folder of that name is found as well, and is then an error, not a recording without sound.
+    named = [file for file in files if file.stem.casefold() in _TRACKS and file.suffix.lower() in every]
+    named.sort(key=lambda file: (_TRACKS.index(file.stem.casefold()), every.index(file.suffix.lower())))
+    sounds = [file for file in files if file.suffix.lower() in _SOUNDS and not file.name.startswith(".")]
+    return named, [file for file in sounds if file not in named]

@@ -1,7 +1,7 @@
 """Reading our own folder format; `layout.py` describes it, `writer.py` writes it."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from avlmaps.core import poses, timeline
+from avlmaps.core import timeline
 from avlmaps.core.errors import NoAudioStreamError, RecordingError
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
@@ -18,17 +18,15 @@ from avlmaps.recordings.corrections import corrected
 from avlmaps.recordings.directions import DIRECTIONS, read_directions
 from avlmaps.recordings.faults import note, report
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, opener, settle
-from avlmaps.recordings.formats.tables import NAMED_FILE, POSE, named_order, read_table, split_header, text_lines
+from avlmaps.recordings.formats.tables import NAMED_FILE, PoseTable, read_list, read_poses
 from avlmaps.recordings.images import DisplayTurn, VideoFrames, file_turn, first_picture_size
 from avlmaps.recordings.layout import Description
 from avlmaps.recordings.microphones import MicrophoneNumbers
-from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault
+from avlmaps.recordings.plausible import pace_fault
 from avlmaps.recordings.types import Recording
 
 # Stamps beyond this are a date (seconds since 1970), not seconds from the start of a recording.
 _DATE_S = 1e8
-# A quaternion whose length is further from one than this was not written as a rotation.
-_MAX_QUATERNION_FAULT = 0.05
 
 
 @opener
@@ -49,7 +47,7 @@ def open_folder(path: Path) -> Recording:
     first_s = 0.0 if found.stamps_s is None else float(found.stamps_s[0]) - start_s
     audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
     up = description.up_in_world
-    heard = _open_audio(path, audio_start_s, video, first_s, description.placed)
+    heard = _open_audio(path, audio_start_s, video, first_s, description.microphones or None)
     audio = _with_directions(path, heard, start_s)
     _note_turn(video)
     recording = FileRecording(
@@ -107,22 +105,12 @@ def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> 
         )
 
 
-def _check_clocks(folder: Path, description: Description, found: "_Pictures", known: "_Poses") -> None:
-    poses_s = np.sort(known.stamps_s[np.isfinite(known.stamps_s)])
-    interval_s = 1.0 / description.pose_rate_hz if description.pose_rate_hz else None
-    fault = ""
-    if found.stamps_s is not None:
-        frames_s = np.sort(found.stamps_s[np.isfinite(found.stamps_s)])
-        fault = clock_fault(frames_s, "frames", poses_s, f"poses of {layout.POSES}")
-        interval_s = interval_s if np.array_equal(frames_s, poses_s) else None
-        rate_s = 1.0 / description.rgb_rate_hz if description.rgb_rate_hz else interval_s
-        fault = fault or pace_fault(frames_s, "frames", rate_s)
-    else:
-        rate_s = 1.0 / description.rgb_rate_hz if description.rgb_rate_hz else interval_s
-        fault = date_fault(poses_s, f"poses of {layout.POSES}")
-        fault = fault or pace_fault(poses_s, f"poses of {layout.POSES}", rate_s)
-    if fault:
-        raise RecordingError(f"{folder}: {fault}")
+def _check_clocks(folder: Path, description: Description, found: "_Pictures", known: PoseTable) -> None:
+    rate_hz = description.rgb_rate_hz or description.pose_rate_hz
+    for what, stamps_s in (("frames", found.stamps_s), (f"poses of {layout.POSES}", known.stamps_s)):
+        rising = np.zeros(0) if stamps_s is None else np.sort(stamps_s[np.isfinite(stamps_s)])
+        if fault := pace_fault(rising, what, 1.0 / rate_hz if rate_hz else None):
+            raise RecordingError(f"{folder}: {fault}")
 
 
 def _open_audio(
@@ -146,13 +134,6 @@ def _note_turn(video: VideoFrames | None) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Poses:
-    stamps_s: Float[np.ndarray, " n"]
-    world_from_camera: Float[np.ndarray, "n 4 4"]
-    usable: Bool[np.ndarray, " n"]
-
-
-@dataclass(frozen=True, slots=True)
 class _Pictures:
     names: list[str]
     colour: list[str]
@@ -161,39 +142,17 @@ class _Pictures:
     video_frames: Sequence[int] = ()
 
 
-def _read_poses(folder: Path) -> _Poses:
+def _read_poses(folder: Path) -> PoseTable:
     path = folder / layout.POSES
-    if not os.path.lexists(path):
-        raise RecordingError(f"{path} is missing; the recording needs it.")
-    table = read_table(path, (8,), names=POSE)
-    stamps_s, translation, quaternion = table.values[:, 0], table.values[:, 1:4], table.values[:, 4:8]
-    length = np.linalg.norm(quaternion, axis=1)
-    finite = np.isfinite(table.values).all(axis=1)
-    rigid = np.abs(length - 1.0) <= _MAX_QUATERNION_FAULT
-    for row in np.flatnonzero(~finite):
-        line = int(table.lines[row])
-        report(f"{path}, line {line}: the pose is NaN or infinite; it is not used.", path, line, fatal=False)
-    for row in np.flatnonzero(finite & ~rigid):
-        line = int(table.lines[row])
+    known = read_poses(path)
+    for row in np.flatnonzero(np.diff(known.stamps_s) <= 0.0) + 1:
+        line = int(known.lines[row])
         sentence = (
-            f"{path}, line {line}: the quaternion has length {length[row]:.3g}, so this is not a rotation; "
-            "write qx qy qz qw of length 1, or leave the line out."
-        )
-        report(sentence, path, line)
-    for row in np.flatnonzero(np.diff(stamps_s) <= 0.0) + 1:
-        line = int(table.lines[row])
-        sentence = (
-            f"{path}, line {line}: stamp {stamps_s[row]:.6f} s is not after that of the line before "
-            f"({stamps_s[row - 1]:.6f} s); frames are sorted, or cut where the clock was reset."
+            f"{path}, line {line}: stamp {known.stamps_s[row]:.6f} s is not after that of the line before "
+            f"({known.stamps_s[row - 1]:.6f} s); frames are sorted, or cut where the clock was reset."
         )
         report(sentence, path, line, fatal=False)
-    usable = finite & rigid
-    quaternion = np.where(usable[:, None], quaternion, (0.0, 0.0, 0.0, 1.0))
-    pose = poses.from_quaternion(translation, quaternion)
-    pose[~usable] = np.nan
-    if len(stamps_s) == 0:
-        raise RecordingError(f"{path} holds no pose, so there is nothing to map.")
-    return _Poses(stamps_s, pose, usable)
+    return known
 
 
 def _find_video(folder: Path, description: Description) -> VideoFrames | None:
@@ -213,7 +172,7 @@ def _find_video(folder: Path, description: Description) -> VideoFrames | None:
     return video
 
 
-def _find_pictures(folder: Path, description: Description, known: _Poses, video: VideoFrames | None) -> _Pictures:
+def _find_pictures(folder: Path, description: Description, known: PoseTable, video: VideoFrames | None) -> _Pictures:
     """Find the pictures and their stamps: by frames.csv, else row by row with poses.csv, else by the rate."""
     if not (folder / "depth").is_dir():
         raise RecordingError(f"{folder / 'depth'} is missing; the recording needs it.")
@@ -226,9 +185,10 @@ def _find_pictures(folder: Path, description: Description, known: _Poses, video:
         )
     path = folder / layout.FRAMES
     if os.path.lexists(path):
-        rows = list(_listed(path, found))
-        names = [name for name, _ in rows]
-        stamps_s: Float[np.ndarray, " n"] | None = np.array([stamp for _, stamp in rows], np.float64)
+        stems = {file: stem for stem, file in found.items()}
+        rows = [row for row in read_list(path, NAMED_FILE) if "/" not in row[0]]
+        names: list[str] = [stems.get(row[0]) or row[0] for row in rows]
+        stamps_s: Float[np.ndarray, " n"] | None = np.array([row[1] for row in rows], np.float64)
         if not names:
             raise RecordingError(f"{path} lists no frame, so there is nothing to map.")
         if lost := [name for name in names if name not in found]:
@@ -251,34 +211,8 @@ def _find_pictures(folder: Path, description: Description, known: _Poses, video:
     return _Pictures(names, colour, depth, stamps_s)
 
 
-def _listed(path: Path, found: dict[str, str]) -> Iterator[tuple[str, float]]:
-    files = {file: stem for stem, file in found.items()}
-    at, factor, first = (0, 1), 1.0, True
-    for number, text in text_lines(path):
-        fields = [field.strip() for field in text.replace(";", ",").split(",")]
-        try:
-            if first and not any(map(_is_number, fields)):
-                order = named_order(split_header(text), NAMED_FILE)
-                at, factor, first = order.columns, order.factors[1], False
-                continue
-            first = False
-            if len(fields) != 2 or not (name := fields[at[0]]) or "/" in name or "\\" in name:
-                raise ValueError(f"{text[:40]!r} is not {layout.FRAMES_HEADER}; fix the line")
-            yield files.get(name, name), float(fields[at[1]]) * factor
-        except ValueError as error:
-            report(f"{path}, line {number}: {error}.", path, number)
-
-
-def _is_number(field: str) -> bool:
-    try:
-        float(field)
-    except ValueError:
-        return False
-    return True
-
-
 def _stamps_without_list(
-    folder: Path, names: list[str], description: Description, known: _Poses
+    folder: Path, names: list[str], description: Description, known: PoseTable
 ) -> Float[np.ndarray, " n"] | None:
     if len(names) == len(known.stamps_s):
         return None
@@ -292,7 +226,7 @@ def _stamps_without_list(
     return np.arange(len(names), dtype=np.float64)
 
 
-def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, float, timeline.Trajectory | None]:
+def _pose_pictures(found: _Pictures, known: PoseTable) -> tuple[Shots, float, timeline.Trajectory | None]:
     """Give every picture a pose: its own row's, or one interpolated at its stamp where the poses allow it.
 
     Returns:
@@ -306,7 +240,7 @@ def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, float, timel
         start_s = float(finite_s.min())
         note(f"The stamps are dates; time 0 is the first frame's, {start_s:.6f} s since 1970.")
     own_row = len(stamps_s) == len(known.stamps_s) and np.array_equal(stamps_s, known.stamps_s, equal_nan=True)
-    covered, world_from_camera, known_at = np.ones(len(stamps_s), bool), known.world_from_camera, None
+    covered, world_from_camera, known_at = np.ones(len(stamps_s), bool), known.pose, None
     if not own_row:
         covered, world_from_camera, known_at = _interpolated(stamps_s, known)
     shots = Shots(found.names, found.colour, found.depth, stamps_s - start_s, world_from_camera, found.video_frames)
@@ -316,24 +250,17 @@ def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, float, timel
 
 
 def _interpolated(
-    stamps_s: Float[np.ndarray, " n"], known: _Poses
+    stamps_s: Float[np.ndarray, " n"], known: PoseTable
 ) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], timeline.Trajectory | None]:
     """Return where a pose is known, the poses there (NaN elsewhere), and all of them."""
-    usable = np.flatnonzero(known.usable)
-    if len(usable) < len(known.usable):
-        note(f"{len(known.usable) - len(usable)} pose(s) of {layout.POSES} are NaN and not used.")
-    order = timeline.in_order(known.stamps_s[usable], f"poses of {layout.POSES}")
-    note(*order.notices)
-    rows = usable[order.index]
+    trajectory = known.trajectory(layout.POSES)
     covered, world_from_camera = np.zeros(len(stamps_s), bool), np.full((len(stamps_s), 4, 4), np.nan)
-    trajectory = None
-    if len(rows):
-        trajectory = timeline.Trajectory(known.stamps_s[rows], known.world_from_camera[rows])
+    if trajectory is not None:
         covered = trajectory.covers(stamps_s)
         world_from_camera[covered] = trajectory.at(stamps_s[covered])
     if not covered.all():
         lost = int((~covered).sum())
-        span = f"{known.stamps_s[rows].min():.2f} to {known.stamps_s[rows].max():.2f} s" if len(rows) else "none"
+        span = "none" if trajectory is None else "{:.2f} to {:.2f} s".format(*trajectory.stamps_s[[0, -1]])
         note(
             f"{lost} of {len(stamps_s)} frame(s) lie outside the poses of {layout.POSES} ({span}) or in a gap of them; "
             "left out."

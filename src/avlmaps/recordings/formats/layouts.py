@@ -35,8 +35,9 @@ from avlmaps.core.files import DESCRIPTION_BYTES
 from avlmaps.recordings.corrections import from_opengl
 from avlmaps.recordings.faults import note, report
 from avlmaps.recordings.formats import avlmaps_layout
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, left_out, list_names, opener, sizes
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, opener, sizes, whole_frames
 from avlmaps.recordings.formats.tables import (
+    as_poses,
     fitted_rig,
     note_resized,
     note_unread,
@@ -44,8 +45,7 @@ from avlmaps.recordings.formats.tables import (
     read_json,
     read_matrix,
     read_numbers,
-    read_table,
-    rigid,
+    read_poses,
     text_lines,
 )
 from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES, first_picture_size
@@ -92,7 +92,6 @@ class Layout:
         colour: the colour pictures; depth: the depth pictures.
         poses: gives the poses by number, NaN where there is none, and the file of each, of a folder.
         cameras: gives the cameras of some shots.
-        files: what a frame needs, in words.
         up: direction against gravity in the poses' world; None where it is not known.
     """
 
@@ -101,7 +100,6 @@ class Layout:
     depth: Pattern
     poses: Callable[[Path, Sequence[int]], tuple[Poses, Callable[[int], Path]]]
     cameras: Callable[[Path, Shots], Cameras]
-    files: str
     up: tuple[float, float, float] | None = None
 
 
@@ -111,16 +109,9 @@ def open_layout(layout: Layout, path: Path) -> FileRecording:
     colour = layout.colour.files(path)
     depth = layout.depth.files(path)
     known, file_of = layout.poses(path, sorted(colour))
-    numbers = [number for number in colour if number in depth and number in known]
-    if not numbers:
-        raise RecordingError(
-            why_unreadable(path)
-            or f"{path} has {len(colour)} colour pictures, {len(depth)} depth pictures and {len(known)} poses, but no "
-            f"frame with all of {layout.files}."
-        )
-    if partial_frames := len((colour.keys() | depth.keys() | known.keys()) - set(numbers)):
-        sentence = f"{partial_frames} frame(s) lack one of colour, depth and pose and are left out."
-        left_out(path, sentence)
+    if not depth and (why := why_unreadable(path)):
+        raise RecordingError(why)
+    numbers = whole_frames(path, colour=colour, depth=depth, pose=known)
     shots = Shots(
         names=[_digits(colour[number]) for number in numbers],
         colour=[colour[number] for number in numbers],
@@ -158,9 +149,8 @@ def _pose_files(pattern: Pattern, path: Path, numbers: Sequence[int]) -> tuple[P
 
 
 def _rows(name: str, path: Path, numbers: Sequence[int]) -> tuple[Poses, Callable[[int], Path]]:
-    table = read_table(path / name, (16,))
     note(_NO_CLOCK)
-    return dict(enumerate(table.values.reshape(-1, 4, 4))), lambda _: path / name
+    return dict(enumerate(read_poses(path / name, (16,)).pose)), lambda _: path / name
 
 
 def _of_robot(path: Path, numbers: Sequence[int]) -> tuple[Poses, Callable[[int], Path]]:
@@ -173,12 +163,7 @@ def _of_robot(path: Path, numbers: Sequence[int]) -> tuple[Poses, Callable[[int]
             f"The files of {path / 'pose'} hold {' and '.join(map(str, sorted(lengths)))} numbers; each is a pose of "
             "seven (x y z qx qy qz qw) or sixteen (a matrix)."
         )
-    pose = np.full((len(rows), 4, 4), np.nan)
-    for at, row in enumerate(rows.values()):
-        if len(row) == 7:
-            pose[at] = rigid(row[None, :3], row[None, 3:])[0]
-        elif len(row) in (12, 16):
-            pose[at] = np.vstack([row.reshape(-1, 4)[:3], [0.0, 0.0, 0.0, 1.0]])
+    pose = np.stack([as_poses(row[None])[0] if len(row) else np.full((4, 4), np.nan) for row in rows.values()])
     if lengths == {7}:
         pose = avlmaps_layout.camera_poses(pose, avlmaps_layout.read_camera_file(path / "camera.json"))
     else:
@@ -313,9 +298,8 @@ def _centred(file: Path, size: tuple[int, int], own_size: tuple[int, int]) -> Pi
 def _robot_camera(path: Path, shots: Shots) -> Cameras:
     if (path / "intrinsic").is_dir():
         return _scannet(path, shots)
-    for name in _OPEN3D:
-        if os.path.lexists(path / name):
-            return _open3d(path, shots)
+    if any(os.path.lexists(path / name) for name in _OPEN3D):
+        return _open3d(path, shots)
     given = avlmaps_layout.read_camera_file(path / "camera.json")
     if given.fx is None:
         note("No file says the camera; a view of 90 degrees is assumed (camera.json: fx fy cx cy).")
@@ -367,7 +351,6 @@ _LAYOUTS = (
         Pattern("", r"frame-(\d+)\.depth\.png"),
         partial(_pose_files, Pattern("", r"frame-(\d+)\.pose\.txt")),
         _kinect,
-        "its three files (frame-000000.color.jpg or .png, .depth.png, .pose.txt)",
     ),
     Layout(
         "replica",
@@ -375,7 +358,6 @@ _LAYOUTS = (
         Pattern("results", r"depth(\d+)\.png"),
         partial(_rows, "traj.txt"),
         _replica,
-        "results/frameN.jpg, results/depthN.png and a line of traj.txt",
         Z_UP,
     ),
     Layout(
@@ -384,7 +366,6 @@ _LAYOUTS = (
         Pattern("depth", rf"(\d+){_DEPTH}"),
         partial(_pose_files, Pattern("pose", r"(\d+)\.txt")),
         _scannet,
-        "color/N.jpg, depth/N.png and pose/N.txt",
         Z_UP,
     ),
     Layout(
@@ -393,7 +374,6 @@ _LAYOUTS = (
         Pattern("depth", rf"(\d+){_DEPTH}"),
         _of_robot,
         _robot_camera,
-        "rgb/N.png, depth/N.png or .npy and pose/N.txt",
         Z_UP,
     ),
 )
@@ -403,11 +383,13 @@ _LAYOUTS = (
 
 
 def find_redwood_log(path: Path) -> Path | None:
-    """Return a folder's log of poses, or None."""
+    """Return the log of poses of a folder with depth, or None."""
+    if not (path / "depth").is_dir():
+        return None
     for name in ("trajectory.log", "scene/trajectory.log"):
         if os.path.lexists(path / name):
             return path / name
-    return next(iter(sorted(path.glob("*-traj.txt"))), None) if path.is_dir() else None
+    return next(iter(sorted(path.glob("*-traj.txt"))), None)
 
 
 @opener
@@ -418,95 +400,58 @@ def open_redwood(path: Path) -> FileRecording:
     if log is None or folder is None:
         what = "trajectory.log" if log is None else "folder of colour pictures (color, rgb, image)"
         raise RecordingError(f"{path} has no {what}; the recording needs it.")
-    colour, depth = list_names(path / folder, COLOUR_SUFFIXES), list_names(path / "depth", DEPTH_SUFFIXES)
+    files = list_names(path / folder, COLOUR_SUFFIXES), list_names(path / "depth", DEPTH_SUFFIXES)
     ids, pose = _read_log(log)
-    if not (colour and depth and len(pose)):
-        raise RecordingError(f"{path} has {len(colour)} colour and {len(depth)} depth pictures and {len(pose)} poses.")
-    rows = _matched(path, log, colour, depth, ids)
-    colour, depth = [colour[row[0]] for row in rows], [depth[row[1]] for row in rows]
-    stamps_s = _microseconds(depth)
+    colour, depth = (_by_number(names) for names in files)
+    if len(colour) == len(depth) and not colour.keys() & depth.keys():
+        colour, depth = (dict(enumerate(names)) for names in files)
+    elif colour.keys() != depth.keys():
+        note("Pictures are matched by the numbers in their names.")
+    numbers = sorted({*colour, *depth}) or [0]
+    every = range(numbers[0], numbers[-1] + 1)  # also those that neither has, where the log goes on
+    count = {number: at for at, number in enumerate(every if len(every) == len(ids) else numbers)}
+    if len(set(ids)) == len(ids) and ids != list(range(len(ids))) and set(ids) <= set(count.values()):
+        note(_NOT_IN_ORDER)
+        of_pose = dict(zip(ids, pose, strict=True))
+    else:
+        of_pose = dict(enumerate(pose))
+    known = {number: of_pose[at] for number, at in count.items() if at in of_pose}
+    rows = sorted(whole_frames(path, colour=colour, depth=depth, pose=known))
+    stamps_s = _microseconds([depth[row] for row in rows])
     if stamps_s is None:
         note(_NO_CLOCK)
-        stamps_s = np.array([row[3] for row in rows], np.float64) / RATE_HZ
+        stamps_s = np.array([count[row] for row in rows], np.float64) / RATE_HZ
     shots = Shots(
-        names=[name.rsplit(".", 1)[0] for name in colour],
-        colour=[f"{folder}/{name}" for name in colour],
-        depth=[f"depth/{name}" for name in depth],
+        names=[colour[row].rsplit(".", 1)[0] for row in rows],
+        colour=[f"{folder}/{colour[row]}" for row in rows],
+        depth=[f"depth/{depth[row]}" for row in rows],
         stamps_s=stamps_s,
-        world_from_camera=pose[[row[2] for row in rows]],
+        world_from_camera=np.stack([known[row] for row in rows]),
     )
     found = _open3d(path, shots)
-    return FileRecording.settled(
-        path, "redwood", found.rig, shots, lambda _: log,
-        depth_units=found.units_per_m,
-    )  # fmt: skip
+    return FileRecording.settled(path, "redwood", found.rig, shots, lambda _: log, depth_units=found.units_per_m)
 
 
-def _matched(
-    path: Path, log: Path, colour: list[str], depth: list[str], ids: list[int]
-) -> list[tuple[int, int, int, int]]:
-    """Return (row of colour, of depth, of the log, count) of each frame that has all three.
-
-    Pictures are matched by the numbers that their names begin with, if these differ from one another, else in order.
-    The poses are matched by their own numbers where they skip frames, else in order.
-    """
-    numbered = [_first_numbers(names) for names in (colour, depth)]
-    if all(numbered) and (len(colour) != len(depth) or set(numbered[0]) & set(numbered[1])):
-        count = {number: at for at, number in enumerate(sorted({*numbered[0], *numbered[1]}))}
-        first = min(count)
-        gone = max(count) - first + 1 - len(count)  # numbers that neither has
-        if gone and len(ids) == len(count) + gone:
-            count = {number: number - first for number in count}
-        of_colour, of_depth = ({count[n]: at for at, n in enumerate(numbers)} for numbers in numbered)
-        how = "by the numbers in their names"
-    else:
-        of_colour, of_depth, how = dict(enumerate(range(len(colour)))), dict(enumerate(range(len(depth)))), "in order"
-    counts = range(1 + max(*of_colour, *of_depth))
-    by_id = len(set(ids)) == len(ids) and ids != list(range(len(ids))) and set(ids) <= set(counts)
-    of_pose = {number: at for at, number in enumerate(ids)} if by_id else dict(enumerate(range(len(ids))))
-    whole = sorted(of_colour.keys() & of_depth.keys() & of_pose.keys())
-    if not whole:
-        raise RecordingError(f"{path} has no frame with all of colour, depth and a pose.")
-    if not len(colour) == len(depth) == len(ids) == len(whole):
-        sentence = (
-            f"There are {len(colour)} colour pictures, {len(depth)} depth pictures and {len(ids)} poses; pictures are "
-            f"matched {how}, poses {'by their numbers in the log' if by_id else 'in order'}, and {len(whole)} frames "
-            "have all three."
-        )
-        left_out(path, sentence, log)
-    elif by_id:
-        left_out(path, _NOT_IN_ORDER, log)
-    return [(of_colour[n], of_depth[n], of_pose[n], n) for n in whole]
-
-
-def _first_numbers(names: list[str]) -> list[int]:
-    found = [re.match(r"\D*(\d+)", name) for name in names]
-    numbers = [int(match.group(1)) for match in found if match]
-    return numbers if len(set(numbers)) == len(names) else []
+def _by_number(names: list[str]) -> dict[int, str]:
+    """Return files by the first number in their names; in order where these do not tell them apart."""
+    found = {int(match.group(1)): name for name in names if (match := re.match(r"\D*(\d+)", name))}
+    return found if len(found) == len(names) else dict(enumerate(names))
 
 
 def _read_log(file: Path) -> tuple[list[int], Float[np.ndarray, "n 4 4"]]:
     """Read the numbers and the matrices of a log, which must be whole: after a lost line every pose is another's."""
-    lines = list(text_lines(file))
-    if len(lines) % 5:
+    lines = [(number, text.split()) for number, text in text_lines(file)]
+    wrong = next((number for at, (number, words) in enumerate(lines) if len(words) != (4 if at % 5 else 3)), None)
+    try:
+        if wrong is not None or len(lines) % 5:
+            raise ValueError(f"line {wrong or lines[-1][0]}")
+        ids = [int(words[0]) for _, words in lines[::5]]
+        rows = [[float(word) for word in words] for at, (_, words) in enumerate(lines) if at % 5]
+    except ValueError as error:
         raise RecordingError(
-            f"{file} has {len(lines)} lines, but each pose takes five (three whole numbers, then a 4x4 matrix); is it "
-            "cut off?"
-        )
-    pose, ids = np.full((len(lines) // 5, 4, 4), np.nan), [0] * (len(lines) // 5)
-    for at in range(0, len(lines), 5):
-        number, text = lines[at]
-        try:
-            ids[at // 5] = [int(word) for word in text.split()][: 3 if len(text.split()) == 3 else 0][0]
-            for row in range(4):
-                number, text = lines[at + 1 + row]
-                pose[at // 5, row] = [float(word) for word in text.split()]
-        except (ValueError, IndexError):
-            wanted = "three whole numbers" if number == lines[at][0] else "four numbers of a matrix"
-            raise RecordingError(
-                f"{file}, line {number}: {text[:40]!r} stands where {wanted} belong; fix it."
-            ) from None
-    return ids, pose
+            f"{file} is not three whole numbers and a matrix of four lines for each pose ({error}); is it cut off?"
+        ) from None
+    return ids, np.array(rows, np.float64).reshape(-1, 4, 4)
 
 
 def _microseconds(names: list[str]) -> Float[np.ndarray, " n"] | None:

@@ -18,32 +18,32 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core import poses, timeline
+from avlmaps.core import timeline
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.faults import note, report
+from avlmaps.recordings.faults import note
 from avlmaps.recordings.formats.file_recording import (
     FileRecording,
     Shots,
-    left_out,
     list_names,
     natural_key,
     opener,
     sizes,
+    whole_frames,
 )
 from avlmaps.recordings.formats.layouts import Z_UP, Cameras, Poses, fitted_cameras
 from avlmaps.recordings.formats.tables import (
     DISTORTED,
-    POSE,
+    NAMED_FILE,
+    PoseTable,
     note_resized,
     pinhole,
+    read_list,
     read_opencv_yaml,
-    read_table,
-    rigid,
-    text_lines,
+    read_poses,
 )
 from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES
-from avlmaps.recordings.plausible import clock_fault, date_fault, repeat_fault
+from avlmaps.recordings.plausible import date_fault, pace_fault, repeat_fault
 
 RATE_HZ = 30.0
 
@@ -78,6 +78,11 @@ def find_trajectory(path: Path) -> Path | None:
     return next((file for pattern in TRAJECTORIES for file in sorted(path.glob(pattern))), None)
 
 
+def is_orb_slam(path: Path) -> bool:
+    """Return whether a folder has associated pictures and a trajectory with stamps."""
+    return find_associations(path) is not None and find_trajectory(path) is not None
+
+
 @opener
 def open_tum(path: Path) -> FileRecording:
     """Open a sequence of the TUM RGB-D benchmark, or one laid out like it, in place.
@@ -107,8 +112,7 @@ def open_orb_slam(path: Path) -> FileRecording:
     assert listed is not None
     rows = _associations(listed)
     order = timeline.in_order(np.array([row[0] for row in rows]), f"lines of {listed.name}")
-    at: list[int] = order.index.tolist()
-    kept = [rows[i] for i in at]
+    kept = [rows[i] for i in order.index]
     stamps_s = np.array([row[0] for row in kept])
     if not kept:
         raise RecordingError(f"{listed} lists no frame, so there is nothing to map.")
@@ -123,7 +127,7 @@ def _timed(
     file = find_trajectory(path) or path / TRAJECTORIES[0]
     trajectory = _trajectory(file)
     known_s = trajectory.stamps_s
-    if fault := clock_fault(stamps_s, "pictures", known_s, f"poses of {file.name}"):
+    if fault := pace_fault(stamps_s, "pictures") or pace_fault(known_s, f"poses of {file.name}"):
         raise RecordingError(f"{path}: {fault}")
     covered = trajectory.covers(stamps_s)
     if not covered.any():
@@ -151,18 +155,8 @@ def _timed(
 
 def _stream(path: Path) -> _Stream:
     """Read a list of ``stamp file``, in the order of time."""
-    stamps: list[float] = []
-    files: list[str] = []
-    for number, text in text_lines(path):
-        stamp, *rest = re.split(r"[\s,;]+", text, maxsplit=1)
-        try:
-            if not rest or not rest[0]:
-                raise ValueError(text)
-            stamps.append(float(stamp))
-            files.append(rest[0] if "/" in rest[0] else rest[0].replace("\\", "/"))  # as Windows writes paths
-        except ValueError:
-            sentence = f"{path}, line {number}: {text[:40]!r} is not a stamp and a file; fix the line."
-            report(sentence, path, number)
+    rows = read_list(path, NAMED_FILE[::-1])
+    stamps, files = [row[0] for row in rows], [row[1] for row in rows]
     if not files:
         raise RecordingError(f"{path} lists no picture, so there is nothing to map.")
     what = f"pictures of {path.name}"
@@ -174,23 +168,10 @@ def _stream(path: Path) -> _Stream:
 
 
 def _trajectory(path: Path) -> timeline.Trajectory:
-    table = read_table(path, (8,), names=POSE)
-    values = table.values
-    norm = np.linalg.norm(values[:, 4:8], axis=1) if len(values) else np.zeros(0)
-    usable = np.isfinite(values).all(axis=1) & (np.abs(norm - 1.0) <= poses.MAX_ROTATION_FAULT)
-    for row in np.flatnonzero(~usable):
-        line = int(table.lines[row])
-        sentence = f"{path}, line {line}: this is not a pose (NaN, or a quaternion of length {norm[row]:.3g}); unused."
-        report(sentence, path, line, fatal=False)
-    lost, values = int((~usable).sum()), values[usable]
-    order = timeline.in_order(values[:, 0] if len(values) else np.zeros(0), f"poses of {path.name}")
-    values = values[order.index]
-    if len(values) == 0:
-        raise RecordingError(f"{path} holds no usable pose, so there is nothing to map.")
-    if lost:
-        note(f"{lost} line(s) of {path.name} are no poses and not used.")
-    note(*order.notices, *timeline.gap_notices(values[:, 0], f"poses in {path.name}"))
-    return timeline.Trajectory(values[:, 0], poses.from_quaternion(values[:, 1:4], values[:, 4:8]))
+    found = read_poses(path).trajectory(path.name)
+    assert found is not None
+    note(*timeline.gap_notices(found.stamps_s, f"poses in {path.name}"))
+    return found
 
 
 def _tum_camera(path: Path, shots: Shots) -> tuple[Cameras, Float[np.ndarray, "3"] | None]:
@@ -235,20 +216,8 @@ def _orb_camera(file: Path, size: tuple[int, int]) -> tuple[Pinhole, float] | No
 
 def _associations(file: Path) -> list[tuple[float, str, str]]:
     """Return (stamp or number, colour file, depth file) of each line, which may name either first."""
-    rows: list[tuple[float, str, str]] = []
-    for number, text in text_lines(file):
-        words = text.split()
-        try:
-            if len(words) != 4:
-                raise ValueError(text)
-            key, other_key, (one, other) = float(words[0]), float(words[2]), words[1::2]
-        except ValueError:
-            sentence = f"{file}, line {number}: {text[:40]!r} is not a number, a file, the number again and a file."
-            report(sentence, file, number)
-            continue
-        one, other = one.removeprefix("./"), other.removeprefix("./")
-        rows.append((other_key, other, one) if "depth" in one else (key, one, other))
-    return rows
+    found = read_list(file, ("stamp_s", "name", "stamp_s", "name"))
+    return [(row[2], row[3], row[1]) if "depth" in row[1] else (row[0], row[1], row[3]) for row in found]
 
 
 @opener
@@ -265,11 +234,8 @@ def open_icl_nuim(path: Path) -> FileRecording:
             f"stamps (CameraTrajectory.txt), beside {listed.name}."
         )
     known = _freiburg(truth)
-    posed = [row for row in rows if row[0] in known]
-    if not posed:
-        raise RecordingError(f"{truth} has a pose for none of the {len(rows)} frames of {listed.name}.")
-    if len(posed) < len(rows):
-        left_out(path, f"{len(rows) - len(posed)} frame(s) have no pose in {truth.name} and are left out.", truth)
+    listed_rows = {row[0]: row for row in rows}
+    posed = [listed_rows[number] for number in whole_frames(path, associations=listed_rows, pose=known)]
     mirror, numbers = np.diag([1.0, -1.0, 1.0, 1.0]), np.array([row[0] for row in posed], np.float64)
     shots = Shots(
         names=[f"{number}" for number, _, _ in posed],
@@ -286,9 +252,9 @@ def open_icl_nuim(path: Path) -> FileRecording:
 
 
 def _freiburg(file: Path) -> Poses:
-    rows = read_table(file, (8,), names=POSE).values
-    found = zip(rows[:, 0].tolist(), rigid(rows[:, 1:4], rows[:, 4:]), strict=True)
-    return {int(number): pose for number, pose in found if np.isfinite(pose).all()}
+    table = read_poses(file)
+    rows = np.flatnonzero(table.usable)
+    return dict(zip(table.stamps_s[rows].astype(int).tolist(), table.pose[rows], strict=True))
 
 
 # What rtabmap-export writes
@@ -317,12 +283,12 @@ def open_rtabmap_export(path: Path) -> FileRecording:
             "`rtabmap-export --images --poses --poses_camera`."
         )
     camera, base_from_camera = _exported_camera(path / f"{name}_calib" / files["calib"][0])
-    table = read_table(file, (8, 9, 12))
-    pose, own = _exported_poses(table.values)
+    table = read_poses(file, (8, 9, 12))
+    pose = table.pose
     if file.name.endswith("_poses.txt") and not file.name.endswith("camera_poses.txt"):
         pose = pose @ base_from_camera
     whole = sorted(whole, key=natural_key)
-    rows, stamps_s = _exported_rows(path, whole, own)
+    rows, stamps_s = _exported_rows(path, whole, table)
     if len(rows) < len(whole):
         note(f"{len(whole) - len(rows)} frame(s) have no pose in {file.name} and are left out.")
     shots = Shots(
@@ -339,34 +305,24 @@ def open_rtabmap_export(path: Path) -> FileRecording:
     )  # fmt: skip
 
 
-def _exported_poses(values: Float[np.ndarray, "n c"]) -> tuple[Float[np.ndarray, "n 4 4"], Float[np.ndarray, "n k"]]:
-    if values.shape[1] == 12:
-        pose = np.tile(np.eye(4), (len(values), 1, 1))
-        pose[:, :3] = values.reshape(-1, 3, 4)
-        return pose, np.zeros((len(values), 0))
-    return rigid(values[:, 1:4], values[:, 4:8]), values[:, [0, *range(8, values.shape[1])]]
-
-
 def _exported_rows(
-    path: Path, stems: Sequence[str], own: Float[np.ndarray, "n c"]
+    path: Path, stems: Sequence[str], table: PoseTable
 ) -> tuple[list[tuple[int, int]], Float[np.ndarray, " k"]]:
     keys = np.array([float(stem) if re.fullmatch(r"\d+(\.\d+)?", stem) else np.nan for stem in stems])
-    for column in range(own.shape[1]):
-        order = np.argsort(own[:, column], kind="stable")
-        a, b = timeline.associate(np.sort(keys), own[order, column], 1e-3)
+    for own in (table.stamps_s, table.ids) if table.stamped else ():
+        order = np.argsort(own, kind="stable")
+        a, b = timeline.associate(np.sort(keys), own[order], 1e-3)
         if 2 * len(a) > min(len(keys), len(own)):
             frames = np.argsort(keys, kind="stable")[a]
-            return list(zip(frames.tolist(), order[b].tolist(), strict=True)), own[order[b], 0]
-    if len(own) != len(stems):
+            return list(zip(frames.tolist(), order[b].tolist(), strict=True)), table.stamps_s[order[b]]
+    if len(table.pose) != len(stems):
         raise RecordingError(
-            f"{path} has {len(stems)} pictures and {len(own)} poses, and the names of the pictures are neither stamps "
-            "nor ids of the poses; export both at once, with `--poses_format 10`."
+            f"{path} has {len(stems)} pictures and {len(table.pose)} poses, and the names of the pictures are neither "
+            "stamps nor ids of the poses; export both at once, with `--poses_format 10`."
         )
-    every = range(len(stems))
-    stamps_s = own[:, 0] if own.shape[1] else np.array(every) / RATE_HZ
-    if not own.shape[1]:
+    if not table.stamped:
         note("The poses have no stamps; 30 frames/s are assumed.")
-    return [(i, i) for i in every], stamps_s
+    return [(i, i) for i in range(len(stems))], table.stamps_s / (1.0 if table.stamped else RATE_HZ)
 
 
 def _exported_camera(file: Path) -> tuple[Pinhole, Float[np.ndarray, "4 4"]]:

@@ -227,25 +227,25 @@ def cloud_camera(rgb: Pinhole) -> Pinhole:
 
 def points_of(message: Any, name: str) -> Float[np.ndarray, "n 3"]:
     """Return the finite points of a PointCloud2, in its frame, metres."""
-    fields = {field.name: field for field in message.fields}
-    step, count = int(message.point_step), int(message.width) * int(message.height)
-    content = np.asarray(message.data, np.uint8)
-    if not {"x", "y", "z"} <= fields.keys():
-        raise RecordingError(f"The point cloud {name} has the fields {', '.join(fields)}, and not x, y and z.")
-    if step < 1 or len(content) < count * step:
-        raise RecordingError(
-            f"The point cloud {name} has {len(content)} bytes where {count} points of {step} need {count * step}."
-        )
-    rows = content[: count * step].reshape(count, step)
+    fields, step = {field.name: field for field in message.fields}, int(message.point_step)
+    content, count = np.asarray(message.data, np.uint8), int(message.width) * int(message.height)
     order = ">" if message.is_bigendian else "<"
-    axes: list[np.ndarray] = []
-    for axis in "xyz":
-        kind = np.dtype(order + _POINT_KINDS.get(int(fields[axis].datatype), "V0"))
-        begin = int(fields[axis].offset)
-        if kind.itemsize == 0 or begin + kind.itemsize > step:
-            raise RecordingError(f"The field {axis} of the point cloud {name} is of an unknown type, or out of place.")
-        axes.append(np.ascontiguousarray(rows[:, begin : begin + kind.itemsize]).view(kind)[:, 0].astype(np.float64))
-    points = np.stack(axes, axis=1)
+    try:
+        row = np.dtype(
+            {
+                "names": list("xyz"),
+                "formats": [order + _POINT_KINDS[int(fields[axis].datatype)] for axis in "xyz"],
+                "offsets": [int(fields[axis].offset) for axis in "xyz"],
+                "itemsize": step,
+            }
+        )
+        cloud = np.frombuffer(content.tobytes(), row, count)
+    except (KeyError, ValueError) as error:
+        raise RecordingError(
+            f"The point cloud {name} has no x, y and z that can be read ({error}) in the fields {', '.join(fields)} of "
+            f"{len(content)} bytes, {count} points of {step}."
+        ) from None
+    points = np.stack([cloud[axis] for axis in "xyz"], axis=1).astype(np.float64)
     return points[np.isfinite(points).all(axis=1) & (points != 0.0).any(axis=1)]
 
 

@@ -63,25 +63,22 @@ class PictureClock:
     another, the two are different clocks; what has no stamp of its own is placed as the pictures around it are.
 
     Attributes:
-        received_s: when the pictures were received, seconds, rising.
-        stamps_s: the stamps in them, seconds.
+        apart_s: by how much the pictures' stamps are ahead of the times at which they were received, their median.
+        first_s: the first of their stamps.
+        last_s: the last.
         start_s: the stamp at which the recording begins.
     """
 
-    received_s: Float[np.ndarray, " n"]
-    stamps_s: Float[np.ndarray, " n"]
+    apart_s: float
+    first_s: float
+    last_s: float
     start_s: float
 
     @classmethod
     def of(cls, received_ns: np.ndarray, stamps_s: Float[np.ndarray, " n"], start_s: float) -> "PictureClock":
         """Return the clock of pictures in any order."""
-        order = np.argsort(received_ns, kind="stable")
-        return cls(received_ns[order] * 1e-9, stamps_s[order], start_s)
-
-    @property
-    def apart_s(self) -> float:
-        """By how much the pictures' stamps are ahead of the times at which they were received, their median."""
-        return float(np.median(self.stamps_s - self.received_s))
+        apart_s = float(np.median(stamps_s - received_ns * 1e-9))
+        return cls(apart_s, float(stamps_s.min()), float(stamps_s.max()), start_s)
 
     def of_received(self, received_s: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
         """Return the recording's time of messages without a stamp, by when they were received."""
@@ -93,16 +90,8 @@ class PictureClock:
 
     def overlaps(self, times_s: Float[np.ndarray, " k"]) -> bool:
         """Return whether times of the recording lie among its pictures, at least some."""
-        first, last = self.stamps_s.min() - self.start_s, self.stamps_s.max() - self.start_s
+        first, last = self.first_s - self.start_s, self.last_s - self.start_s
         return bool(((times_s >= first) & (times_s <= last)).any())
-
-    def note_apart(self, topic: str) -> None:
-        """Note where the sound was received on another clock than that of the pictures' stamps."""
-        if abs(self.apart_s) > _APART_S:
-            note(
-                f"The stamps of the pictures are {self.apart_s:+.6g} s from when the bag received them; {topic} has no "
-                "stamps on their clock and is placed as they are."
-            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +147,11 @@ class SoundTopic:
         by_stamp = self.clock.of_stamps(np.array(stamps))
         if len(stamps) and np.isfinite(by_stamp).all() and self.clock.overlaps(by_stamp):
             return by_stamp
-        self.clock.note_apart(self.name)
+        if abs(apart_s := self.clock.apart_s) > _APART_S:
+            note(
+                f"The stamps of the pictures are {apart_s:+.6g} s from when the bag received them; {self.name} has no "
+                "stamps on their clock and is placed as they are."
+            )
         return self.clock.of_received(np.array(received) * 1e-9)
 
 
@@ -183,17 +176,6 @@ def silences(
             silence_s[at] = behind_s[at] - filled_s
             filled_s = behind_s[at]
     return float(behind_s[0]), silence_s
-
-
-def _note_gaps(topic: str, start_s: float, lengths_s: np.ndarray, silence_s: np.ndarray) -> None:
-    gaps = np.flatnonzero(silence_s)
-    if len(gaps):
-        first = int(gaps[0])
-        at_s = start_s + float(lengths_s[:first].sum())
-        note(
-            f"{len(gaps)} gap(s) in the sound of {topic}, {silence_s.sum():.4g} s together (the first of "
-            f"{silence_s[first]:.3g} s at {at_s:.2f} s), are filled with silence: its messages are missing there."
-        )
 
 
 def extract_audio(sound: SoundTopic, info: Any, folder: Path, pcm: Pcm | None = None) -> AudioTrack | None:
@@ -242,28 +224,54 @@ def _sampled(
     pcm, lengths_s = measured[0][1], np.array([count / pcm.rate_hz for count, pcm in measured])
     require_pace(topic, pcm, lengths_s, times_s)
     start_s, silence_s = silences(times_s, lengths_s)
-    target, channels = folder / "audio.flac", min(pcm.channels, _FLAC_CHANNELS)
 
-    def blocks() -> Iterator[np.ndarray]:
-        for missing_s, (own, samples) in zip(silence_s.tolist(), pieces(), strict=True):
+    def same() -> Iterator[list[np.ndarray]]:
+        for own, samples in pieces():
             if own != pcm:
                 raise RecordingError(
                     f"The sound on {topic} changes from {pcm.rate_hz} to {own.rate_hz} samples a second, or from "
                     f"{pcm.channels} to {own.channels} channel(s); give one file instead ({option('audio', 'FILE')})."
                 )
-            yield from _silence(round(missing_s * pcm.rate_hz), channels)
-            yield samples
+            yield [samples]
 
-    with _room_for(topic, folder):
-        write_samples(target, blocks(), pcm.rate_hz, channels)
-    track = AudioTrack.open(target, start_s=start_s, label=topic)
+    track = _joined(topic, folder, pcm, start_s, lengths_s, silence_s, same())
     if pcm.channels > 1 and track.channel is None:
         note(
             f"The sound of {topic} has {pcm.channels} channels, of which the mean is heard; where their microphones "
             f"are ({option('microphones', 'FILE')}) would show where sounds come from."
         )
-    _note_gaps(topic, start_s, lengths_s, silence_s)
     return track
+
+
+def _joined(
+    topic: str,
+    folder: Path,
+    pcm: Pcm,
+    start_s: float,
+    lengths_s: Float[np.ndarray, " n"],
+    silence_s: Float[np.ndarray, " n"],
+    pieces: Iterable[Iterable[np.ndarray]],
+) -> AudioTrack:
+    """Write pieces of sound, each behind so much silence."""
+    target, channels = folder / "audio.flac", min(pcm.channels, _FLAC_CHANNELS)
+
+    def blocks() -> Iterator[np.ndarray]:
+        for missing_s, piece in zip(silence_s.tolist(), pieces, strict=True):
+            missing = round(missing_s * pcm.rate_hz)
+            for at in range(0, missing, _SILENT_BLOCK):
+                yield np.zeros((min(_SILENT_BLOCK, missing - at), channels), np.float32)
+            yield from piece
+
+    with _room_for(topic, folder):
+        write_samples(target, blocks(), pcm.rate_hz, channels)
+    if len(gaps := np.flatnonzero(silence_s)):
+        first = int(gaps[0])
+        note(
+            f"{len(gaps)} gap(s) in the sound of {topic}, {silence_s.sum():.4g} s together (the first of "
+            f"{silence_s[first]:.3g} s at {start_s + lengths_s[:first].sum():.2f} s), are filled with silence: its "
+            "messages are missing there."
+        )
+    return AudioTrack.open(target, start_s=start_s, label=topic)
 
 
 def require_pace(topic: str, said: Pcm, lengths_s: Float[np.ndarray, " n"], times_s: Float[np.ndarray, " n"]) -> None:
@@ -314,11 +322,6 @@ def _room_for(topic: str, folder: Path) -> Generator[None]:
         ) from None
 
 
-def _silence(count: int, channels: int) -> Iterator[np.ndarray]:
-    for at in range(0, count, _SILENT_BLOCK):
-        yield np.zeros((min(_SILENT_BLOCK, count - at), channels), np.float32)
-
-
 def _compressed(sound: SoundTopic, suffix: str, folder: Path, times_s: Float[np.ndarray, " n"]) -> AudioTrack:
     """Write a compressed stream; where messages are missing it is cut, and each part decoded to its own place."""
     interval_s = np.diff(times_s)
@@ -350,18 +353,9 @@ def _compressed(sound: SoundTopic, suffix: str, folder: Path, times_s: Float[np.
             )
         return first
     silence_s = np.array([0.0, *(max(b.start_s - a.end_s, 0.0) for a, b in pairwise(tracks))])
-
-    def blocks() -> Iterator[np.ndarray]:
-        for track, missing_s in zip(tracks, silence_s.tolist(), strict=True):
-            yield from _silence(round(missing_s * first.rate_hz), 1)
-            yield from (block.samples[:, None] for block in track.blocks())
-
-    with _room_for(sound.name, folder):
-        write_samples(folder / "audio.flac", blocks(), first.rate_hz, 1)
-    joined = AudioTrack.open(folder / "audio.flac", start_s=first.start_s, label=sound.name)
     lengths_s = np.array([track.duration_s for track in tracks])
-    _note_gaps(sound.name, first.start_s, lengths_s, silence_s)
-    return joined
+    pieces = ((block.samples[:, None] for block in track.blocks()) for track in tracks)
+    return _joined(sound.name, folder, Pcm(first.rate_hz, 1), first.start_s, lengths_s, silence_s, pieces)
 
 
 def _coding_of(sound: SoundTopic, beginning: bytes, said: str, times_s: Float[np.ndarray, " n"]) -> str:
@@ -431,28 +425,21 @@ def directions_of(topic: str, messages: Callable[[], Iterator[tuple[int, Any]]],
         messages: gives (received ns, message) of each.
         clock: of the pictures; numbers have no stamp of their own.
     """
-    received: list[float] = []
-    stamped: list[float] = []
-    angle: list[float] = []
-    whole = True
-    for received_ns, message in messages():
-        received.append(received_ns * 1e-9)
-        if hasattr(message, "pose"):
-            stamped.append(stamp_of(message))
-        value, is_whole = angle_of(message)
-        angle.append(value)
-        whole = whole and is_whole
-    if not angle:
+    rows = [
+        (received_ns * 1e-9, stamp_of(message) if hasattr(message, "pose") else np.nan, *angle_of(message))
+        for received_ns, message in messages()
+    ]
+    if not rows:
         raise RecordingError(f"The topic {topic} has no messages, so that it says no directions; name another.")
-    at_s = clock.of_stamps(np.array(stamped)) if stamped else clock.of_received(np.array(received))
-    azimuth = np.array(angle)
+    received, stamped, azimuth, whole = np.array(rows, np.float64).T
+    at_s = clock.of_stamps(stamped) if np.isfinite(stamped).all() else clock.of_received(received)
     order = np.argsort(at_s, kind="stable")
     at_s, azimuth = at_s[order], azimuth[order]
     used = np.isfinite(azimuth) & np.append(np.diff(at_s) > 0.0, True)
     if not used.all():
         note(f"{int((~used).sum())} of {len(used)} directions of {topic} are no numbers, or came at one moment.")
     at_s, azimuth = at_s[used], azimuth[used]
-    if whole or np.abs(azimuth).max(initial=0.0) > BEYOND_A_TURN_RAD:
+    if whole.all() or np.abs(azimuth).max(initial=0.0) > BEYOND_A_TURN_RAD:
         azimuth = np.deg2rad(azimuth)
         note(f"The directions of {topic} are taken as degrees.")
     return DirectionTrack.of(at_s, np.angle(np.exp(1j * azimuth)))

@@ -17,7 +17,7 @@ from avlmaps.core.poses import inverse
 from avlmaps.core.timeline import Trajectory, in_order
 from avlmaps.recordings.formats.bags import Bag
 from avlmaps.recordings.formats.ros_messages import pose_of, stamp_of
-from avlmaps.recordings.formats.tables import POSE, read_table, rigid
+from avlmaps.recordings.formats.tables import read_poses
 from avlmaps.recordings.types import BaseHeight
 
 # A correction such as map -> odom may come seldom: past its ends it is held for this long, as tf holds the last one,
@@ -339,11 +339,9 @@ def _tree_of_file(file: Path, camera_frame: str) -> TransformTree:
     Its columns are stamp tx ty tz qx qy qz qw, as TUM writes them, or what its header says.
     """
     tree = TransformTree()
-    rows = read_table(file, (8,), names=POSE).values
-    for stamp_s, pose in zip(rows[:, 0].tolist(), rigid(rows[:, 1:4], rows[:, 4:]), strict=True):
+    table = read_poses(file)
+    for stamp_s, pose in zip(table.stamps_s.tolist(), table.pose, strict=True):
         tree.add("world", camera_frame, pose, stamp_s, static=False)
-    if not tree.moves(camera_frame):
-        raise RecordingError(f"{file} holds no pose (stamp tx ty tz qx qy qz qw a line).")
     return tree
 
 

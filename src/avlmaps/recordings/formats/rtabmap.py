@@ -14,7 +14,7 @@ import threading
 import zlib
 from collections.abc import Generator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -120,13 +120,6 @@ def _unpacked_depth(place: Path, content: bytes) -> Float32[np.ndarray, "h w"]:
     raise RecordingError(f"{place} is no depth picture (it may be the right picture of a stereo camera).")
 
 
-@dataclass(frozen=True, slots=True)
-class _Calibration:
-    camera: Pinhole
-    base_from_camera: Float[np.ndarray, "4 4"]
-    distorted: bool
-
-
 @opener
 def open_rtabmap(path: Path) -> StoredRecording:
     """Open a database in place."""
@@ -164,11 +157,12 @@ def open_rtabmap(path: Path) -> StoredRecording:
         colour=[str(row[0]) for row in used],
         depth=[str(row[0]) for row in used],
         stamps_s=np.array([float(row[1] or 0.0) for row in used]),
-        world_from_camera=base @ np.stack([own.base_from_camera for own in seen]),
+        world_from_camera=base @ np.stack([base_from_camera for _, base_from_camera, _ in seen]),
     )
-    if seen[0].distorted:
+    camera, _, distorted = seen[0]
+    if distorted:
         note(DISTORTED)
-    rig, unit_m = _rig(path, database, shots, seen[0].camera)
+    rig, unit_m = _rig(path, database, shots, camera)
     shots = settle(path, shots, lambda _: path)
     start_s = float(shots.stamps_s[0]) if len(shots.names) else 0.0
     shots = replace(shots, stamps_s=shots.stamps_s - start_s)
@@ -180,39 +174,28 @@ def open_rtabmap(path: Path) -> StoredRecording:
 
 def _version(database: _Database) -> tuple[int, ...]:
     tables = {name for (name,) in database.rows("SELECT name FROM sqlite_master WHERE type = 'table'")}
-    if missing := {"Node", "Data", "Admin"} - tables:
-        raise RecordingError(
-            f"{database.path} is a SQLite database without RTAB-Map's table {sorted(missing)[0]}; give a database that "
-            "RTAB-Map recorded."
-        )
     columns = {row[1] for row in database.rows("PRAGMA table_info(Data)")}
-    if missing := {"image", "depth", "calibration"} - columns:
+    if missing := ({"Node", "Data", "Admin"} - tables) or ({"image", "depth", "calibration"} - columns):
         raise RecordingError(
-            f"{database.path} is of a version of RTAB-Map before 0.10 (its table Data has no {sorted(missing)[0]}); "
-            "open it in today's RTAB-Map, which converts it."
+            f"{database.path} is a SQLite database without RTAB-Map's {sorted(missing)[0]}; give one that RTAB-Map "
+            "recorded, and open one of a version before 0.10 in today's, which converts it."
         )
     said = database.rows("SELECT version FROM Admin")
-    words = str(said[0][0] if said else "").split(".")
-    return tuple(int(word) for word in words if word.isdigit())
-
-
-def _uncompressed(blob: bytes, kind: str) -> np.ndarray:
-    raw = zlib.decompressobj().decompress(blob, _MOST_POSES_BYTES)
-    return np.frombuffer(raw, kind)
+    return tuple(int(word) for word in str(said[0][0] if said else "").split(".") if word.isdigit())
 
 
 def _optimised(database: _Database) -> dict[int, np.ndarray]:
     columns = {row[1] for row in database.rows("PRAGMA table_info(Admin)")}
     if not {"opt_ids", "opt_poses"} <= columns:
         return {}
-    for ids_blob, poses_blob in database.rows("SELECT opt_ids, opt_poses FROM Admin"):
-        if not ids_blob or not poses_blob:
+    for blobs in database.rows("SELECT opt_ids, opt_poses FROM Admin"):
+        if not all(blobs):
             continue
         with database.told():
-            ids, numbers = _uncompressed(ids_blob, "<i4"), _uncompressed(poses_blob, "<f4")
-            if len(numbers) != _TRANSFORM_NUMBERS * len(ids):
-                raise ValueError(f"{len(ids)} optimised nodes have {len(numbers)} numbers of poses")
-            return {int(i): _matrix(row) for i, row in zip(ids, numbers.reshape(len(ids), -1), strict=True)}
+            raw = [zlib.decompressobj().decompress(blob, _MOST_POSES_BYTES) for blob in blobs]
+            ids, numbers = np.frombuffer(raw[0], "<i4"), np.frombuffer(raw[1], "<f4")
+            poses = map(_matrix, numbers.reshape(-1, _TRANSFORM_NUMBERS))
+            return dict(zip(ids.tolist(), poses, strict=True))
     return {}
 
 
@@ -228,7 +211,8 @@ def _matrix(numbers: np.ndarray) -> Float[np.ndarray, "4 4"]:
     return full if np.any(full[:3, :3]) else np.full((4, 4), np.nan)  # all zero: RTAB-Map's word for none
 
 
-def _calibration(path: Path, node: int, blob: bytes, version: tuple[int, ...]) -> _Calibration:
+def _calibration(path: Path, node: int, blob: bytes, version: tuple[int, ...]) -> tuple[Pinhole, Any, bool]:
+    """Return a node's camera, base_from_camera, and whether the pictures are distorted."""
     if version and version < (0, 18):
         raise RecordingError(
             f"{path} is of a version of RTAB-Map before 0.18; open it in today's RTAB-Map, which converts it."
@@ -253,7 +237,7 @@ def _calibration(path: Path, node: int, blob: bytes, version: tuple[int, ...]) -
     base_from_camera = _matrix(np.frombuffer(blob, "<f4", local, size - 4 * local)) if local else np.eye(4)
     # OpenCV counts pixel centres as whole numbers
     camera = pinhole(path / f"node {node}, calibration", fx, fy, cx + 0.5, cy + 0.5, width, height)
-    return _Calibration(camera, base_from_camera, bool(np.abs(distortion).max(initial=0.0) > 1e-9))
+    return camera, base_from_camera, bool(np.abs(distortion).max(initial=0.0) > 1e-9)
 
 
 def _rig(path: Path, database: _Database, shots: Shots, camera: Pinhole) -> tuple[Rig, float]:

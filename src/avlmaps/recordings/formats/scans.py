@@ -63,9 +63,11 @@ from avlmaps.recordings.formats.file_recording import (
     open_audio,
     opener,
     sizes,
+    whole_frames,
 )
 from avlmaps.recordings.formats.tables import (
     DISTORTED,
+    as_poses,
     fitted,
     fitted_rig,
     median_camera,
@@ -167,15 +169,12 @@ def _note_frames(file: Path, given: _Transforms, plain: dict[str, Any]) -> None:
 
 def _units_per_m(file: Path, given: _Transforms) -> float:
     said = {given.integer_depth_scale, given.depth_unit_scale_factor} - {None}
-    if len(said) > 1:
-        raise RecordingError(
-            f"{file} says twice how long a unit of depth is: integer_depth_scale {given.integer_depth_scale} and "
-            f"depth_unit_scale_factor {given.depth_unit_scale_factor}; keep the right one."
-        )
     metres = next((value for value in said if value is not None), _MILLIMETRE)
-    for name, value in (("a depth unit in metres", metres), ("applied_scale", given.applied_scale)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise RecordingError(f"{file} says that {name} is {value}; it must be positive.")
+    if len(said) > 1 or not all(np.isfinite(value) and value > 0.0 for value in (metres, given.applied_scale)):
+        raise RecordingError(
+            f"{file} says that a unit of depth is {' and '.join(map(str, said)) or metres} m, and the scale of "
+            f"positions {given.applied_scale}; give one positive number of each."
+        )
     return 1.0 / metres
 
 
@@ -189,13 +188,11 @@ def _found(folder: Path, name: str) -> str:
 
 
 def _matrices(file: Path, frames: list[_Frame], scale: float) -> Float[np.ndarray, "n 4 4"]:
-    pose = np.full((len(frames), 4, 4), np.nan)
+    pose = np.tile(np.eye(4), (len(frames), 1, 1))
     for i, frame in enumerate(frames):
         rows = frame.transform_matrix
         if len(rows) not in (3, 4) or any(len(row) != 4 for row in rows):
-            shape = "x".join(map(str, (len(rows), len(rows[0]) if rows else 0)))
-            raise RecordingError(f"{file}: the transform_matrix of {frame.file_path!r} is {shape}; it must be 4x4.")
-        pose[i, 3] = (0.0, 0.0, 0.0, 1.0)
+            raise RecordingError(f"{file}: the transform_matrix of {frame.file_path!r} is not 4x4; convert it again.")
         pose[i, : len(rows)] = rows
     pose[:, :3, 3] /= scale
     return from_opengl(pose)
@@ -239,9 +236,8 @@ def _numbers(file: Path, frame: _Frame, given: _Transforms, size: tuple[int, int
 
 
 # What the app writes beside; it says nothing about how the pictures are read.
-_POLYCAM_IDLE = (
-    "t_30", "t_31", "t_32", "t_33", "blur_score", "center_depth", "neighbors", "angular_velocity", "manual_keyframe",
-)  # fmt: skip
+_POLYCAM_IDLE = ("blur_score", "center_depth", "neighbors", "angular_velocity", "manual_keyframe")
+_POLYCAM_POSE = tuple(f"t_{row}{column}" for row in range(4) for column in range(4))
 _UNITS_S = (1.0, 1e-3, 1e-6, 1e-9)
 # Keyframes of a scan follow one another at such a pace, by which the unit of their stamps is known.
 _LEAST_INTERVAL_S, _MOST_INTERVAL_S = 0.02, 20.0
@@ -252,18 +248,6 @@ class _PolycamCamera(msgspec.Struct, frozen=True):
     fy: float
     cx: float
     cy: float
-    t_00: float
-    t_01: float
-    t_02: float
-    t_03: float
-    t_10: float
-    t_11: float
-    t_12: float
-    t_13: float
-    t_20: float
-    t_21: float
-    t_22: float
-    t_23: float
     width: int | None = None
     height: int | None = None
     timestamp: float | None = None
@@ -289,24 +273,19 @@ def open_polycam(path: Path) -> FileRecording:
     cameras, images = ("corrected_cameras", "corrected_images") if mended else ("cameras", "images")
     colour = _by_stem(frames / images, COLOUR_SUFFIXES)
     depth, described = _by_stem(frames / "depth", (".png",)), _by_stem(frames / cameras, (".json",))
-    names = [stem for stem in described if stem in colour and stem in depth]
-    if not names:
-        raise RecordingError(f"{frames} holds no frame with all of {images}/N.jpg, depth/N.png and {cameras}/N.json.")
-    partial = len((colour.keys() | depth.keys() | described.keys()) - set(names))
-    if partial:
-        left_out(path, f"{partial} frame(s) lack one of colour, depth and camera and are left out.")
+    names = whole_frames(path, cameras=described, colour=colour, depth=depth)
     files = [frames / cameras / described[stem] for stem in names]
     read = [read_json(file, _PolycamCamera, DESCRIPTION_BYTES) for file in files]
-    found = [camera for camera, _ in read]
+    found, matrices = [camera for camera, _ in read], list(map(_matrix, files, (plain for _, plain in read)))
     present = {key: None for _, plain in read for key in plain}
-    note_unread(files[0], present, (*_PolycamCamera.__struct_fields__, *_POLYCAM_IDLE), strict=False)
+    note_unread(files[0], present, (*_PolycamCamera.__struct_fields__, *_POLYCAM_POSE, *_POLYCAM_IDLE), strict=False)
     sure = _by_stem(frames / "confidence", (".png",)) if (frames / "confidence").is_dir() else {}
     shots = Shots(
         names=names,
         colour=[f"{below}{images}/{colour[stem]}" for stem in names],
         depth=[f"{below}depth/{depth[stem]}" for stem in names],
         stamps_s=_keyframe_stamps(found, names),
-        world_from_camera=from_opengl(np.stack([_matrix(camera) for camera in found])),
+        world_from_camera=from_opengl(np.stack(matrices)),
         confidence=[f"{below}confidence/{sure[s]}" for s in names] if all(s in sure for s in names) else (),
     )
     numbers = np.array([(c.fx, c.fy, c.cx, c.cy) for c in found])
@@ -322,9 +301,12 @@ def _by_stem(folder: Path, suffixes: tuple[str, ...]) -> dict[str, str]:
     return {name.split(".", 1)[0]: name for name in list_names(folder, suffixes)}
 
 
-def _matrix(camera: _PolycamCamera) -> Float[np.ndarray, "4 4"]:
-    rows = [[getattr(camera, f"t_{row}{column}") for column in range(4)] for row in range(3)]
-    return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
+def _matrix(file: Path, plain: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
+    try:
+        rows = msgspec.convert([plain[name] for name in _POLYCAM_POSE[:12]], list[float])
+    except (KeyError, msgspec.ValidationError) as error:
+        raise RecordingError(f"{file} has no pose, t_00 to t_23 ({error}); export the scan again.") from None
+    return as_poses(np.array([rows]))[0]
 
 
 def _keyframe_stamps(cameras: list[_PolycamCamera], names: list[str]) -> Float[np.ndarray, " n"]:
@@ -353,13 +335,9 @@ def open_stray_scanner(path: Path) -> FileRecording:
     inside = path / "confidence"
     sure = {number_of(name): name for name in (list_names(inside, (".png",)) if inside.is_dir() else ())}
     numbers = rows[:, 1].astype(int)
-    whole = np.array([n in depth and 0 <= n < len(video) for n in numbers], bool)
-    if not whole.any():
-        raise RecordingError(f"{path} has no frame with all of a picture in rgb.mp4, depth/ and a row in odometry.csv.")
-    if not whole.all():
-        lost = f"{int((~whole).sum())} row(s) of odometry.csv have no depth or no video frame and are left out."
-        left_out(path, lost, path / "odometry.csv")
-    rows, numbers = rows[whole], numbers[whole]
+    row_of = {int(number): row for row, number in enumerate(numbers)}
+    whole = whole_frames(path, odometry=row_of, depth=depth, video=dict(enumerate(video.stamps_s)))
+    rows, numbers = rows[[row_of[number] for number in whole]], np.array(whole)
     shots = Shots(
         names=[f"{n:06d}" for n in numbers],
         colour=[],
@@ -385,7 +363,7 @@ def _odometry(file: Path) -> np.ndarray:
             f"{file} begins with {','.join(header)[:60]!r} where the header {','.join(_HEADER)} belongs; is it another "
             "app's, or another version's?"
         )
-    table = read_table(file, (len(header),), header=True)
+    table = read_table(file, (len(header),))
     finite = table.values[np.isfinite(table.values[:, :2]).all(axis=1)]
     if len(finite) == 0:
         raise RecordingError(f"{file} holds no pose, so there is nothing to map.")
@@ -439,68 +417,68 @@ def _record3d_layout(path: Path) -> tuple[str, str, str] | None:
     return None
 
 
-class _Files:
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        try:
-            self._archive = zipfile.ZipFile(path) if path.is_file() else None
-        except (zipfile.BadZipFile, OSError) as error:
-            raise RecordingError(
-                f"{path} is no whole .r3d, which is a ZIP archive ({error}); share it from Record3D again."
-            ) from None
+Place = Path | zipfile.Path  # in a folder, or in a .r3d
 
-    def names(self, folder: str, suffixes: tuple[str, ...]) -> list[str]:
-        if self._archive is None:
-            return list_names(self.path / folder, suffixes)
-        every = [name.split("/") for name in self._archive.namelist()]
-        return [name[-1] for name in every if name[:-1] == [folder] and name[-1].lower().endswith(suffixes)]
 
-    def read(self, name: str, limit: int = PICTURE_BYTES) -> bytes:
-        if self._archive is None:
-            return images.read_bytes(self.path / name)
-        try:
-            if self._archive.getinfo(name).file_size > limit:
-                raise ValueError(f"it has more than {limit:,} bytes")
-            return self._archive.read(name)
-        except (KeyError, ValueError, zipfile.BadZipFile, OSError, EOFError, zlib.error, RuntimeError) as error:
-            raise RecordingError(f"{name} in {self.path} cannot be read ({error}); share it again.") from None
+def _inside(path: Path) -> Place:
+    try:
+        return zipfile.Path(path) if path.is_file() else path / "EXR_RGBD" if (path / "EXR_RGBD").is_dir() else path
+    except (zipfile.BadZipFile, OSError) as error:
+        raise RecordingError(
+            f"{path} is no whole .r3d, which is a ZIP archive ({error}); share it from Record3D again."
+        ) from None
 
-    def unpack_sound(self, folder: Path) -> None:
-        """Write the archive's sound track into a folder, where it has one."""
-        name = likeliest_sound(self._archive.namelist() if self._archive is not None else ())
-        if name is not None:
-            (folder / f"audio{Path(name).suffix.lower()}").write_bytes(self.read(name, SOUND_BYTES))
 
-    def has(self, name: str) -> bool:
-        if self._archive is None:
-            return (self.path / name).is_file()
-        return name in self._archive.NameToInfo
+def _names(folder: Place, suffixes: tuple[str, ...]) -> list[str]:
+    if isinstance(folder, Path):
+        return list_names(folder, suffixes)
+    return [file.name for file in folder.iterdir() if file.name.lower().endswith(suffixes)] if folder.is_dir() else []
+
+
+def _read(place: Place, limit: int = PICTURE_BYTES) -> bytes:
+    if isinstance(place, Path):
+        return images.read_bytes(place)
+    try:
+        if place.root.getinfo(place.at).file_size > limit:
+            raise ValueError(f"it has more than {limit:,} bytes")
+        return place.read_bytes()
+    except (KeyError, ValueError, zipfile.BadZipFile, OSError, EOFError, zlib.error, RuntimeError) as error:
+        raise RecordingError(f"{place} cannot be read ({error}); share it again.") from None
 
 
 class _Pictures:
-    def __init__(self, files: _Files) -> None:
-        self._files = files
+    def __init__(self, inside: Place) -> None:
+        self._inside = inside
 
     def colour(self, name: str, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
-        return images.decode_colour(self._files.path / name, self._files.read(name), camera)
+        return images.decode_colour(Path(str(self._inside / name)), _read(self._inside / name), camera)
 
     def depth(self, name: str, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
-        depth_m = _record3d_depth(self._files, name, (camera.width, camera.height))
-        confidence = name.removesuffix(".depth") + ".conf"
-        if name.endswith(".depth") and self._files.has(confidence):
-            depth_m[_unfolded(self._files, confidence, depth_m.size).reshape(depth_m.shape) == 0] = 0.0
+        place, shape = self._inside / name, (camera.height, camera.width)
+        if name.endswith(".exr"):
+            depth_m = _exr(place)
+            if depth_m.shape != shape:
+                raise RecordingError(
+                    f"{place} is {depth_m.shape[1]}x{depth_m.shape[0]}, the others {camera.width}x{camera.height}; "
+                    "every picture of a recording must have one size."
+                )
+            return images.metres(depth_m, 1.0)
+        depth_m = images.metres(_unfolded(place, 4 * camera.width * camera.height).view("<f4").reshape(shape), 1.0)
+        confidence = self._inside / (name.removesuffix(".depth") + ".conf")
+        if confidence.is_file():
+            depth_m[_unfolded(confidence, depth_m.size).reshape(shape) == 0] = 0.0
         return depth_m
 
 
-def _unfolded(files: _Files, name: str, size: int) -> UInt8[np.ndarray, " n"]:
-    content = files.read(name)
-    raw = content if len(content) == size else _decompressed(files, name, content, size)
+def _unfolded(place: Place, size: int) -> UInt8[np.ndarray, " n"]:
+    content = _read(place)
+    raw = content if len(content) == size else _decompressed(place, content, size)
     if len(raw) != size:
-        raise RecordingError(f"{name} in {files.path} has {len(raw):,} bytes where {size:,} belong; share it again.")
+        raise RecordingError(f"{place} has {len(raw):,} bytes where {size:,} belong; share it again.")
     return np.frombuffer(raw, np.uint8)
 
 
-def _decompressed(files: _Files, name: str, content: bytes, most: int) -> bytes:
+def _decompressed(place: Place, content: bytes, most: int) -> bytes:
     import lzfse
 
     library: Any = lzfse
@@ -510,67 +488,43 @@ def _decompressed(files: _Files, name: str, content: bytes, most: int) -> bytes:
         return library.decompress(content)
     except (library.error, ValueError, MemoryError) as error:
         reason = str(error) or "it is no LZFSE stream"
-        raise RecordingError(f"{name} in {files.path} cannot be read: {reason}; share or copy it again.") from None
+        raise RecordingError(f"{place} cannot be read: {reason}; share or copy it again.") from None
 
 
-def _record3d_depth(files: _Files, name: str, size: tuple[int, int]) -> Float32[np.ndarray, "h w"]:
-    width, height = size
-    if name.endswith(".exr"):
-        depth_m = _exr(files, name)
-        if depth_m.shape != (height, width):
-            raise RecordingError(
-                f"{files.path / name} is {depth_m.shape[1]}x{depth_m.shape[0]}, the others {width}x{height}; every "
-                "picture of a recording must have one size."
-            )
-    else:
-        depth_m = _unfolded(files, name, 4 * width * height).view("<f4").reshape(height, width)
-    return images.metres(depth_m, 1.0)
-
-
-def _exr(files: _Files, name: str) -> Float32[np.ndarray, "h w"]:
+def _exr(place: Place) -> Float32[np.ndarray, "h w"]:
     import OpenEXR
 
     library: Any = OpenEXR
     try:
-        header = library.File(BytesIO(files.read(name)), header_only=True).header()
+        header = library.File(BytesIO(_read(place)), header_only=True).header()
         (x0, y0), (x1, y1) = header["dataWindow"]
         if (int(x1) - int(x0) + 1) * (int(y1) - int(y0) + 1) > images.MOST_PIXELS:
             raise ValueError("it is larger than any depth picture")
-        channels: dict[str, Any] = library.File(BytesIO(files.read(name)), separate_channels=True).channels()
+        channels: dict[str, Any] = library.File(BytesIO(_read(place)), separate_channels=True).channels()
         likely = next((n for n in ("Z", "R", "Y", "A") if n in channels), next(iter(channels)))
         return np.asarray(channels[likely].pixels, np.float32)
     except (RuntimeError, ValueError, TypeError, KeyError, StopIteration, MemoryError) as error:
         raise RecordingError(
-            f"{files.path / name} cannot be read as OpenEXR ({str(error).splitlines()[0][:120]}); copy it again, or "
-            "share the .r3d instead."
+            f"{place} cannot be read as OpenEXR ({str(error).splitlines()[0][:120]}); copy it again, or share the "
+            ".r3d instead."
         ) from None
 
 
 @opener
 def open_record3d(path: Path) -> StoredRecording:
     """Open a recording in place."""
-    inside = path / "EXR_RGBD" if (path / "EXR_RGBD").is_dir() else path
-    layout = ("metadata", "rgbd", "rgbd") if path.is_file() else _record3d_layout(inside)
+    inside = _inside(path)
+    layout = _record3d_layout(inside) if isinstance(inside, Path) else ("metadata", "rgbd", "rgbd")
     if layout is None:
         raise RecordingError(f"{path} holds neither metadata with rgbd/ nor metadata.json with rgb/ and depth/.")
-    files = _Files(inside)
     described, colour_in, depth_in = layout
-    file = inside / described
-    given, plain = _metadata(files, file, described)
+    file = Path(str(inside / described))
+    given, plain = parse_json(file, _read(inside / described, MANIFEST_BYTES), _Metadata)
     _require_whole(file, given)
-    colour = {number_of(name): name for name in files.names(colour_in, images.COLOUR_SUFFIXES)}
-    depth = {number_of(name): name for name in files.names(depth_in, (".depth", ".exr"))}
-    numbers = [n for n in range(len(given.poses)) if n in colour and n in depth]
-    if not numbers:
-        raise RecordingError(
-            f"{inside} has {len(given.poses)} poses, {len(colour)} colour and {len(depth)} depth pictures, and no "
-            "frame with all three; was it recorded with LiDAR?"
-        )
+    colour = {number_of(name): name for name in _names(inside / colour_in, images.COLOUR_SUFFIXES)}
+    depth = {number_of(name): name for name in _names(inside / depth_in, (".depth", ".exr"))}
+    numbers = whole_frames(path, pose=dict(enumerate(given.poses)), colour=colour, depth=depth)
     note_unread(file, plain, (*_Metadata.__struct_fields__, *_RECORD3D_IDLE), strict=False)
-    if len(numbers) < max(len(given.poses), len(colour)):
-        lost = max(len(given.poses), len(colour)) - len(numbers)
-        sentence = f"{lost} frame(s) lack one of colour, depth and pose and are left out."
-        left_out(inside, sentence, file)
     given_s = _record3d_stamps(given)
     shots = Shots(
         names=[str(n) for n in numbers],
@@ -581,26 +535,22 @@ def open_record3d(path: Path) -> StoredRecording:
     )
     if fault := pace_fault(shots.stamps_s, "frames", 1.0 / _fps(given)):
         raise RecordingError(f"{file}: {fault}")
-    rig = _record3d_rig(files, file, given, shots)
-    folder = Path(tempfile.mkdtemp(prefix="avlmaps-r3d-")) if path.is_file() else None
-    if folder is not None:
-        files.unpack_sound(folder)
+    rig = _record3d_rig(inside, file, given, shots)
+    folder = None
+    if isinstance(inside, zipfile.Path):
+        folder = Path(tempfile.mkdtemp(prefix="avlmaps-r3d-"))
+        if (sound := likeliest_sound(inside.root.namelist())) is not None:
+            (folder / f"audio{Path(sound).suffix.lower()}").write_bytes(_read(inside / sound, SOUND_BYTES))
     audio = open_audio(folder or path, float(given_s[0]))
     if audio is not None and folder is not None:
         audio = replace(audio, label=f"{path.name}/{audio.path.name}")
     recording = StoredRecording.settled(
-        path, "record3d", rig, shots, lambda _: file, pictures=_Pictures(files),
+        path, "record3d", rig, shots, lambda _: file, pictures=_Pictures(inside),
         up_in_world=UP_IN_WORLD.copy(), audio=audio,
     )  # fmt: skip
     if folder is not None:  # a track is read by pieces, for as long as the recording is open
         weakref.finalize(recording, shutil.rmtree, folder, ignore_errors=True)
     return recording
-
-
-def _metadata(files: _Files, file: Path, name: str) -> tuple[_Metadata, dict[str, Any]]:
-    if files.path.is_dir():
-        return read_json(file, _Metadata)
-    return parse_json(file, files.read(name, MANIFEST_BYTES), _Metadata)
 
 
 def _fps(given: _Metadata) -> float:
@@ -616,18 +566,15 @@ def _record3d_stamps(given: _Metadata) -> Float[np.ndarray, " n"]:
 
 def _require_whole(file: Path, given: _Metadata) -> None:
     rows, k, stamps = given.perFrameIntrinsicCoeffs, given.K, given.frameTimestamps
-    wrong = [
-        what
-        for what, right in (
-            ("a pose of other than seven numbers (qx qy qz qw tx ty tz)", all(len(row) == 7 for row in given.poses)),
-            (f"{len(stamps)} frameTimestamps for {len(given.poses)} poses", len(stamps) in (0, len(given.poses))),
-            ("a row of perFrameIntrinsicCoeffs of other than four numbers", all(len(row) == 4 for row in rows)),
-            (f"K of {len(k)} numbers, where nine belong", rows or len(k) == 9),
-        )
-        if not right
-    ]
-    if wrong:
-        raise RecordingError(f"{file} has {' and '.join(wrong)}; share it from Record3D again.")
+    wrong = {
+        "a pose of other than seven numbers (qx qy qz qw tx ty tz)": any(len(row) != 7 for row in given.poses),
+        f"{len(stamps)} frameTimestamps for {len(given.poses)} poses": len(stamps) not in (0, len(given.poses)),
+        "a row of perFrameIntrinsicCoeffs of other than four numbers": any(len(row) != 4 for row in rows),
+        f"K of {len(k)} numbers, where nine belong": not rows and len(k) != 9,
+    }
+    if any(wrong.values()):
+        what = " and ".join(name for name, is_wrong in wrong.items() if is_wrong)
+        raise RecordingError(f"{file} has {what}; share it from Record3D again.")
 
 
 def _record3d_poses(given: _Metadata) -> Float[np.ndarray, "n 4 4"]:
@@ -635,22 +582,19 @@ def _record3d_poses(given: _Metadata) -> Float[np.ndarray, "n 4 4"]:
     return from_opengl(rigid(rows[:, 4:], rows[:, :4]))
 
 
-def _record3d_rig(files: _Files, file: Path, given: _Metadata, shots: Shots) -> Rig:
+def _record3d_rig(inside: Place, file: Path, given: _Metadata, shots: Shots) -> Rig:
     k = given.K
     numbers = np.array(given.perFrameIntrinsicCoeffs or [[k[0], k[4], k[6] or k[2], k[7] or k[5]]], np.float64)
     camera = median_camera(file, numbers, given.w, given.h)
-    rgb_size = images.picture_size(files.path / shots.colour[0], files.read(shots.colour[0]))
+    first, deep = inside / shots.colour[0], inside / shots.depth[0]
+    rgb_size = images.picture_size(Path(str(first)), _read(first))
     depth_size = (given.dw, given.dh)
-    if shots.depth[0].endswith(".exr"):
-        height, width = _exr(files, shots.depth[0]).shape
+    if deep.name.endswith(".exr"):
+        height, width = _exr(deep).shape
         depth_size = (width, height)
     elif not (given.dw > 0 and given.dh > 0):
-        depth_size = _size_like(files, shots.depth[0], camera)
+        count = len(_decompressed(deep, _read(deep), 4 * camera.width * camera.height)) // 4
+        width = max(1, round((count * camera.width / camera.height) ** 0.5))
+        depth_size = (width, count // width)
     note_resized(camera, rgb_size)
     return fitted_rig(camera, rgb_size, depth_size, file)
-
-
-def _size_like(files: _Files, name: str, camera: Pinhole) -> tuple[int, int]:
-    count = len(_decompressed(files, name, files.read(name), 4 * camera.width * camera.height)) // 4
-    width = max(1, round((count * camera.width / camera.height) ** 0.5))
-    return width, count // width

@@ -3,6 +3,7 @@
 The first line of a table, or the comment above it, may name its columns, in any order and with their units.
 """
 
+import os
 import re
 from array import array
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -12,8 +13,9 @@ from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
+from avlmaps.core import timeline
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, MANIFEST_BYTES, TABLE_BYTES, decode_json, open_regular, read_regular
@@ -34,51 +36,34 @@ _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 _COMMENT_SHARE = 0.5
 
 
-@dataclass(frozen=True, slots=True)
-class ColumnOrder:
-    """Where each wanted column stands in the file, and the factor that takes it to seconds or metres."""
-
-    columns: tuple[int, ...]
-    factors: tuple[float, ...]
-
-    def applied(self, values: Float[np.ndarray, "n c"]) -> Float[np.ndarray, "n c"]:
-        """Return rows of the file in the wanted order and units."""
-        return values[:, self.columns] * np.array(self.factors)
-
-
-def split_header(text: str) -> list[str]:
-    """Return the fields of a line of names; a name may hold spaces where commas or semicolons part the names."""
+def split_fields(text: str, most: int = 0) -> list[str]:
+    """Return the fields of a line; one may hold spaces where commas, semicolons or tabs part them, or as the last."""
     text = text.lstrip("#%").strip()
     separator = next((sign for sign in ";,\t" if sign in text), None)
-    return [field.strip() for field in text.split(separator)]
+    return [field.strip() for field in text.split(separator, most - 1 if most and separator is None else -1)]
 
 
-def named_order(fields: Sequence[str], wanted: Sequence[str]) -> ColumnOrder:
-    """Return where the wanted columns stand."""
+def named_order(fields: Sequence[str], wanted: Sequence[str]) -> tuple[list[int], list[float]]:
+    """Return where the wanted columns stand among the fields of a header, and what takes each to seconds or metres."""
     found: dict[str, tuple[int, float]] = {}
     for at, field in enumerate(fields):
         column, factor = _column(field)
         if column not in wanted:
-            raise ValueError(f"{field!r} is none of the columns {','.join(wanted)}, which may stand in any order")
+            raise ValueError(
+                f"{field!r} is none of the columns {','.join(wanted)}, which may stand in any order, in "
+                f"{', '.join((*_METRES, *_SECONDS))}"
+            )
         if column in found:
             raise ValueError(f"{fields[found[column][0]]!r} and {field!r} both name the column {column}")
         found[column] = (at, factor)
     if missing := [column for column in wanted if column not in found]:
         raise ValueError(f"the column {missing[0]} is missing; {','.join(wanted)} are needed")
-    return ColumnOrder(tuple(found[column][0] for column in wanted), tuple(found[column][1] for column in wanted))
+    return [found[column][0] for column in wanted], [found[column][1] for column in wanted]
 
 
-def is_header_in_comment(fields: Sequence[str], wanted: Sequence[str]) -> bool:
-    """Return whether a comment is a list of columns: as many as are wanted, of which it names some."""
-    known = sum(_column_or_none(field) in wanted for field in fields)
+def _is_header_in_comment(fields: Sequence[str], wanted: Sequence[str]) -> bool:
+    known = sum(_column(field)[0] in wanted for field in fields)
     return len(fields) == len(wanted) and known >= _COMMENT_SHARE * len(wanted)
-
-
-def _column_or_none(field: str) -> str:
-    try:
-        return _column(field)[0]
-    except ValueError:
-        return ""
 
 
 def _column(field: str) -> tuple[str, float]:
@@ -91,21 +76,17 @@ def _column(field: str) -> tuple[str, float]:
     if not unit and stem and suffix in {**_SECONDS, **_METRES}:
         word, unit = stem, suffix
     if word in _TIME:
-        return "stamp_s", _factor(field, unit, _SECONDS)
-    if word in _FILE:
+        column, units = "stamp_s", _SECONDS
+    elif word in _FILE:
         return "name", 1.0
-    prefix, axis = word[:-1].strip("_"), word[-1:]
-    kinds = [kind for part in prefix.split("_") for kind, words in (("t", _PLACE), ("q", _TURN)) if part in words]
-    kind = kinds[0] if kinds else "q" if axis == "w" and not prefix else "t" if not prefix else ""
-    if not kind or axis not in ("xyz" if kind == "t" else "xyzw"):
+    else:
+        prefix, axis = word[:-1].strip("_"), word[-1:]
+        kinds = [kind for part in prefix.split("_") for kind, words in (("t", _PLACE), ("q", _TURN)) if part in words]
+        kind = kinds[0] if kinds else "" if prefix else "q" if axis == "w" else "t"
+        column, units = (kind + axis, _METRES) if kind == "t" else (kind + axis, {})
+    if column not in POSE or (unit and units and unit not in units):
         return "", 1.0
-    return kind + axis, _factor(field, unit, _METRES) if kind == "t" else 1.0
-
-
-def _factor(field: str, unit: str, units: dict[str, float]) -> float:
-    if unit and unit not in units:
-        raise ValueError(f"{field!r} has the unit {unit!r}; known are {', '.join(units)}")
-    return units.get(unit, 1.0)
+    return column, units.get(unit, 1.0)
 
 
 # A line holds 16 numbers or a name; without a limit a file of zeros would be one line of gigabytes.
@@ -157,14 +138,12 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
                 yield number, text
 
 
-def read_table(path: Path, columns: tuple[int, ...], header: bool = False, names: Sequence[str] = ()) -> Table:
+def read_table(path: Path, columns: tuple[int, ...], names: Sequence[str] = ()) -> Table:
     """Read lines of numbers, split at commas, semicolons (with decimal commas, too) or white space.
 
     Args:
         path: the file.
         columns: how many numbers a line may have; the first line decides which of them.
-        report: called with every line that is not as it should be.
-        header: whether the first line may name the columns instead.
         names: the columns that are wanted. Where the first line, or the comment above it, names columns, they are
             returned in this order and in seconds and metres; a name that is not known is a fault.
     """
@@ -173,49 +152,36 @@ def read_table(path: Path, columns: tuple[int, ...], header: bool = False, names
     first = True
     for number, text in _lines(path):
         if text.startswith("#"):
-            if names and first and is_header_in_comment(split_header(text), names):
+            if names and first and _is_header_in_comment(split_fields(text), names):
                 heading = number, text
             continue
-        fields = _fields(text)
+        fields, is_first, first = _fields(text), first, False
+        if is_first and not _any_number(fields):
+            heading = number, text
+            continue
         try:
             row = [_number(field) for field in fields]
         except ValueError:
-            if (header or names) and first and not _any_number(fields):
-                heading, first = (number, text) if names else None, False
-                continue
-            first = False
             report(f"{path}, line {number}: {text[:40]!r} is not all numbers; fix the line.", path, number)
             continue
-        first = False
         if len(row) not in columns or (width and len(row) != width):
             wanted = width or " or ".join(map(str, columns))
-            kitti = ": 12 are a 3x4 matrix, as KITTI has poses; write stamps, positions and quaternions"
-            sentence = (
-                f"{path}, line {number}: there are {len(row)} numbers where {wanted} belong"
-                f"{kitti if len(row) == 12 else '; fix the line'}."
-            )
+            fix = "write stamps, positions and quaternions for KITTI's matrices" if len(row) == 12 else "fix the line"
+            sentence = f"{path}, line {number}: there are {len(row)} numbers where {wanted} belong; {fix}."
             report(sentence, path, number)
             continue
         width = len(row)
         values.extend(row)
         lines.append(number)
-    table = np.frombuffer(values, np.float64) if len(values) else np.zeros(0)
-    table = table.reshape(-1, width or columns[0])
-    return Table(_in_order(path, heading, table, names), np.array(lines, np.int64))
-
-
-def _in_order(
-    path: Path, heading: tuple[int, str] | None, table: Float[np.ndarray, "n c"], names: Sequence[str]
-) -> Float[np.ndarray, "n c"]:
-    if heading is None or (len(table) and table.shape[1] != len(names)):
-        return table
-    number, text = heading
-    try:
-        return named_order(split_header(text), names).applied(table)
-    except ValueError as error:
-        sentence = f"{path}, line {number}: {error}; write the header as {','.join(names)}, or leave it out."
-        report(sentence, path, number)
-        return table
+    table = (np.frombuffer(values, np.float64) if len(values) else np.zeros(0)).reshape(-1, width or columns[0])
+    if heading is not None and names and (not len(table) or table.shape[1] == len(names)):
+        try:
+            at, factors = named_order(split_fields(heading[1]), names)
+            table = table[:, at] * np.array(factors)
+        except ValueError as error:
+            again = f"write the header as {','.join(names)}, or leave it out"
+            report(f"{path}, line {heading[0]}: {error}; {again}.", path, heading[0])
+    return Table(table, np.array(lines, np.int64))
 
 
 def _fields(text: str) -> list[str]:
@@ -382,21 +348,120 @@ def note_resized(camera: Pinhole, size: tuple[int, int]) -> None:
         note(f"The pictures are {size[0]}x{size[1]}; the intrinsics of {width}x{height} are scaled to them.")
 
 
-def read_pose_file(path: Path) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 4 4"]]:
-    """Return the stamps and the poses (4x4, metres) of a table: stamp tx ty tz qx qy qz qw, or as its header says."""
-    table = read_table(path, (8,), names=POSE)
-    if not len(table.values):
-        raise RecordingError(f"{path} holds no pose; it needs a line of stamp tx ty tz qx qy qz qw for each.")
-    pose = rigid(table.values[:, 1:4], table.values[:, 4:])
-    wrong = ~np.isfinite(pose).all(axis=(1, 2)) | ~np.isfinite(table.values[:, 0])
-    if wrong.any():
-        row = int(np.flatnonzero(wrong)[0])
-        length = np.linalg.norm(table.values[row, 4:])
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseTable:
+    """Poses of a text file, one a line; NaN where a line is no pose.
+
+    Attributes:
+        stamps_s: (n,) the first of eight or nine numbers; of fewer or more the line's number among the poses.
+        pose: (n, 4, 4).
+        lines: (n,) each one's line in the file, from 1.
+        ids: (n,) the last of nine numbers, else the line's number among the poses.
+        stamped: whether the file has stamps.
+    """
+
+    stamps_s: Float[np.ndarray, " n"]
+    pose: Float[np.ndarray, "n 4 4"]
+    lines: Int[np.ndarray, " n"]
+    ids: Float[np.ndarray, " n"]
+    stamped: bool
+
+    @property
+    def usable(self) -> Bool[np.ndarray, " n"]:
+        """Which of them are poses."""
+        return np.asarray(np.isfinite(self.pose).all(axis=(1, 2)))
+
+    def trajectory(self, what: str) -> timeline.Trajectory | None:
+        """Return the poses in the order of time, None where there is none; gaps and resets are noted."""
+        rows = np.flatnonzero(self.usable)
+        order = timeline.in_order(self.stamps_s[rows], f"poses of {what}")
+        note(*order.notices)
+        rows = rows[order.index]
+        return timeline.Trajectory(self.stamps_s[rows], self.pose[rows]) if len(rows) else None
+
+
+def as_poses(rows: Float[np.ndarray, "n c"]) -> Float[np.ndarray, "n 4 4"]:
+    """Return poses of seven numbers (position, quaternion x y z w), of a matrix of twelve, or of one of sixteen."""
+    if rows.shape[1] == 16:
+        return rows.reshape(-1, 4, 4)
+    if rows.shape[1] == 7:
+        return rigid(rows[:, :3], rows[:, 3:])
+    pose = np.tile(np.eye(4), (len(rows), 1, 1))
+    pose[:, :3] = rows.reshape(-1, 3, 4)
+    return pose
+
+
+def read_poses(path: Path, widths: tuple[int, ...] = (8,)) -> PoseTable:
+    """Read a table of poses; a line that is no pose is reported, and not used.
+
+    Args:
+        path: the file.
+        widths: how many numbers a line may have: 7 (tx ty tz qx qy qz qw), 8 (after a stamp), 9 (before an id), 12 or
+            16 (a matrix, row by row). A header may name those of the first of them.
+    """
+    if not os.path.lexists(path):
+        raise RecordingError(f"{path} is missing; the recording needs it.")
+    table = read_table(path, widths, names=POSE[8 - widths[0] :] if widths[0] <= 8 else ())
+    values, stamped = table.values, table.values.shape[1] in (8, 9)
+    counted = np.arange(len(values), dtype=np.float64)
+    found = PoseTable(
+        values[:, 0] if stamped else counted,
+        as_poses(values[:, 1:8] if stamped else values),
+        table.lines,
+        values[:, 8] if values.shape[1] == 9 else counted,
+        stamped,
+    )
+    found.pose[~np.isfinite(found.stamps_s)] = np.nan
+    wrong = np.flatnonzero(~found.usable)
+    for row in wrong.tolist():
+        line = int(table.lines[row])
+        why = f"the quaternion has length {np.linalg.norm(values[row, 3 + stamped : 7 + stamped]):.3g}, where 1 belongs"
+        why = why if np.isfinite(values[row]).all() else "it is NaN or infinite"
+        report(f"{path}, line {line}: this is no pose, and not used; {why}.", path, line, fatal=False)
+    if len(wrong) == len(values):
+        shape = "x y z qx qy qz qw" if widths[0] <= 8 else "a matrix"
         raise RecordingError(
-            f"{path}, line {int(table.lines[row])}: this is no pose (NaN, or a quaternion of length {length:.3g}, "
-            "where 1 belongs); fix or remove the line."
+            f"{path} holds no usable pose, so there is nothing to map; a line is {'stamp ' * (widths[0] == 8)}{shape}."
         )
-    return table.values[:, 0], pose
+    if len(wrong):
+        note(f"{len(wrong)} line(s) of {path.name} are no poses and not used.")
+    return found
+
+
+def read_list(path: Path, columns: Sequence[str]) -> list[list[Any]]:
+    """Return the rows of a list of files: a text of each column ``name``, a number of others; a header may be first."""
+    rows: list[list[Any]] = []
+    at, factors, first = list(range(len(columns))), [1.0] * len(columns), True
+    for number, text in text_lines(path):
+        fields = split_fields(text, len(columns))
+        try:
+            if first and not _any_number(fields):
+                at, factors = named_order(fields, columns)
+                continue
+            if len(fields) != len(columns) or "" in fields:
+                raise ValueError(f"{text[:40]!r} is not {','.join(columns)}; fix the line")
+            in_order = zip(columns, [fields[i] for i in at], factors, strict=True)
+            rows.append([_file(field) if name == "name" else float(field) * by for name, field, by in in_order])
+        except ValueError as error:
+            report(f"{path}, line {number}: {error}.", path, number)
+        finally:
+            first = False
+    return rows
+
+
+def _file(name: str) -> str:
+    return (name if "/" in name else name.replace("\\", "/")).removeprefix("./")  # as Windows writes paths
+
+
+def read_pose_file(path: Path) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 4 4"]]:
+    """Return the stamps and the poses (4x4, metres) of a table, of which every line must be one."""
+    found = read_poses(path)
+    if not found.usable.all():
+        line = int(found.lines[np.argmin(found.usable)])
+        raise RecordingError(
+            f"{path}, line {line}: this is no pose (NaN, or a quaternion of another length than 1); fix or remove it."
+        )
+    return found.stamps_s, found.pose
 
 
 def on_clock_of(stamps_s: Float[np.ndarray, " n"], recording: Recording) -> Float[np.ndarray, " n"]:
