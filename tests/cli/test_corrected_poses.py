@@ -61,9 +61,9 @@ def test_a_map_that_is_not_there_is_built_first(answer, walk: Path, tmp_path: Pa
 
 
 FILES = {
-    "empty": ("", "holds no pose"),
+    "empty": ("", "holds no usable pose"),
     "words": ("here there\nand everywhere\n", "numbers"),
-    "no quaternion": ("0.1 0 0 0 0 0 0 0\n", "line 1: this is no pose"),
+    "no quaternion": ("0.1 0 0 0 0 0 0 1\n0.2 0 0 0 0 0 0 0\n", "line 2: this is no pose"),
     "another clock": ("1700000000.0 0 0 0 0 0 0 1\n", "of no frame"),
     "backwards": ("0.2 0 0 0 0 0 0 1\n0.1 0 0 0 0 0 0 1\n", "must rise"),
 }

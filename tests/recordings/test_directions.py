@@ -127,16 +127,16 @@ def add_directions(maker: BagMaker) -> None:
 
 
 @pytest.mark.parametrize("kind", ["ros1", "mcap"])
-@pytest.mark.parametrize("topic", ["/doa", "/doa_rad", "/doa_deg", "/doa_pose", "/doa_place"])
-def test_a_topic_of_a_bag_gives_directions(kind: str, topic: str, tmp_path: Path) -> None:
+def test_a_topic_of_a_bag_gives_directions(kind: str, tmp_path: Path) -> None:
     path = write_bag(tmp_path, kind, sound=True, more=add_directions)
-    recording = open_recording(path, topics={"directions": topic})
-    assert recording.audio is not None and recording.audio.directions is not None
-    found = recording.audio.directions
-    assert np.allclose(np.rad2deg(found.azimuth_rad), np.arange(10.0, 91.0, 10.0), atol=0.01)
-    assert np.allclose(np.diff(found.stamp_s), 0.1, atol=1e-3) and abs(found.stamp_s[0] - 0.05) < 0.02
-    assert recording.topics["directions"] == topic
-    assert any("degrees" in notice for notice in recording.notices) == (topic in ("/doa", "/doa_deg"))
+    for topic in ("/doa", "/doa_rad", "/doa_deg", "/doa_pose", "/doa_place"):
+        recording = open_recording(path, topics={"directions": topic})
+        assert recording.audio is not None and recording.audio.directions is not None
+        found = recording.audio.directions
+        assert np.allclose(np.rad2deg(found.azimuth_rad), np.arange(10.0, 91.0, 10.0), atol=0.01)
+        assert np.allclose(np.diff(found.stamp_s), 0.1, atol=1e-3) and abs(found.stamp_s[0] - 0.05) < 0.02
+        assert recording.topics["directions"] == topic
+        assert any("degrees" in notice for notice in recording.notices) == (topic in ("/doa", "/doa_deg"))
 
 
 def test_topics_that_give_no_directions_are_refused(tmp_path: Path) -> None:

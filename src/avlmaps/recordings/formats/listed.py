@@ -112,7 +112,8 @@ def open_orb_slam(path: Path) -> FileRecording:
     assert listed is not None
     rows = _associations(listed)
     order = timeline.in_order(np.array([row[0] for row in rows]), f"lines of {listed.name}")
-    kept = [rows[i] for i in order.index]
+    at: list[int] = order.index.tolist()
+    kept = [rows[i] for i in at]
     stamps_s = np.array([row[0] for row in kept])
     if not kept:
         raise RecordingError(f"{listed} lists no frame, so there is nothing to map.")
