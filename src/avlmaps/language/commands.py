@@ -26,8 +26,16 @@ from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.names import is_entry
 from avlmaps.language.questions import read_question
-from avlmaps.language.rephrase import any_one, forms
-from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, language_of, stand_ins
+from avlmaps.language.sentence import (
+    ASK,
+    Attachments,
+    Sentence,
+    StandIns,
+    any_one,
+    forms,
+    language_of,
+    stand_ins,
+)
 from avlmaps.language.storey_words import SaidStorey, changes_storey, said_storeys
 from avlmaps.language.verbalise import verbalise
 from avlmaps.language.word_classes import load_word_classes

@@ -7,7 +7,7 @@ back costs a second and a drive costs more, so the limit is below one half.
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -16,7 +16,7 @@ import numpy as np
 
 from avlmaps.core.errors import BackendError
 from avlmaps.language.lexer import tokenise
-from avlmaps.language.rephrase import rewritten
+from avlmaps.language.sentence import rewritten
 from avlmaps.language.word_classes import filled, table, words_of
 from avlmaps.perception.embedded.words import WordPieces
 from avlmaps.perception.networks import open_network
@@ -47,34 +47,25 @@ class NoOrder:
         return self.kind == _UNSURE
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
-    kind: str
-    answer: str
-    says: re.Pattern[str]
-
-
 def no_order(text: str) -> NoOrder | None:
     """Return why a sentence may be no order, to the robot, now; None where it is one."""
     said = " ".join(token.text for token in tokenise(text))
     # What is said of the robot ("send the rover to the door") is judged as if it were said to it.
-    to_it, _ = rewritten(text, only_robot=True)
-    ordered = " ".join(token.text for token in tokenise(to_it))
-    closed = (NoOrder(row.kind, row.answer) for row in _rows() if row.kind != _ORDER and row.says.search(said))
-    found = next(closed, None)
-    if found is not None or any(row.says.search(ordered) for row in _rows() if row.kind == _ORDER):
-        return found
-    judge = _judge()
-    unsure = judge.probability(text if ordered == said else ordered) > judge.limit
+    ordered = " ".join(token.text for token in tokenise(rewritten(text, only_robot=True)[0]))
+    closed = (kind for kind, rows in _rows().items() if kind != _ORDER and any(row.search(said) for row in rows))
+    kind = next(closed, None)
+    if kind is not None:
+        return NoOrder(kind, table("gate")[kind]["answer"])
+    if any(row.search(ordered) for row in _rows()[_ORDER]):
+        return None
+    unsure = _judge().probability(text if ordered == said else ordered) > _judge().limit
     return NoOrder(_UNSURE, _UNSURE_ANSWER) if unsure else None
 
 
 @cache
-def _rows() -> Sequence[_Row]:
-    words, kinds = words_of("gate"), {kind: of for kind, of in table("gate").items() if kind != "words"}
-    return [
-        _Row(kind, of["answer"], re.compile(filled(row, words))) for kind, of in kinds.items() for row in of["rows"]
-    ]
+def _rows() -> Mapping[str, Sequence[re.Pattern[str]]]:
+    words, kinds = words_of("gate"), table("gate").items()
+    return {kind: [re.compile(filled(row, words)) for row in of["rows"]] for kind, of in kinds if "rows" in of}
 
 
 class _Judge:

@@ -153,6 +153,8 @@ def spelled(words: Sequence[str]) -> tuple[int, float] | None:
     if found is None:
         return None
     size = found[0].count(" ") + 1
+    if found["run"]:
+        return size, float("".join(str(_NUMBERS[word]) for word in found["run"].split()))
     if found["half"]:
         return size, _folded(found["half"].split()[:-4]) * 1000 + 500.0
     digits = "".join(str(_NUMBERS[word]) for word in (found["digits"] or "").split())

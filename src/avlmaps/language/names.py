@@ -68,14 +68,17 @@ def is_other_form(word: str, other: str) -> bool:
 def may_name(name: str) -> bool:
     """Return whether the head of a name is an English word that can name a thing, whether or not a map can find it.
 
-    "Hedge" and "footstool" are; "tabel" and "frobnicator" are misspelt or no words.
+    "Hedge", "footstool", "coffee stand" and "theatre two" are; "tabel" and "frobnicator" are misspelt or no words.
     """
-    head = name.lower().split()[-1:]
-    if not head or len(head[0]) < _SHORTEST_NOUN or head[0] in listed("never") or head[0] in _verbs():
+    words = name.lower().split()
+    while len(words) > 1 and (words[-1] in WORDS or words[-1].isdigit()):
+        words.pop()
+    head = words[-1] if words else ""
+    if len(words) > 1 and head in _verbs() and _is_spelt(head) and may_name(words[-2]):
+        return True
+    if len(head) < _SHORTEST_NOUN or head in listed("never") or head in _verbs():
         return False
-    if head[0] in _adjectives() or head[0].endswith("ly"):
-        return False
-    return _is_spelt(head[0])
+    return head not in _adjectives() and not head.endswith("ly") and _is_spelt(head)
 
 
 def _is_spelt(word: str) -> bool:
@@ -271,7 +274,7 @@ def _better(word: str) -> str | None:
         swapped = {other for other in near if len(other) == len(word) and sorted(other) == sorted(word)}
         longer = {other for other in near if len(other) > len(word)} if len(word) == _SHORTEST - 1 else set()
         near = swapped or longer
-    if not near or is_word(word):  # "forge" is no misspelt "forget"
+    if not near or is_word(word) or word in _words_of("nouns"):  # "forge" is no misspelt "forget"
         return None
     plain = {other for other in near if other.rstrip("s") not in near or other == other.rstrip("s")}
     better = plain.pop() if len(plain) == 1 else None

@@ -1,14 +1,18 @@
 """A sentence as tokens, and what comes with it: files, the map's own names, and the language that it is in.
 
+Forms that the networks do not know are written as those that they know, by rows of `rewrites.toml`: what another person
+should make the robot do ("send the robot to the lab") is said to it, what waits is said before its order.
+
 Names that people gave to things and rooms ("my charging dock") are in no lexicon. A sentence is read with a known word
 in the place of each, since what was learnt reads such words best; what was read has the own name again.
 """
 
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import Any
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
@@ -16,10 +20,17 @@ from avlmaps.core.words import singulars_of
 from avlmaps.language.claims import claimed_words
 from avlmaps.language.intents import Pick, Target, TargetKind
 from avlmaps.language.lexer import WORDS, Token, in_figures, tokenise
-from avlmaps.language.names import class_words, is_entry, is_known, respelt, sounding_words
-from avlmaps.language.rephrase import forms, rewritten
+from avlmaps.language.names import (
+    class_words,
+    is_entry,
+    is_known,
+    respelt,
+    sounding_forms,
+    sounding_words,
+    third_forms,
+)
 from avlmaps.language.verbalise import phrase
-from avlmaps.language.word_classes import table
+from avlmaps.language.word_classes import filled, listed, load_word_classes, pattern, table, words_of
 from avlmaps.perception.embedded.words import is_word
 
 OwnName = tuple[str, bool]
@@ -144,6 +155,66 @@ class StandIns:
         return replace(target, name=own.name, pick=pick, number=own.number, near=near)
 
 
+def rewritten(text: str, *, only_robot: bool = False) -> tuple[str, list[str]]:
+    """Return a sentence with the forms of the rows rewritten, and one note for each that a person should know of.
+
+    Args:
+        text: the sentence.
+        only_robot: whether only what is said of the robot is said to it.
+    """
+    notes: list[str] = []
+    for says, row in forms("row"):
+        found = None if only_robot and not row.get("robot") else says.search(text)
+        if found is not None:
+            notes += [found.expand(row["note"])] if "note" in row else []
+            text = says.sub(row["to"], text)
+    return text if only_robot else _sounding().sub(_whatever, text), notes
+
+
+@cache
+def _sounding() -> re.Pattern[str]:
+    """Return what finds a thing that has no name but its sound: "the thing that rings", "the beeping device"."""
+    nameless, generic = "|".join(listed("nameless")), "|".join(listed("nameless") | listed("generic"))
+    silent = listed("silent")
+    rings = "|".join(sorted(third_forms() - silent))
+    ringing = "|".join(sorted({ing for ing in sounding_forms().values() if ing not in silent}))
+    return re.compile(
+        rf"(?:(?:\b(?:the|an?|some|any) )?\b(?:{generic}) (?:that|which|who)|\bwhat(?:ever)?|\bwhoever) "
+        rf"(?P<rings>{rings})\b"
+        rf"|\b(?:the|an?|some|any) (?P<ringing>{ringing}) (?:{nameless})\b"
+        rf"|\b(?:the|an?|some|any) (?:{nameless}) (?:that|which) is (?P<rung>{ringing})\b",
+        re.IGNORECASE,
+    )
+
+
+def _whatever(found: re.Match[str]) -> str:
+    rings = found["rings"]
+    sound = sounding_forms()[rings.lower()] if rings else found["ringing"] or found["rung"]
+    return f"whatever is {sound}"
+
+
+@cache
+def forms(kind: str) -> Sequence[tuple[re.Pattern[str], Mapping[str, Any]]]:
+    """Return the rows of a kind: ``row`` is written in another form, ``pick`` and ``condition`` are taken apart."""
+    words = {**words_of("rewrites"), "order": "|".join(sorted(_order_words()))}
+    return [(re.compile(filled(row["says"], words), re.IGNORECASE), row) for row in table("rewrites")[kind]]
+
+
+def any_one(before: str, behind: str) -> bool:
+    """Return whether the words round a name leave it to the robot which thing of that name is meant: "any chair"."""
+    found = pattern("rewrites", "any_before").search(before) or pattern("rewrites", "any_behind").match(behind)
+    return found is not None
+
+
+def _order_words() -> frozenset[str]:
+    classes = load_word_classes().words
+    names = ("GO", "TURN", "FACE", "WAIT", "CIRCLE", "RETURN", "BACK_UP")
+    begins = {phrase.split()[0] for name in names for phrase in classes[name]}
+    return frozenset(
+        re.escape(word) for word in begins - {"the", "a", "be", "is", "to", "you", "your", "in", "on", "and", "with"}
+    )
+
+
 def is_reserved(name: str) -> bool:
     """Return whether a name would take a word of orders: "stop", "left", "5 m", "near the bed"."""
     said = [token.text for token in tokenise(name) if token.kind != "punct"]
@@ -160,25 +231,21 @@ def stand_ins(text: str, names: Sequence[OwnName], *, orders: bool = False) -> S
     ``orders``: also for each thing that is chosen by its order ("the second nearest chair").
     """
     out, own = text, dict[str, Target]()
+
+    def stand_in(said: str, target: Target) -> None:
+        nonlocal out
+        words = _ROOMS if target.kind is TargetKind.AREA else _THINGS
+        word = next((one for one in words if one not in own and one not in text.casefold()), None)
+        pattern = re.compile(rf"(?<![\w-]){said}(?![\w-])", re.IGNORECASE)
+        if word is not None and pattern.search(out):
+            out, own[word] = pattern.sub(f"the {word}", out), target
+
     for name, is_room in sorted(names, key=lambda one: -len(one[0])):
-        if is_reserved(name) or lexicon().find(name, EntryKind.ROOM if is_room else EntryKind.THING) is not None:
-            continue
-        said = re.compile(rf"(?<![\w-])(?:(?:the|a|an|my|your|our) )?{re.escape(name)}(?![\w-])", re.IGNORECASE)
-        if not said.search(out):
-            continue
-        free = (one for one in (_ROOMS if is_room else _THINGS) if one not in own and one not in text.casefold())
-        word = next(free, None)
-        if word is None:
-            break
-        out = said.sub(f"the {word}", out)
-        own[word] = Target(TargetKind.AREA if is_room else TargetKind.OBJECT, name)
-    free = (one for one in _THINGS if one not in own and one not in text.casefold())
+        if not is_reserved(name) and lexicon().find(name, EntryKind.ROOM if is_room else EntryKind.THING) is None:
+            target = Target(TargetKind.AREA if is_room else TargetKind.OBJECT, name)
+            stand_in(rf"(?:(?:the|a|an|my|your|our) )?{re.escape(name)}", target)
     for words, target in chosen_things(out) if orders else ():
-        word = next(free, None)
-        if word is None:
-            break
-        out = out.replace(words, f"the {word}")
-        own[word] = target
+        stand_in(re.escape(words), target)
     return StandIns(out, own)
 
 

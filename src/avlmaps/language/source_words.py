@@ -5,7 +5,7 @@ each of its parts has its own place; so have several sounds of a question that s
 """
 
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 from itertools import pairwise
 
@@ -69,33 +69,12 @@ def seeks_source(tokens: Sequence[Token], own: Sequence[int], others: Collection
         own = [number for number, token in enumerate(tokens) if token.text in _listed("recordings")][:1]
     if not own:
         return False
-    begin, end = min(own), max(own) + 1
-    while begin > 0 and not _is_break(tokens[begin - 1]) and begin - 1 not in others:
-        begin -= 1
-    while end < len(tokens) and not _is_break(tokens[end]) and end not in others:
-        end += 1
+    breaks = {at for at, token in enumerate(tokens) if token.kind == "punct" or token.text in _listed("breaks")}
+    cuts = sorted({-1, len(tokens), *breaks, *others})
+    end = min(cut for cut in cuts if cut > max(own))
+    clauses = [tokens[max(cut for cut in cuts if cut < min(own)) + 1 : end]]
+    until = min((other for other in others if other >= end), default=len(tokens))
+    behind = (tokens[first + 1 : last] for first, last in pairwise(cut for cut in cuts if end <= cut <= until))
+    clauses += [clause for clause in behind if not _listed("refers").isdisjoint(token.text for token in clause)]
     sound = {tokens[number].text for number in own}
-    clauses = (_text(tokens[begin:end]), *_behind(tokens, end, others))
-    return any(asks_for_source(clause, sound) for clause in clauses)
-
-
-def _behind(tokens: Sequence[Token], at: int, others: Collection[int]) -> Iterator[str]:
-    """Yield the clauses behind a place that refer to what was said before, up to the next name."""
-    clause: list[Token] = []
-    for number in range(at, len(tokens) + 1):
-        if number < len(tokens) and not _is_break(tokens[number]) and number not in others:
-            clause.append(tokens[number])
-            continue
-        if not _listed("refers").isdisjoint(token.text for token in clause):
-            yield _text(clause)
-        if number in others:
-            return
-        clause = []
-
-
-def _is_break(token: Token) -> bool:
-    return token.kind == "punct" or token.text in _listed("breaks")
-
-
-def _text(tokens: Sequence[Token]) -> str:
-    return " ".join(token.text for token in tokens)
+    return any(asks_for_source(" ".join(token.text for token in clause), sound) for clause in clauses)

@@ -8,6 +8,7 @@ from avlmaps.language.claims import claimed_words, lacking
 from avlmaps.language.intents import Clarify, Intent, Pick, Refuse, Side, Target, TargetKind
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import class_words, is_known, may_name, near_names
+from avlmaps.language.word_classes import listed
 from avlmaps.perception.embedded.words import is_word
 
 _FILES = {
@@ -131,7 +132,7 @@ def _picked(target: Target) -> str:
 
 def is_strange(word: str) -> bool:
     """Return whether a word is none that is known."""
-    known = is_word(word) or is_known(word) or may_name(word) or word in class_words()
+    known = is_word(word) or is_known(word) or may_name(word) or word in class_words() | listed("choices")
     return len(word) > _SHORT and word.isalpha() and not known
 
 

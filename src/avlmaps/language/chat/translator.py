@@ -21,7 +21,6 @@ from avlmaps.language.program import SKILLS, Program, parse_program, skill_lines
 from avlmaps.language.program.parser import called
 from avlmaps.language.translator import Translation
 
-MOST_COMMAND_CHARACTERS = 500
 _MOST_SAID_CHARACTERS = 4000
 _MOST_DONE = 40
 _MOVES_NOTHING = (
@@ -267,30 +266,14 @@ def system_prompt() -> str:
 
 
 def command_message(command: str) -> str:
-    """Return the turn that gives a command.
-
-    Raises:
-        LanguageError: the command is empty or too long.
-    """
+    """Return the turn that gives a command."""
     return f"Command: {json.dumps(plain_command(command), ensure_ascii=False)}"
 
 
 def plain_command(command: str) -> str:
-    """Return a command on one line, without control characters or halves of letters.
-
-    Raises:
-        LanguageError: it is empty or too long.
-    """
+    """Return a command on one line, without control characters or halves of letters."""
     letters = command.encode("utf-8", "replace").decode("utf-8")
-    plain = " ".join("".join(letter for letter in letters if letter.isprintable() or letter.isspace()).split())
-    if not plain:
-        raise LanguageError("The command is empty; say where the robot shall go, such as: go to the sofa.")
-    if len(plain) > MOST_COMMAND_CHARACTERS:
-        raise LanguageError(
-            f"The command has {len(plain)} characters, more than {MOST_COMMAND_CHARACTERS}; say it shorter, or in "
-            "several commands."
-        )
-    return plain
+    return " ".join("".join(letter for letter in letters if letter.isprintable() or letter.isspace()).split())
 
 
 def unusable_message(fault: str) -> str:
