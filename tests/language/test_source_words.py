@@ -9,8 +9,8 @@ from avlmaps.language.intents import TargetKind, targets_of
 from avlmaps.language.list_questions import Listed, read_list
 from avlmaps.language.program import parse_program
 from avlmaps.language.questions import read_question
+from avlmaps.language.said_places import asks_for_source
 from avlmaps.language.sentence import Attachments
-from avlmaps.language.source_words import asks_for_source
 from avlmaps.language.translator import LearnedTranslator
 
 WORDS = Attachments(at=None)

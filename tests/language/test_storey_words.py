@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
+from avlmaps.language.said_places import asks_how_many_storeys, said_storeys
 
 # Question: what is left, number, above, excluded.
 NAMED = {

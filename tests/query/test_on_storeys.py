@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Question
-from avlmaps.language.storey_words import said_storeys
+from avlmaps.language.said_places import said_storeys
 from avlmaps.maps.storeys import Storey, Storeys
 from avlmaps.query.answer import Answer, PartAnswer
 from avlmaps.query.asking import on_storey

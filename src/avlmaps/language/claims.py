@@ -78,9 +78,13 @@ def _known() -> Mapping[str, str]:
 
 
 @cache
-def _rows(kind: str) -> Sequence[tuple[Row, re.Pattern[str]]]:
-    rows = msgspec.convert(table("claims")[kind], list[Row])
-    return [(row, re.compile(f"(?<![^ ^@$])(?:{filled(row.says, _known())})")) for row in rows]
+def _rows(kind: str) -> Sequence[Row]:
+    return msgspec.convert(table("claims")[kind], list[Row])
+
+
+@cache
+def _pattern(says: str) -> re.Pattern[str]:
+    return re.compile(f"(?<![^ ^@$])(?:{filled(says, _known())})")
 
 
 @cache
@@ -126,8 +130,8 @@ class _Marked:
 
 
 def _first(kind: str, marked: _Marked, facts: frozenset[str]) -> Refuse | Clarify | None:
-    for row, says in _rows(kind):
-        found = says.search(marked.text) if row.of <= facts and row.unless.isdisjoint(facts) else None
+    for row in _rows(kind):
+        found = _pattern(row.says).search(marked.text) if row.of <= facts and row.unless.isdisjoint(facts) else None
         if found is None:
             continue
         start, end = next((found.span(name) for name in found.groupdict() if found[name]), found.span())

@@ -26,6 +26,7 @@ from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.names import is_entry
 from avlmaps.language.questions import read_question
+from avlmaps.language.said_places import SaidStorey, changes_storey, said_storeys
 from avlmaps.language.sentence import (
     ASK,
     Attachments,
@@ -36,7 +37,6 @@ from avlmaps.language.sentence import (
     language_of,
     stand_ins,
 )
-from avlmaps.language.storey_words import SaidStorey, changes_storey, said_storeys
 from avlmaps.language.verbalise import verbalise
 from avlmaps.language.word_classes import load_word_classes
 
@@ -109,7 +109,7 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
 def _branched(text: str, given: Attachments | None) -> Command | None:
     """Return a command whose steps depend on whether the map has a thing; None for any other."""
     said = " ".join(token.text for token in tokenise(text))
-    found = next(filter(None, (says.fullmatch(said) for says, _ in forms("condition"))), None)
+    found = next(filter(None, (says.fullmatch(said) for says, _ in forms("condition", said))), None)
     parts = {} if found is None else found.groupdict()
     what = re.sub(r" (?:is|are|'s)(?: not| n't)? ", " ", parts.get("what") or "")
     thing = _thing(what, given) if what else None

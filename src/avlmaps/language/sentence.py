@@ -163,8 +163,8 @@ def rewritten(text: str, *, only_robot: bool = False) -> tuple[str, list[str]]:
         only_robot: whether only what is said of the robot is said to it.
     """
     notes: list[str] = []
-    for says, row in forms("row"):
-        found = None if only_robot and not row.get("robot") else says.search(text)
+    for says, row in forms("row", text.lower(), only_robot=only_robot):
+        found = says.search(text)
         if found is not None:
             notes += [found.expand(row["note"])] if "note" in row else []
             text = says.sub(row["to"], text)
@@ -193,11 +193,21 @@ def _whatever(found: re.Match[str]) -> str:
     return f"whatever is {sound}"
 
 
+def forms(kind: str, text: str, *, only_robot: bool = False) -> Iterator[tuple[re.Pattern[str], Mapping[str, Any]]]:
+    """Yield the rows of a kind: ``row`` is written in another form, ``pick`` and ``condition`` are taken apart.
+
+    Rows of which no word of `has` is in the text cannot fit it, and are not compiled.
+    """
+    for row in table("rewrites")[kind]:
+        has = row.get("has", "").split()
+        if (row.get("robot") or not only_robot) and (not has or any(word in text for word in has)):
+            yield _form(row["says"]), row
+
+
 @cache
-def forms(kind: str) -> Sequence[tuple[re.Pattern[str], Mapping[str, Any]]]:
-    """Return the rows of a kind: ``row`` is written in another form, ``pick`` and ``condition`` are taken apart."""
+def _form(says: str) -> re.Pattern[str]:
     words = {**words_of("rewrites"), "order": "|".join(sorted(_order_words()))}
-    return [(re.compile(filled(row["says"], words), re.IGNORECASE), row) for row in table("rewrites")[kind]]
+    return re.compile(filled(says, words), re.IGNORECASE)
 
 
 def any_one(before: str, behind: str) -> bool:
@@ -251,7 +261,7 @@ def stand_ins(text: str, names: Sequence[OwnName], *, orders: bool = False) -> S
 
 def chosen_things(text: str) -> Iterator[tuple[str, Target]]:
     """Yield the things of a sentence that are chosen by their order, each with its words."""
-    for says, _ in forms("pick"):
+    for says, _ in forms("pick", text.lower()):
         for found in says.finditer(text):
             said = found.groupdict()
             words = found["name"].lower().split()

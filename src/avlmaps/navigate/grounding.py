@@ -13,7 +13,7 @@ from avlmaps.core.errors import GoalNotFoundError, ProgramError, SeveralFitError
 from avlmaps.core.question import HeardAt
 from avlmaps.core.wording import option, place_text, the_room
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
-from avlmaps.language.storey_words import said_storeys
+from avlmaps.language.said_places import said_storeys
 from avlmaps.maps.store.folder import stamp
 from avlmaps.maps.storeys import said_storeys as storeys_in_words
 from avlmaps.navigate.file_access import Readable

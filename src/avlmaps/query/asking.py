@@ -222,7 +222,7 @@ def _of_storeys(asking: _Asking) -> Answer | None:
     sentence = asking.asked.sentence
     if not any(stem in sentence.lower() for stem in _STOREY_STEMS):  # a query of one word loads nothing of the language
         return None
-    from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
+    from avlmaps.language.said_places import asks_how_many_storeys, said_storeys
     from avlmaps.query.lists import answer_on_storey, how_many
 
     if asks_how_many_storeys(sentence):
@@ -267,7 +267,7 @@ def _of_parts(asking: _Asking) -> Answer | None:
 
 
 def _of_sources(asking: _Asking) -> Answer | None:
-    from avlmaps.language.source_words import asks_for_source
+    from avlmaps.language.said_places import asks_for_source
     from avlmaps.query.sound_sources import no_sources
 
     if (asking.asked.at or asking.avlmap.settings.sounds.at) is not None or not asks_for_source(asking.asked.sentence):

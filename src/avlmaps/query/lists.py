@@ -20,7 +20,7 @@ from avlmaps.core.wording import the_room
 from avlmaps.core.words import stem_of
 from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.language.names import sounding_forms
-from avlmaps.language.storey_words import SaidStorey
+from avlmaps.language.said_places import SaidStorey
 from avlmaps.maps.storeys import Storeys, said_storeys
 from avlmaps.query import changes
 from avlmaps.query.answer import Alternative, Answer, in_words, place_of, placed

@@ -22,7 +22,7 @@ from avlmaps.language.learned import linear
 from avlmaps.language.learned.features import columns, features
 from avlmaps.language.learned.linear import INDEX, SYMBOLS
 from avlmaps.language.lexer import Token
-from avlmaps.language.source_words import seeks_source
+from avlmaps.language.said_places import seeks_source
 from avlmaps.perception.embedded.words import words_checksum
 from avlmaps.perception.networks import open_network
 

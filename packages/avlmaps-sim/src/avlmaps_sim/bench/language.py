@@ -109,7 +109,7 @@ def _asked(sentence: str, given: Attachments) -> dict[str, Any]:
     """
     from avlmaps.language.list_questions import read_list, said_alternatives, said_number, speaks_of_photo
     from avlmaps.language.questions import read_question
-    from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
+    from avlmaps.language.said_places import asks_how_many_storeys, said_storeys
 
     if asks_how_many_storeys(sentence):
         return {"ask": "list", "counts": "storeys"}
@@ -249,7 +249,7 @@ def _target(target: Any) -> Any:
 
 
 def _storey_apart(target: Any, kind: str) -> Any:
-    from avlmaps.language.storey_words import said_storeys
+    from avlmaps.language.said_places import said_storeys
 
     storeys = said_storeys(str(target[kind])) if kind in ("object", "area") else ()
     if len(storeys) != 1 or not storeys[0].said or not storeys[0].rest:
