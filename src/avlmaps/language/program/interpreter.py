@@ -248,7 +248,7 @@ class _Run:
         if isinstance(target, ast.Name):
             value = [value]
         else:
-            values.check_kind(target.lineno, "unpack", values.kind_of(value))
+            values.needed(target.lineno, "unpack", value)
         if len(value) != len(names):
             raise misfit(target.lineno, len(names), len(value))
         self.names.update(zip(names, value, strict=True))
@@ -294,10 +294,7 @@ class _Run:
         return self.names[name]
 
     def needed(self, node: ast.expr, use: str) -> Any:
-        """Return the value of an expression; refuse one that does not serve a use."""
-        value = self.value(node)
-        values.check_kind(node.lineno, use, values.kind_of(value))
-        return value
+        return values.needed(node.lineno, use, self.value(node))
 
     def truth(self, node: ast.expr) -> bool:
         return bool(self.needed(node, "truth"))
@@ -320,9 +317,7 @@ class _Run:
         left = self.value(node.left)
         for op, operand in zip(node.ops, node.comparators, strict=True):
             right, sign = self.value(operand), SIGNS[type(op)]
-            values.check_comparison(node.lineno, sign, values.kind_of(left), values.kind_of(right))
-            if not sign.startswith("is"):
-                self.step(node.lineno, values.compared(node.lineno, left, right))
+            self.step(node.lineno, values.compared(node.lineno, sign, left, right))
             if not _COMPARE[sign](left, right):
                 return False
             left = right
@@ -338,10 +333,8 @@ class _Run:
 
     def function_call(self, node: ast.Call) -> Value:
         name, arguments = called(node), [self.value(each) for each in node.args]
-        kinds = tuple(values.kind_of(each) for each in arguments)
-        values.check_function(node.lineno, name, kinds)
-        if name in ("min", "max") and len(kinds) == 1:
-            self.step(node.lineno, len(arguments[0]))
+        if name in ("min", "max"):
+            self.step(node.lineno, sum(len(each) for each in arguments if isinstance(each, (list, tuple, range))))
         return values.call_function(node.lineno, name, arguments)
 
     # ---- skills

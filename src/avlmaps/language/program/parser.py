@@ -1,29 +1,19 @@
 """From text to a program: Python's own parser reads it, and a whitelist of its nodes says what may stand in one.
 
 Characters that hide what a line does, letters that only look like others and odd escapes are refused before. A program
-with a part that is not on the whitelist is refused by its line, and so is one that must fail wherever it gets to: a
-robot that has begun to move should not stop half way for a slip that could be seen from the start. What is left means
-what Python means by it.
+with a part that is not on the whitelist is refused by its line, and so are unknown skills, arguments that do not fit
+and names without a value. What is left means what Python means by it; what values do not go together a run finds.
 """
 
 import ast
 import re
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from avlmaps.core.errors import ProgramError
 from avlmaps.core.printable import UNSAFE, printable
 from avlmaps.core.words import nearest
-from avlmaps.language.program.values import (
-    bounded,
-    check_comparison,
-    check_function,
-    check_kind,
-    kind_of,
-    kind_of_result,
-    refused,
-)
+from avlmaps.language.program.values import bounded, kind_of, refused
 from avlmaps.language.program.vocabulary import ROBOT, SKILLS, Skill, ValueType
 
 MOST_CHARACTERS = 20_000
@@ -71,6 +61,7 @@ _INSTEAD = {
     "Break Continue": "put it into the block of a `for`",
     "Attribute": "the only dot is that of `robot.SKILL(...)`; a list grows by `name = name + [element]`",
 }  # fmt: skip
+_KINDS = {ast.List: ValueType.LIST, ast.Tuple: ValueType.TUPLE, ast.Compare: ValueType.TRUTH}
 _REMEDIES = {name: remedy for names, remedy in _INSTEAD.items() for name in names.split()}
 
 
@@ -209,18 +200,14 @@ def target_names(target: ast.expr) -> list[str]:
     ]
 
 
-Guess = ValueType | None  # the kind of a value; None where it may have several
+Guess = ValueType | None  # the kind of a value; None where only a run can tell
 
 
 class _Checker:
-    """Refuses a program that has a part that is none, or that must fail wherever it gets to what is wrong.
-
-    A name has a kind where one line alone gives it a value.
-    """
+    """Refuses a program that has a part that is none, or that must fail wherever it gets to what is wrong."""
 
     def __init__(self, statements: Sequence[ast.stmt]) -> None:
-        self.lines = Counter(name for one in statements for node in ast.walk(one) for name in _names_given(node))
-        self.kinds: dict[str, Guess] = {}
+        self.names = {name for one in statements for node in ast.walk(one) for name in _names_given(node)}
         self.given: set[str] = set()  # the names that a line before gave a value
 
     def block(self, nodes: Sequence[ast.stmt], deep: int = 0, *, in_loop: bool = False) -> None:
@@ -229,170 +216,108 @@ class _Checker:
         for node in nodes:
             self.statement(node, deep + 1, in_loop)
 
-    def statement(self, node: ast.stmt, deep: int, in_loop: bool) -> None:  # noqa: C901 - one case for each form
-        line = node.lineno
+    def statement(self, node: ast.stmt, deep: int, in_loop: bool) -> None:
         match node:
             case ast.Assign(targets=[target]):
-                self.assign(target, node.value)
-            case ast.AugAssign(target=ast.Name(id=name)):
-                before, sign = self.name(line, name), _sign(line, node.op)
-                made = self.arithmetic(line, sign, before, self.value(node.value))
-                if sign == "+" and made is ValueType.LIST:
-                    raise grown(line, name)
-                self.give(line, name, made)
+                self.value(node.value)
+                self.give(target)
+            case ast.AugAssign(target=ast.Name(id=name)) if type(node.op) in SIGNS:
+                self.name(node.lineno, name)
+                self.value(node.value)
+                self.give(node.target)
             case ast.Expr(value=ast.Call() as call):
                 self.value(call)
                 if called(call) not in SKILLS:
-                    raise _no_part(line, node)
+                    raise _no_part(node)
             case ast.For(orelse=[]):
-                self.loop(node, deep)
+                self.value(node.iter)
+                self.give(node.target)
+                # Any round but the first may use what a later line of the body gave.
+                self.given.update(*(_names_given(inner) for inner in ast.walk(node)))
+                self.block(node.body, deep, in_loop=True)
             case ast.If():
                 chosen, otherwise = branches_of(node)
                 for each in chosen:
-                    self.needed(each.test, "truth")
+                    self.value(each.test)
                     self.block(each.body, deep, in_loop=in_loop)
                 self.block(otherwise, deep, in_loop=in_loop)
-            case ast.Break() | ast.Continue() if in_loop:
-                pass
             case ast.Pass():
                 pass
-            case ast.Expr():
-                self.value(node.value)
-                raise _no_part(line, node)
+            case ast.Break() | ast.Continue() if in_loop:
+                pass
             case _:
-                raise _no_part(line, node)
+                raise _no_part(node)
 
-    def loop(self, node: ast.For, deep: int) -> None:
-        kind = self.needed(node.iter, "walk")
-        counts = kind is ValueType.RANGE and isinstance(node.target, ast.Name)
-        for name in _targets(node.target):
-            self.give(node.lineno, name, ValueType.NUMBER if counts else None)
-        # Any round but the first may use what a later line of the body gave.
-        self.given.update(*(_names_given(inner) for inner in ast.walk(node)))
-        self.block(node.body, deep, in_loop=True)
+    def give(self, target: ast.expr) -> None:
+        names, line = target_names(target), target.lineno
+        if len(names) != (len(target.elts) if isinstance(target, ast.Tuple) else 1) or not names:
+            raise refused(line, "only names take a value, as in `a = 1` and `a, b = 1, 2`; a list is made again")
+        taken = next((name for name in names if name == ROBOT or name in SKILLS or name in BUILTINS), None)
+        if taken:
+            raise refused(line, f"`{taken}` is the robot, a skill or a function; give the value another name")
+        self.given.update(names)
 
-    def assign(self, target: ast.expr, value: ast.expr) -> None:
-        names, kind = _targets(target), self.value(value)
-        kinds: list[Guess] = [kind]
-        if isinstance(target, ast.Tuple):
-            kinds = [None] * len(names)
-            if isinstance(value, ast.List | ast.Tuple):
-                kinds = [self.value(each) for each in value.elts]
-            elif isinstance(kind, ValueType):
-                check_kind(target.lineno, "unpack", kind)
-        if len(kinds) != len(names):
-            raise misfit(target.lineno, len(names), len(kinds))
-        for name, one in zip(names, kinds, strict=True):
-            self.give(target.lineno, name, one)
-
-    def give(self, line: int, name: str, kind: Guess) -> None:
-        if name == ROBOT or name in SKILLS or name in BUILTINS:
-            raise refused(line, f"`{name}` is the robot, a skill or a function; give the value another name")
-        self.kinds[name] = kind if self.lines[name] == 1 else None
-        self.given.add(name)
-
-    def needed(self, node: ast.expr, use: str, deep: int = 0) -> Guess:
-        """Return the kind of an expression; refuse one that does not serve a use."""
-        kind = self.value(node, deep)
-        if isinstance(kind, ValueType):
-            check_kind(node.lineno, use, kind)
-        return kind
-
-    def value(self, node: ast.expr, deep: int = 0) -> Guess:  # noqa: C901 - one case for each form
-        """Return the kind of an expression; refuse what is no part of a program, or cannot be."""
-        line, deep = node.lineno, deep + 1
+    def value(self, node: ast.expr, deep: int = 0) -> Guess:
+        """Return the kind of an expression; refuse what is no part of a program."""
         if deep > DEEPEST:
-            raise _too_deep(line)
+            raise _too_deep(node.lineno)
         match node:
             case ast.Constant(value=None | bool() | str() | int() | float() as value):
-                return _constant(line, value)
+                return _constant(node.lineno, value)
             case ast.Name(id=name):
-                return self.name(line, name)
-            case ast.List() | ast.Tuple():
-                for each in node.elts:
-                    self.value(each, deep)
-                return ValueType.LIST if isinstance(node, ast.List) else ValueType.TUPLE
-            case ast.UnaryOp(op=ast.Not()):
-                self.needed(node.operand, "truth", deep)
-                return ValueType.TRUTH
-            case ast.UnaryOp():
-                _sign(line, node.op)
-                self.needed(node.operand, "sign", deep)
-                return ValueType.NUMBER
-            case ast.BinOp():
-                sign = _sign(line, node.op)
-                return self.arithmetic(line, sign, self.value(node.left, deep), self.value(node.right, deep))
-            case ast.Compare():
-                return self.comparison(node, deep)
-            case ast.BoolOp():
-                kinds = [self.needed(each, "truth", deep) for each in node.values[:-1]]
-                kinds.append(self.value(node.values[-1], deep))
-                return kinds[0] if len(set(kinds)) == 1 else None
-            case ast.IfExp():
-                self.needed(node.test, "truth", deep)
-                kind, otherwise = self.value(node.body, deep), self.value(node.orelse, deep)
-                return kind if kind is otherwise else None
-            case ast.Subscript():
-                self.needed(node.value, "index of", deep)
-                self.needed(node.slice, "index", deep)
-                return None
+                return self.name(node.lineno, name)
             case ast.Call():
-                return self.call(node, deep)
+                return self.call(node, deep + 1)
+            case ast.Compare() if any(isinstance(op, ast.Is | ast.IsNot) for op in node.ops) and not any(
+                isinstance(part, ast.Constant) and part.value is None for part in (node.left, *node.comparators)
+            ):
+                raise refused(node.lineno, "`is` compares with None alone; use `==` or `!=`")
+            case (
+                ast.List() | ast.Tuple() | ast.UnaryOp() | ast.BinOp() | ast.Compare() | ast.BoolOp() | ast.IfExp()
+                | ast.Subscript()
+            ):  # fmt: skip
+                for part in ast.iter_child_nodes(node):
+                    if isinstance(part, ast.expr):
+                        self.value(part, deep + 1)
+                    elif type(part) not in SIGNS and not isinstance(part, ast.expr_context):
+                        raise _no_part(node, part)
+                return _KINDS.get(type(node))
             case _:
-                raise _no_part(line, node)
+                raise _no_part(node)
 
-    def name(self, line: int, name: str) -> Guess:
+    def name(self, line: int, name: str) -> None:
         if name == ROBOT or name in SKILLS or name in BUILTINS:
             raise refused(line, f"`{name}` is no value; write `{ROBOT}.SKILL(...)` or call the function")
-        if name not in self.given:
-            raise _without_value(line, name, self.given, later=name in self.lines)
-        return self.kinds.get(name)
-
-    def comparison(self, node: ast.Compare, deep: int) -> Guess:
-        parts = [node.left, *node.comparators]
-        kinds = [self.value(each, deep) for each in parts]
-        for at, each in enumerate(node.ops):
-            sign, left, right = _sign(node.lineno, each), kinds[at], kinds[at + 1]
-            nothing = any(isinstance(part, ast.Constant) and part.value is None for part in parts[at : at + 2])
-            if sign.startswith("is") and not nothing:
-                raise refused(node.lineno, f"`{sign}` compares with None alone; use `==` or `!=`")
-            if isinstance(left, ValueType) and isinstance(right, ValueType):
-                check_comparison(node.lineno, sign, left, right)
-        return ValueType.TRUTH
-
-    def arithmetic(self, line: int, sign: str, left: Guess, right: Guess) -> Guess:
-        if isinstance(left, ValueType) and isinstance(right, ValueType):
-            return kind_of_result(line, sign, left, right)
-        return None
+        if name in self.given:
+            return
+        if name in self.names:
+            raise refused(line, f"`{name}` is used before it has a value; give it one on a line above")
+        close = nearest(name, sorted(self.given))
+        advice = f"did you mean `{close}`?" if close else "give it one on a line above, or put a phrase in quotes."
+        raise ProgramError(f"Line {line}: `{name}` has no value; {advice}")
 
     def call(self, node: ast.Call, deep: int) -> Guess:
-        line = node.lineno
         match node.func:
             case ast.Attribute(value=ast.Name(id=robot), attr=name) if robot == ROBOT:
                 known: Sequence[str] = tuple(SKILLS)
             case ast.Name(id=name):
                 known = (*SKILLS, *BUILTINS)
             case _:
-                raise _no_part(line, node.func)
+                raise _no_part(node.func)
         if name not in known:
             close = nearest(name, known)
             advice = f"did you mean `{close}`?" if close else f"there are {', '.join(known)}."
-            raise ProgramError(f"Line {line}: there is no skill or function `{name}`; {advice}")
+            raise ProgramError(f"Line {node.lineno}: there is no skill or function `{name}`; {advice}")
         if name in BUILTINS:
-            return self.function(node, name, deep)
+            fewest, most = BUILTINS[name]
+            if node.keywords or not fewest <= len(node.args) <= most:
+                raise refused(node.lineno, f"`{name}` takes {fewest} to {most} values, and nothing by name")
+            for each in node.args:
+                self.value(each, deep)
+            return ValueType.RANGE if name == "range" else ValueType.NUMBER
         kinds = {name: self.value(each, deep) for name, each in given_to(SKILLS[name], node).items()}
-        check_arguments(line, SKILLS[name], kinds)
+        check_arguments(node.lineno, SKILLS[name], kinds)
         return SKILLS[name].returns
-
-    def function(self, node: ast.Call, name: str, deep: int) -> Guess:
-        line, (fewest, most) = node.lineno, BUILTINS[name]
-        if node.keywords or not fewest <= len(node.args) <= most:
-            raise refused(line, f"`{name}` takes {fewest} to {most} values, and nothing by name")
-        kinds = [self.value(each, deep) for each in node.args]
-        known = tuple(kind for kind in kinds if isinstance(kind, ValueType))
-        if len(known) == len(kinds):
-            check_function(line, name, known)
-        return ValueType.RANGE if name == "range" else ValueType.NUMBER
 
 
 def _constant(line: int, value: bool | str | float | None) -> ValueType:
@@ -417,35 +342,10 @@ def _names_given(node: ast.AST) -> list[str]:
             return []
 
 
-def _targets(node: ast.expr) -> list[str]:
-    """Return the names that take a value; refuse all else."""
-    names = target_names(node)
-    if len(names) != (len(node.elts) if isinstance(node, ast.Tuple) else 1) or not names:
-        raise refused(node.lineno, "only names take a value, as in `a = 1` and `a, b = 1, 2`; a list is made again")
-    return names
-
-
-def _without_value(line: int, name: str, given: set[str], *, later: bool) -> ProgramError:
-    if later:
-        return refused(line, f"`{name}` is used before it has a value; give it one on a line above")
-    if name in ("true", "false", "none", "null"):
-        return refused(line, f"`{name}` has no value; write True, False or None")
-    close = nearest(name, sorted(given))
-    if close:
-        return ProgramError(f"Line {line}: `{name}` has no value; did you mean `{close}`?")
-    return refused(line, f"`{name}` has no value; give it one on a line above, or put a phrase in quotes")
-
-
-def _sign(line: int, node: ast.AST) -> str:
-    if type(node) not in SIGNS:
-        raise _no_part(line, node)
-    return SIGNS[type(node)]
-
-
-def _no_part(line: int, node: ast.AST) -> ProgramError:
-    name = type(node).__name__
+def _no_part(node: ast.stmt | ast.expr, part: ast.AST | None = None) -> ProgramError:
+    name = type(part or node).__name__
     remedy = _REMEDIES.get(name, "call skills and work out values")
-    return refused(line, f"`{name.lower()}` is not part of a program in this form; {remedy}")
+    return refused(node.lineno, f"`{name.lower()}` is not part of a program in this form; {remedy}")
 
 
 def _too_deep(line: int) -> ProgramError:

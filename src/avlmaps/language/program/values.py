@@ -1,6 +1,6 @@
 """The values of a running program: their kinds and sizes, what operators make of them, and how a trace shows them.
 
-The check before a run and the run itself both ask here what goes with what, so that they cannot disagree.
+Tables say what goes with what; Python would allow more, such as a string times a billion.
 """
 
 from collections.abc import Callable
@@ -116,46 +116,12 @@ def kind_of(value: Value) -> ValueType:
     return _KINDS[type(value)]
 
 
-def check_kind(line: int, use: str, kind: ValueType) -> None:
-    """Refuse a kind of value for a use; see the table of uses."""
+def needed(line: int, use: str, value: Value) -> Any:
+    """Return a value; refuse one of a kind that does not serve a use, see the table of uses."""
     takes, refusal = _NEEDS[use]
-    if kind not in takes:
-        raise refused(line, refusal.format(kind))
-
-
-def check_comparison(line: int, sign: str, left: ValueType, right: ValueType) -> None:
-    """Refuse a comparison that has no meaning for these two kinds."""
-    if sign in ("in", "not in"):
-        check_kind(line, "in", right)
-        check_kind(line, "compared", left)
-    elif sign in ("==", "!="):
-        check_kind(line, "compared", left)
-        check_kind(line, "compared", right)
-    elif sign in ("<", "<=", ">", ">=") and not (left is right and left in (_NUMBER, ValueType.STRING)):
-        raise refused(line, f"`{sign}` compares two numbers or two strings, not {left} and {right}")
-
-
-def check_function(line: int, function: str, kinds: tuple[ValueType, ...]) -> None:
-    """Refuse a function what it cannot work with."""
-    if function == "len":
-        check_kind(line, "len", kinds[0])
-    elif function in ("min", "max") and len(kinds) == 1:
-        check_kind(line, "all of", kinds[0])
-    else:
-        for kind in kinds:
-            check_kind(line, "number", kind)
-
-
-def kind_of_result(line: int, sign: str, left: ValueType, right: ValueType) -> ValueType:
-    """Return the kind that an arithmetic operator makes of two.
-
-    Raises:
-        ProgramError: it does not take these.
-    """
-    results, takes, _ = _ARITHMETIC[sign]
-    if (left, right) not in results:
-        raise refused(line, f"`{sign}` takes {takes}, not {left} and {right}")
-    return results[left, right]
+    if kind_of(value) not in takes:
+        raise refused(line, refusal.format(kind_of(value)))
+    return value
 
 
 def combined(line: int, sign: str, left: Any, right: Any, factors: int) -> Value:
@@ -164,7 +130,10 @@ def combined(line: int, sign: str, left: Any, right: Any, factors: int) -> Value
     Raises:
         ProgramError: they are of no kinds that it takes, it divides by zero, or the result is too large.
     """
-    kind = kind_of_result(line, sign, kind_of(left), kind_of(right))
+    results, takes, operate = _ARITHMETIC[sign]
+    kind = results.get((kind_of(left), kind_of(right)))
+    if kind is None:
+        raise refused(line, f"`{sign}` takes {takes}, not {kind_of(left)} and {kind_of(right)}")
     if kind is _HEAT:
         count = left.factors + right.factors
         if count > factors:
@@ -173,7 +142,7 @@ def combined(line: int, sign: str, left: Any, right: Any, factors: int) -> Value
     if kind is _PLACE:
         left, right = handed_on(left), handed_on(right)
     try:
-        made = _ARITHMETIC[sign][2](left, right)
+        made = operate(left, right)
     except ZeroDivisionError:
         raise refused(line, f"`{sign}` divides by zero; check the number below with `if` first") from None
     except ValueError:  # the one value that refuses to be made is a place at infinity
@@ -183,16 +152,27 @@ def combined(line: int, sign: str, left: Any, right: Any, factors: int) -> Value
     return made
 
 
-def compared(line: int, *sides: Value) -> int:
+def compared(line: int, sign: str, left: Value, right: Value) -> int:
     """Return how many elements and characters a comparison goes through.
 
     Raises:
-        ProgramError: a list holds lists: one that is small and holds another many times over is compared for years.
+        ProgramError: it has no meaning for these two, or a list holds lists: one that is small and holds another many
+            times over is compared for years.
     """
-    nests = any(isinstance(each, (list, tuple)) for side in sides if isinstance(side, (list, tuple)) for each in side)
-    if nests:
+    if sign in ("in", "not in"):
+        needed(line, "in", right)
+    if sign in ("<", "<=", ">", ">="):
+        if kind_of(left) is not kind_of(right) or kind_of(left) not in (_NUMBER, ValueType.STRING):
+            raise refused(
+                line, f"`{sign}` compares two numbers or two strings, not {kind_of(left)} and {kind_of(right)}"
+            )
+    elif not sign.startswith("is"):
+        needed(line, "compared", left)
+        needed(line, "compared", right)
+    lists = [side for side in (left, right) if isinstance(side, (list, tuple)) and not sign.startswith("is")]
+    if any(isinstance(each, (list, tuple)) for side in lists for each in side):
         raise refused(line, "lists in lists are not compared; compare their elements")
-    return sum(1 + len(side) for side in sides if isinstance(side, (str, list, tuple)))
+    return sum(1 + len(side) for side in (left, right) if isinstance(side, (str, list, tuple)))
 
 
 def element_of(line: int, values: list[Any] | tuple[Any, ...], index: Any) -> Value:
@@ -216,11 +196,20 @@ def is_among(value: Any, collection: list[Any] | tuple[Any, ...] | range) -> boo
     return isinstance(value, int) and value in collection
 
 
-def call_function(line: int, function: str, arguments: list[Any]) -> Value:
-    """Return the result of one of the functions; its arguments are of kinds that it takes."""
+def call_function(line: int, function: str, arguments: list[Any]) -> Value:  # noqa: C901 - one case for each
+    """Return the result of one of the functions.
+
+    Raises:
+        ProgramError: it cannot work with these arguments.
+    """
+    if function == "len":
+        return len(needed(line, "len", arguments[0]))
+    numbers = arguments
+    if function in ("min", "max") and len(arguments) == 1:
+        numbers = list(needed(line, "all of", arguments[0]))
+    for number in numbers:
+        needed(line, "number", number)
     match function:
-        case "len":
-            return len(arguments[0])
         case "abs":
             return abs(arguments[0])
         case "range" | "round" if any(type(each) is not int for each in arguments[function == "round" :]):
@@ -233,11 +222,8 @@ def call_function(line: int, function: str, arguments: list[Any]) -> Value:
             if not all(-15 <= digits <= 15 for digits in arguments[1:]):
                 raise refused(line, f"`round` takes from -15 to 15 digits, not {arguments[1]}")
             return bounded(line, round(*arguments))
-    numbers = arguments if len(arguments) > 1 else list(arguments[0])
     if not numbers:
         raise refused(line, f"`{function}` of nothing has no value; check `len` with `if` first")
-    for number in numbers:
-        check_kind(line, "number", kind_of(number))
     return min(numbers) if function == "min" else max(numbers)
 
 
