@@ -194,7 +194,8 @@ def program_text(answer: ModelReply) -> str:
 
 def without_thoughts(content: str) -> str:
     """Return an answer without what a reasoning model thought aloud before it; of endless thoughts nothing is left."""
-    said = _THOUGHTS.sub("", content, count=1)
+    thoughts = _THOUGHTS.match(content)
+    said = content[thoughts.end() :] if thoughts else content
     return "" if _ENDLESS_THOUGHT.match(said) else said
 
 
