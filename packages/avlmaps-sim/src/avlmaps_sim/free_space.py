@@ -287,7 +287,6 @@ def _apart(height: Float[np.ndarray, " n"]) -> list[float]:
 
 
 def _top(height: np.ndarray, area: np.ndarray, low: float, high: float, otherwise: float) -> float:
-    """Return the highest level within a range whose surface is at least half as large as the largest there."""
     near = (height >= low) & (height <= high)
     if not near.any():
         return otherwise

@@ -163,7 +163,6 @@ def _smooth_corners(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _corner_samples(mesh: Mesh, chosen: Bool[np.ndarray, " t"], smooth: np.ndarray, first: np.ndarray,
                     incident: np.ndarray) -> tuple[_Samples, Int32[np.ndarray, "t 3"]]:  # fmt: skip
-    """Return samples at the corners of the chosen triangles, a little inside of them."""
     sample = np.full((len(mesh.triangle), 3), -1, np.int32)
     stands = np.zeros(3 * len(mesh.triangle), np.int64)
     count = sampling_kernels.share_corners(mesh.triangle, smooth, first, incident, chosen, sample, stands)

@@ -142,7 +142,6 @@ class Sensor:
 def _blurred(
     rgb: UInt8[np.ndarray, "h w 3"], motion_px: float, defocus_px: float, rng: np.random.Generator
 ) -> UInt8[np.ndarray, "h w 3"]:
-    """Return the picture with one kernel of motion and lens blur laid over it."""
     length, angle = motion_px * rng.exponential(), rng.uniform(0, np.pi)
     if length < 0.3 and defocus_px < 0.2:
         return rgb

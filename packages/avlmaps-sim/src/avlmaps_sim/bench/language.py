@@ -135,7 +135,6 @@ def _asked(sentence: str, given: Attachments) -> dict[str, Any]:
 
 
 def _list_json(listed: ListQuestion) -> dict[str, Any]:
-    """Return a question to the lists as lists of questions have it."""
     name = listed.name
     told: dict[Listed, dict[str, Any]] = {
         Listed.HEARD: {"heard": name, **({"how": listed.how} if listed.how else {})},

@@ -154,7 +154,6 @@ def _prepared(clip: Clip) -> Sound:
 
 
 def _track(sounds: Sequence[Sound], rng: np.random.Generator) -> tuple[Float32[np.ndarray, " n"], list[Segment]]:
-    """Put sounds one after the other, with pauses of any length between two bounds."""
     pieces: list[np.ndarray] = []
     truth: list[Segment] = []
     at = 0

@@ -237,7 +237,6 @@ def _paraphrased(encoder: EmbeddedSounds, features: Sequence[Features], kinds: S
 
 
 def _refusals(encoder: EmbeddedSounds, features: Sequence[Features], categories: Sequence[str]) -> Table:
-    """Return how many clips of unknown categories no question by any kind's name claims."""
     names = [kind.called[0] for kind in encoder.kinds]
     scores = encoder.score_words(features, names)
     rows = []

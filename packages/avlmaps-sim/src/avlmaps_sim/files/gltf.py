@@ -159,7 +159,6 @@ def _glb_header(path: Path) -> dict[str, Any]:
 
 
 def _parts(loaded: trimesh.Scene) -> Iterator[MeshPart]:
-    """Walk the nodes that hold triangles."""
     parents = loaded.graph.transforms.parents
     looks: dict[int, Material] = {}
     for node in sorted(loaded.graph.nodes_geometry, key=str):

@@ -142,7 +142,6 @@ def _words(root: Path) -> dict[int, str]:
 
 
 def _categories(root: Path) -> dict[str, str]:
-    """Read the table of objects, where the data set has one: a category for each template."""
     tables = [*root.glob("semantics/objects.csv"), *sorted(root.glob("metadata/object_categories*.csv"))]
     if not tables:
         return {}

@@ -12,7 +12,6 @@ from avlmaps_sim.shapes import along_y, at_height, box, cylinder, ellipsoid, lat
 
 
 def _porthole(rng: np.random.Generator, x: float, y: float, z: float, radius: float, look: Material) -> Meshes:
-    """Return a round door: ring, dark glass, a grip at its side."""
     ring = look if chance(rng, 0.4) else made_of(rng, "metal", "black", "white")
     glass, inner = material("black", rng), radius * draw(rng, 0.6, 0.8)
     out = draw(rng, 0.015, 0.05)
@@ -25,7 +24,6 @@ def _porthole(rng: np.random.Generator, x: float, y: float, z: float, radius: fl
 
 
 def _panel(rng: np.random.Generator, x: float, half: float, low: float, high: float, look: Material) -> Meshes:
-    """Return a washing machine's control panel: soap drawer, dial, display, buttons."""
     side, mid = pick(rng, (-1.0, 1.0)), (low + high) / 2
     dark, metal = material("black", rng), made_of(rng, "metal", "white", "plastic")
     yield box((x, -half + 0.003, low), (x + 0.012, half - 0.003, high), look)

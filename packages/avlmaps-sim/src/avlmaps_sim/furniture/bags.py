@@ -132,7 +132,6 @@ def _slotted_laundry(rng: np.random.Generator) -> Parts:
 
 
 def _clothes(rng: np.random.Generator, x: float, y: float, z: float) -> Meshes:
-    """Return some crumpled clothes that fill an opening up to about z."""
     for _ in range(count(rng, 0, 4)):
         n = 6
         grid = np.stack(np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij"), axis=-1)

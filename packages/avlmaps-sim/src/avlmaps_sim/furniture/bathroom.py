@@ -254,7 +254,6 @@ def _curtained_tub(rng: np.random.Generator) -> Parts:
 
 def _free_tub(rng: np.random.Generator, wide: float, long: float, z: tuple[float, float], foot: float, power: float,
               look: Material, inside: Material) -> list[Mesh]:  # fmt: skip
-    """Return a tub that stands by itself: a shell that narrows to its foot, its ends raised at times."""
     low, high = z
     lift = draw(rng, 0.0, 0.13) if chance(rng, 0.5) else 0.0
 

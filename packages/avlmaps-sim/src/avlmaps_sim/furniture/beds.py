@@ -87,7 +87,6 @@ def bedclothes(rng: np.random.Generator, plan: BedPlan) -> Meshes:
 
 
 def _runner(rng: np.random.Generator, plan: BedPlan, hang: float) -> Mesh:
-    """Return a folded spread across the foot of the bed."""
     x = plan.length * draw(rng, 0.68, 0.8)
     y, z = plan.width / 2 + 0.045, plan.top + 0.055
     profile = [
@@ -112,7 +111,6 @@ def _rails(plan: BedPlan, look: Material, tall: float, thick: float = 0.025) -> 
 
 
 def _end_board(rng: np.random.Generator, plan: BedPlan, x: float, top: float, look: Material, style: str) -> list[Mesh]:
-    """Return a headboard or a footboard at x: a panel, slats, rails, tubes or an arch, between two posts."""
     y, low = plan.width / 2 + 0.025, plan.base * 0.6
     post = named_leg(pick(rng, ("straight", "tapered")), pick(rng, (4, 4, 8)), draw(rng, 0.045, 0.075))
     arch = draw(rng, 0.05, 0.25) if style == "arch" else 0.0
@@ -148,8 +146,7 @@ def _end_board(rng: np.random.Generator, plan: BedPlan, x: float, top: float, lo
 
 
 @family("bed", "bedstead")
-def bedstead(rng: np.random.Generator) -> Parts:
-    """Return a wooden bed between a headboard and a lower footboard, or with a headboard only."""
+def _bedstead(rng: np.random.Generator) -> Parts:
     plan, look = bed_plan(rng), bed_look(rng)
     style = pick(rng, ("panel", "panel", "planks", "bars", "arch"))
     head = plan.top + draw(rng, 0.3, 0.75)
@@ -168,8 +165,7 @@ def bedstead(rng: np.random.Generator) -> Parts:
 
 
 @family("bed", "metal")
-def metal_bed(rng: np.random.Generator) -> Parts:
-    """Return a bed of metal tubes with bars or an arch at both ends."""
+def _metal_bed(rng: np.random.Generator) -> Parts:
     plan, look = bed_plan(rng, (0.28, 0.42)), made_of(rng, "metal", "black", "black", "white")
     head, foot = plan.top + draw(rng, 0.35, 0.75), plan.top + draw(rng, 0.05, 0.3)
     yield from (*bedclothes(rng, plan), *_rails(plan, look, 0.05, 0.02))
@@ -186,8 +182,7 @@ def metal_bed(rng: np.random.Generator) -> Parts:
 
 
 @family("bed", "upholstered")
-def upholstered_bed(rng: np.random.Generator) -> Parts:
-    """Return a bed whose box and headboard are covered with cloth or leather; the board may be tufted or winged."""
+def _upholstered_bed(rng: np.random.Generator) -> Parts:
     plan, look = bed_plan(rng, (0.22, 0.34), 0.75), covering(rng, 0.3)
     y, thick, head = plan.width / 2 + 0.03, draw(rng, 0.06, 0.14), plan.top + draw(rng, 0.4, 0.8)
     low = pick(rng, (0.0, 0.04, 0.12))
@@ -212,8 +207,7 @@ def upholstered_bed(rng: np.random.Generator) -> Parts:
 
 
 @family("bed", "platform")
-def platform_bed(rng: np.random.Generator) -> Parts:
-    """Return a low bed on a wide board without, or with a low, headboard; its foot stands back."""
+def _platform_bed(rng: np.random.Generator) -> Parts:
     plan, look = bed_plan(rng, (0.12, 0.28)), bed_look(rng)
     rim_m = draw(rng, 0.03, 0.2)
     y = plan.width / 2 + rim_m
@@ -228,8 +222,7 @@ def platform_bed(rng: np.random.Generator) -> Parts:
 
 
 @family("bed", "box spring")
-def box_spring(rng: np.random.Generator) -> Parts:
-    """Return a mattress on a second one on short feet, with no bedstead at all."""
+def _box_spring(rng: np.random.Generator) -> Parts:
     plan = bed_plan(rng, (0.3, 0.42))
     look = material("fabric", rng)
     low = draw(rng, 0.04, 0.14)
@@ -243,8 +236,7 @@ def box_spring(rng: np.random.Generator) -> Parts:
 
 
 @family("bed", "with drawers")
-def drawer_bed(rng: np.random.Generator) -> Parts:
-    """Return a bed on a box with drawers at its sides, or a day bed with a back along one side."""
+def _drawer_bed(rng: np.random.Generator) -> Parts:
     plan, look = bed_plan(rng, (0.32, 0.46), 0.45), bed_look(rng)
     style = front_style(rng, look, ("flat", "framed"))
     y = plan.width / 2 + 0.02
@@ -264,8 +256,7 @@ def drawer_bed(rng: np.random.Generator) -> Parts:
 
 
 @family("bed", "four-poster", held_out=True)
-def four_poster(rng: np.random.Generator) -> Parts:
-    """Return a bed whose posts carry a frame over it, perhaps with a cloth roof or drawn curtains."""
+def _four_poster(rng: np.random.Generator) -> Parts:
     plan, look = bed_plan(rng, (0.28, 0.42), 0.9), made_of(rng, "wood", "wood", "black", "metal")
     height, y = draw(rng, 1.85, 2.2), plan.width / 2 + 0.04
     turned = chance(rng, 0.4)
@@ -287,8 +278,7 @@ def four_poster(rng: np.random.Generator) -> Parts:
 
 
 @family("bed", "sleigh", held_out=True)
-def sleigh_bed(rng: np.random.Generator) -> Parts:
-    """Return a wooden bed whose head and foot roll outwards like a sleigh's."""
+def _sleigh_bed(rng: np.random.Generator) -> Parts:
     plan, look = bed_plan(rng, (0.26, 0.36), 0.8), material("wood", rng)
     y, thick = plan.width / 2 + 0.03, 0.035
     yield from (*bedclothes(rng, plan), *_rails(plan, look, 0.25, 0.03))

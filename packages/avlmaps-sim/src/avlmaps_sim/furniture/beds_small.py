@@ -33,8 +33,7 @@ def _cot_bedding(rng: np.random.Generator, length: float, width: float, z: float
 
 
 @family("crib", "barred")
-def barred_crib(rng: np.random.Generator) -> Parts:
-    """Return a cot with bars on all sides, or with solid ends."""
+def _barred_crib(rng: np.random.Generator) -> Parts:
     length, width = draw(rng, 1.15, 1.45), draw(rng, 0.62, 0.8)
     top, low = draw(rng, 0.8, 1.05), draw(rng, 0.18, 0.42)
     look, bar = made_of(rng, "white", "wood", "wood", "painted"), draw(rng, 0.065, 0.1)
@@ -62,8 +61,7 @@ def barred_crib(rng: np.random.Generator) -> Parts:
 
 
 @family("crib", "bassinet")
-def bassinet(rng: np.random.Generator) -> Parts:
-    """Return a deep oval basket of cloth or wicker on legs, perhaps with a hood."""
+def _bassinet(rng: np.random.Generator) -> Parts:
     length, width = draw(rng, 0.75, 0.95), draw(rng, 0.42, 0.55)
     low, deep = draw(rng, 0.35, 0.55), draw(rng, 0.2, 0.32)
     look = made_of(rng, "fabric", "wicker", "white")
@@ -96,8 +94,7 @@ def bassinet(rng: np.random.Generator) -> Parts:
 
 
 @family("crib", "travel cot", held_out=True)
-def travel_cot(rng: np.random.Generator) -> Parts:
-    """Return a folding cot: cloth walls with net windows between round padded rails."""
+def _travel_cot(rng: np.random.Generator) -> Parts:
     length, width, top = draw(rng, 1.0, 1.25), draw(rng, 0.6, 0.75), draw(rng, 0.7, 0.85)
     look, net, frame = material("fabric", rng), material("black", rng), material("plastic", rng)
     flat = rounded_rectangle(length, width, 0.06, 3)
@@ -122,7 +119,6 @@ def _ladder(rng: np.random.Generator, x: float, y: float, top: float, look: Mate
 
 
 def _bunk(rng: np.random.Generator, lower: bool) -> Parts:
-    """Return two beds one above the other, or one high up with free room below."""
     length, width = draw(rng, 1.9, 2.1), draw(rng, 0.8, 1.0)
     look = bed_look(rng) if chance(rng, 0.7) else material("metal", rng)
     upper = draw(rng, 1.15, 1.45)
@@ -148,14 +144,12 @@ def _bunk(rng: np.random.Generator, lower: bool) -> Parts:
 
 
 @family("bunk bed", "two beds")
-def bunk_bed(rng: np.random.Generator) -> Parts:
-    """Return two beds one above the other with a ladder and a guard rail."""
+def _bunk_bed(rng: np.random.Generator) -> Parts:
     return _bunk(rng, True)
 
 
 @family("bunk bed", "loft")
-def loft_bed(rng: np.random.Generator) -> Parts:
-    """Return one high bed on posts with room for a desk below."""
+def _loft_bed(rng: np.random.Generator) -> Parts:
     return _bunk(rng, False)
 
 
@@ -164,8 +158,7 @@ def _stand_size(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @family("nightstand", "drawers")
-def drawer_nightstand(rng: np.random.Generator) -> Parts:
-    """Return a small chest of one to three drawers on a base or legs."""
+def _drawer_nightstand(rng: np.random.Generator) -> Parts:
     depth, width, height = _stand_size(rng)
     look = board_look(rng)
     base, lift = cabinet_base(rng, depth, width, look)
@@ -178,8 +171,7 @@ def drawer_nightstand(rng: np.random.Generator) -> Parts:
 
 
 @family("nightstand", "drawer over shelf")
-def shelf_nightstand(rng: np.random.Generator) -> Parts:
-    """Return a drawer over an open bay, on a base or legs."""
+def _shelf_nightstand(rng: np.random.Generator) -> Parts:
     depth, width, height = _stand_size(rng)
     look = board_look(rng)
     base, lift = cabinet_base(rng, depth, width, look)
@@ -197,8 +189,7 @@ def shelf_nightstand(rng: np.random.Generator) -> Parts:
 
 
 @family("nightstand", "door")
-def door_nightstand(rng: np.random.Generator) -> Parts:
-    """Return a little cupboard with a door, often under a drawer."""
+def _door_nightstand(rng: np.random.Generator) -> Parts:
     depth, width, height = _stand_size(rng)
     look = board_look(rng)
     base, lift = cabinet_base(rng, depth, width, look)
@@ -215,8 +206,7 @@ def door_nightstand(rng: np.random.Generator) -> Parts:
 
 
 @family("nightstand", "table on legs")
-def legged_nightstand(rng: np.random.Generator) -> Parts:
-    """Return a small table with a drawer under its top on four slender legs, perhaps with a shelf below."""
+def _legged_nightstand(rng: np.random.Generator) -> Parts:
     depth, width, height = _stand_size(rng)
     look = board_look(rng)
     tall = draw(rng, 0.09, 0.2)
@@ -236,8 +226,7 @@ def legged_nightstand(rng: np.random.Generator) -> Parts:
 
 
 @family("nightstand", "drum", held_out=True)
-def drum_nightstand(rng: np.random.Generator) -> Parts:
-    """Return a round stand: a drum with an opening, or discs on a few rods."""
+def _drum_nightstand(rng: np.random.Generator) -> Parts:
     r, height = draw(rng, 0.18, 0.26), draw(rng, 0.42, 0.62)
     look = board_look(rng)
     flat = [(r * float(np.cos(a)), r * float(np.sin(a))) for a in np.linspace(0.0, 2 * np.pi, 16, endpoint=False)]

@@ -102,7 +102,6 @@ def grip(style: FrontStyle, x: float, y: float, z: float, upright: bool, length:
 
 
 def _panel(style: FrontStyle, room: Room, panel: Panel, glass: Material) -> Mesh:
-    """Return a closed front that fills a room."""
     (a, b, c), (d, e, f) = room.low, room.high
     frame = min(0.07, 0.25 * (e - b), 0.25 * (f - c))
     if panel == "flat":

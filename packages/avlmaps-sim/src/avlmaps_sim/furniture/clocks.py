@@ -22,7 +22,6 @@ def _hands(rng: np.random.Generator, x: float, z: float, radius: float, look: Ma
 
 
 def _dial_face(rng: np.random.Generator, x: float, z: float, radius: float) -> list[Mesh]:
-    """Return a clock's face with twelve marks and two hands, or a picture of one."""
     if chance(rng, 0.4):
         flat = circle(1.0, 24)
         ring = np.column_stack([np.full(24, x), radius * flat[:, 0], z + radius * flat[:, 1]])

@@ -13,7 +13,6 @@ from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_bo
 
 
 def _book(rng: np.random.Generator, tall: float, deep: float, thick: float) -> Mesh:
-    """Return a book lying flat with its spine at the greatest x, middle at the origin; height along y."""
     cover, paper = made_of(rng, "painted", "plastic", "leather", "fabric"), material("paper", rng)
     t = min(0.0025, thick * 0.2)
     x, y = deep / 2, tall / 2
@@ -200,7 +199,6 @@ def _rings(rng: np.random.Generator) -> Parts:
 
 
 def _shoe(rng: np.random.Generator, long: float, kind: str, look: Material, sole: Material) -> Mesh:
-    """Return a shoe along x, its toe at the greatest x."""
     wide = long * 0.36
     s = np.linspace(0.0, 1.0, 8)
     half = wide / 2 * np.interp(s, [0.0, 0.15, 0.45, 0.75, 0.92, 1.0], [0.55, 0.75, 0.7, 1.0, 0.8, 0.2])

@@ -119,7 +119,6 @@ def _laptop_tent(rng: np.random.Generator) -> Parts:
 
 
 def _case_front(rng: np.random.Generator, deep: float, wide: float, high: float, look: Material) -> Meshes:
-    """Return the parts on the front of a computer: drive bays, button, lamp, grille."""
     dark = material("black", rng)
     for i in range(count(rng, 0, 3)):
         z = high * (0.9 - 0.11 * i)

@@ -106,7 +106,6 @@ def _cone(x: float, y: float, z: float, radius: float, ring: Material, dark: Mat
 
 def _box_speaker(rng: np.random.Generator, wide: float, deep: float, z: tuple[float, float], drivers: int,
                  look: Material) -> list[Mesh]:  # fmt: skip
-    """Return a box with cones on its front, or a cloth before them, between two heights."""
     half, (low, high) = wide / 2, z
     dark, ring = material("black", rng), made_of(rng, "black", "black", "metal", "plastic")
     parts = [body(rng, (0.0, -half, low), (deep, half, high), look, draw(rng, 0.003, 0.012))]

@@ -64,7 +64,6 @@ def _sheer(rng: np.random.Generator) -> Material:
 
 
 def _panels(rng: np.random.Generator, y: float, top: float, x: float, style: str) -> list[Mesh]:
-    """Return the cloth of a curtain of a style between -y and y."""
     look = _textile(rng)
     if style == "wall open pair":
         shares = draw(rng, 0.18, 0.4), draw(rng, 0.18, 0.4)

@@ -188,7 +188,6 @@ def _power_rack(rng: np.random.Generator) -> Parts:
 
 
 def _pulls(rng: np.random.Generator, back: float, tall: float, frame: Material, steel: Material) -> Meshes:
-    """Return a multi-gym's press arms and the bar that hangs from its cable."""
     reach = back + 0.85
     for s in (-1, 1):
         y = s * draw(rng, 0.3, 0.45)

@@ -172,7 +172,6 @@ def _convector(rng: np.random.Generator) -> Parts:
 
 
 def _fire(rng: np.random.Generator, x: float, wide: float, z: float) -> Meshes:
-    """Return logs, and flames over them in some cases."""
     wood = material("wood", rng, (0.25, 0.16, 0.1))
     yield from [tube([(x + draw(rng, -0.05, 0.05), -wide * draw(rng, 0.2, 0.35), z + 0.04 + 0.06 * k),
                       (x + draw(rng, -0.06, 0.06), wide * draw(rng, 0.2, 0.35), z + 0.05 + 0.07 * k)],

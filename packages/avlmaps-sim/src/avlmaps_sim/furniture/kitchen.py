@@ -42,7 +42,6 @@ def _doors(style: FrontStyle, x: float, y: tuple[float, float], z: tuple[float, 
 
 def _unit(rng: np.random.Generator, style: FrontStyle, depth: float, y: tuple[float, float],
           z: tuple[float, float]) -> list[Mesh]:  # fmt: skip
-    """Return one unit of a run: its fronts on a closed body, or an open shelf."""
     kind = pick(rng, ("doors", "doors", "drawers", "drawer over door", "drawer over door", "open"))
     if kind == "open":
         return cabinet_box((0.0, y[0], z[0]), (depth, y[1], z[1]), style.look, count(rng, 1, 2))
@@ -107,7 +106,6 @@ def _splashback_run(rng: np.random.Generator) -> Parts:
 
 
 def _angled(rng: np.random.Generator, sides: tuple[float, ...]) -> Parts:
-    """Return a run along the back wall with legs towards the front at the ends: an L or a U."""
     style, (depth, z, thick), stone = front_style(rng), _measures(rng), _worktop(rng)
     plinth, dark = _plinth(rng, style)
     width = depth + 0.03
@@ -203,7 +201,6 @@ def _waterfall(rng: np.random.Generator) -> Parts:
 
 
 def _hung(rng: np.random.Generator, style: FrontStyle, length: float, depth: float, high: float) -> Meshes:
-    """Return wall units in a row; those with glass fronts are open boxes with shelves behind the glass."""
     cuts = _split(rng, length, 0.35, 0.65)
     glass = material("glass", rng)
     for a, b in pairwise(cuts):

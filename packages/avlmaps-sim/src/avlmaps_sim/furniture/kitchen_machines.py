@@ -221,7 +221,6 @@ def _hood_curved(rng: np.random.Generator) -> Parts:
 
 @family("range hood", "wall mantle", held_out=True)
 def _hood_mantle(rng: np.random.Generator) -> Parts:
-    """Return a plastered country hood with a wooden beam."""
     wide, deep, high = draw(rng, 0.8, 1.3), draw(rng, 0.45, 0.6), draw(rng, 0.7, 1.1)
     look, wood = made_of(rng, "white", "painted", "stone"), material("wood", rng)
     beam, bend = draw(rng, 0.07, 0.14), pick(rng, (1.0, 0.5, 2.0))

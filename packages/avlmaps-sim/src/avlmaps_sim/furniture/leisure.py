@@ -165,7 +165,6 @@ def _guitar_hung(rng: np.random.Generator) -> Parts:
 
 
 def _pool_top(rng: np.random.Generator, wide: float, long: float, tall: float, wood: Material) -> Meshes:
-    """Return a pool table's bed, rails, pockets, balls and perhaps a cue."""
     rail, hole = draw(rng, 0.1, 0.15), material("black", rng)
     green, blue, red = (0.05, 0.4, 0.2), (0.1, 0.3, 0.55), (0.5, 0.08, 0.12)
     baize = material("fabric", rng, pick(rng, (green, green, blue, red, (0.1, 0.45, 0.3))))
@@ -221,7 +220,6 @@ def _cabinet_pool(rng: np.random.Generator) -> Parts:
 
 
 def _water(rng: np.random.Generator, long: float, wide: float, tall: float, z: float) -> list[Mesh]:
-    """Return a tank's inside: gravel, weeds and fish behind a pane of water."""
     parts = [slab(0.0, 0.0, z + 0.01, wide * 0.94, long * 0.97, tall * 0.12, material("stone", rng))]
     green = material("plant", rng)
     for _ in range(count(rng, 5, 12)):

@@ -58,7 +58,6 @@ def _dome(x: float, y: float, z: float, radius: float, look: Material, deep: flo
 
 
 def _foot(rng: np.random.Generator, radius: float, look: Material) -> Mesh:
-    """Return a lamp's foot of a drawn form, on the floor round the origin."""
     kind = pick(rng, ("disc", "disc", "square", "cross", "bell"))
     if kind == "square":
         return slab(0.0, 0.0, 0.0, 1.8 * radius, 1.8 * radius, draw(rng, 0.015, 0.05), look)
@@ -141,7 +140,6 @@ def _torchiere(rng: np.random.Generator) -> Parts:
 
 
 def _body(rng: np.random.Generator, tall: float, wide: float) -> list[Mesh]:
-    """Return a table lamp's body of a drawn form."""
     look = made_of(rng, "ceramic", "ceramic", "wood", "metal", "painted", "glass", "stone")
     kind = pick(rng, ("gourd", "vase", "column", "balls", "block", "stick", "ginger jar"))
     if kind == "gourd":

@@ -33,7 +33,6 @@ def _styles(known: dict[Families, tuple[str, ...]], which: Families) -> tuple[st
 
 
 def _casing(rng: np.random.Generator, width: float, height: float, wall: float, look: Material) -> tuple[Mesh, float]:
-    """Return lining and architraves of a door hole, and how thick the lining is."""
     lining, trim, proud = draw(rng, 0.018, 0.04), draw(rng, 0.04, 0.1), draw(rng, 0.008, 0.022)
     edge = width / 2
     parts = [
@@ -249,7 +248,6 @@ def opaque(rng: np.random.Generator) -> Material:
 
 
 def _rows(rng: np.random.Generator, style: str) -> Rows:
-    """Draw rows of fields from the bottom up: share of the height, number of columns, what fills them."""
     columns = count(rng, 1, 3)
     if style == "glazed":
         if chance(rng, 0.3):
@@ -323,7 +321,6 @@ def _gridded(rng: np.random.Generator, width: float, height: float, thick: float
 
 
 def _flat(rng: np.random.Generator, width: float, height: float, thick: float, look: Material, style: str) -> Mesh:
-    """Return a flush leaf, one with grooves, or one of planks, placed as `_gridded` does."""
     if style == "plank":
         boards = max(int(width / draw(rng, 0.09, 0.16)), 2)
         each = width / boards

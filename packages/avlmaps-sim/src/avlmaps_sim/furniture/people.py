@@ -71,7 +71,6 @@ def _looks(rng: np.random.Generator) -> _Looks:
 
 
 def _limb(path: Sequence[Float[np.ndarray, "3"]], radii: Sequence[float], look: Material) -> Mesh:
-    """Return a round limb along a path, as thick as is said at each point."""
     points = np.asarray(path, np.float64)
     along = np.gradient(points, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
@@ -123,7 +122,6 @@ def _arm(pose: Pose, number: int, shoulder: np.ndarray, height_m: float, looks: 
 
 
 def _head(top: np.ndarray, tilt: float, height_m: float, looks: _Looks) -> Mesh:
-    """Return neck, head and hair over the top of a trunk."""
     half, neck = _HEAD_HIGH * height_m / 2, _NECK * height_m
     parts = [_limb([np.zeros(3), np.array([0.01, 0.0, 1.4 * neck])], [0.034 * height_m, 0.03 * height_m], looks.skin)]
     middle: Triple = (0.012, 0.0, neck + half)

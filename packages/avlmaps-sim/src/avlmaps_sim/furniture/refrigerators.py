@@ -48,7 +48,6 @@ def _case(rng: np.random.Generator, depth: float, wide: float, high: float, look
 
 
 def _stacked(rng: np.random.Generator, parts_of_height: tuple[float, ...]) -> Parts:
-    """Return a refrigerator of one door's width with doors over each other, as shares of its height from below."""
     wide, deep, high = draw(rng, 0.5, 0.78), draw(rng, 0.5, 0.66), draw(rng, 1.35, 2.02)
     look, metal, soft = enamel(rng), chrome(rng), pick(rng, (0.004, 0.012, 0.03))
     side = look if chance(rng, 0.6) else made_of(rng, "black", "metal", "white")

@@ -33,7 +33,6 @@ def _frame_look(rng: np.random.Generator) -> Material:
 
 
 def _wooden(rng: np.random.Generator, frame: ChairFrame, look: Material, seat: str = "", finial: float = 0.0) -> Mesh:
-    """Return the parts that most wooden chairs share: seat, rails, legs, posts, perhaps rungs and arms."""
     style = leg_style(rng, 0.026, 0.045)
     posts = LegStyle(((0.0, 0.75), (0.2, 1.0), (1.0, 1.0)), style.sides, style.thickness_m)
     rungs = count(rng, 1, 2) if chance(rng, 0.45) else 0
@@ -49,8 +48,7 @@ def _wooden(rng: np.random.Generator, frame: ChairFrame, look: Material, seat: s
 
 
 @family("chair", "rail back")
-def rail_back(rng: np.random.Generator) -> Parts:
-    """Return a chair with one to three broad rails across its back."""
+def _rail_back(rng: np.random.Generator) -> Parts:
     frame, look = chair_frame(rng), _frame_look(rng)
     number = count(rng, 1, 3)
     tall = draw(rng, 0.05, 0.3 / number)
@@ -58,8 +56,7 @@ def rail_back(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "ladder back")
-def ladder_back(rng: np.random.Generator) -> Parts:
-    """Return a tall chair with many thin rails between posts with knobs, its seat woven."""
+def _ladder_back(rng: np.random.Generator) -> Parts:
     frame = chair_frame(rng, back=draw(rng, 0.5, 0.72))
     look = _frame_look(rng)
     number = count(rng, 3, 6)
@@ -70,8 +67,7 @@ def ladder_back(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "slat back")
-def slat_back(rng: np.random.Generator) -> Parts:
-    """Return a chair with upright slats or rods between two rails."""
+def _slat_back(rng: np.random.Generator) -> Parts:
     frame, look = chair_frame(rng), _frame_look(rng)
     number = count(rng, 3, 8)
     wide = draw(rng, 0.012, 0.6 * frame.rear / number)
@@ -79,8 +75,7 @@ def slat_back(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "splat back")
-def splat_back(rng: np.random.Generator) -> Parts:
-    """Return a chair with one shaped board in the middle of its back, under a curved crest."""
+def _splat_back(rng: np.random.Generator) -> Parts:
     frame = chair_frame(rng, back=draw(rng, 0.45, 0.62))
     look = _frame_look(rng)
     wide = draw(rng, 0.1, 0.2)
@@ -95,8 +90,7 @@ def splat_back(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "solid back")
-def solid_back(rng: np.random.Generator) -> Parts:
-    """Return a chair with a board or a pad as its back."""
+def _solid_back(rng: np.random.Generator) -> Parts:
     frame, look = chair_frame(rng), _frame_look(rng)
     low = frame.seat + draw(rng, 0.02, 0.2)
     x = frame.back_x((low + frame.top) / 2)
@@ -114,8 +108,7 @@ def solid_back(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "windsor")
-def windsor(rng: np.random.Generator) -> Parts:
-    """Return a chair with a thick shaped seat, splayed turned legs and rods under a bent hoop or a comb."""
+def _windsor(rng: np.random.Generator) -> Parts:
     frame = chair_frame(rng, back=draw(rng, 0.42, 0.68))
     look = _frame_look(rng)
     thick, splay = draw(rng, 0.03, 0.05), draw(rng, 0.03, 0.07)
@@ -149,8 +142,7 @@ def windsor(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "cross back", held_out=True)
-def cross_back(rng: np.random.Generator) -> Parts:
-    """Return a chair whose back is two crossed bars under a rail or a hoop."""
+def _cross_back(rng: np.random.Generator) -> Parts:
     frame, look = chair_frame(rng, back=draw(rng, 0.4, 0.5)), _frame_look(rng)
     low, top = frame.seat + draw(rng, 0.04, 0.1), frame.top - 0.04
     y = frame.rear / 2 - 0.04
@@ -161,8 +153,7 @@ def cross_back(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "bentwood")
-def bentwood(rng: np.random.Generator) -> Parts:
-    """Return a café chair: round seat, rods bent into rear legs and a hoop for a back, another hoop inside it."""
+def _bentwood(rng: np.random.Generator) -> Parts:
     wide = draw(rng, 0.38, 0.44)
     seat, top = draw(rng, 0.44, 0.48), draw(rng, 0.83, 0.95)
     # The rods pass the round seat where it is narrower than at its middle.
@@ -186,8 +177,7 @@ def bentwood(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "scandinavian")
-def scandinavian(rng: np.random.Generator) -> Parts:
-    """Return a chair with a low curved back rail that goes round the sides, on splayed round legs."""
+def _scandinavian(rng: np.random.Generator) -> Parts:
     frame = chair_frame(rng, back=draw(rng, 0.27, 0.36))
     look = material("wood", rng)
     yield seat_board(rng, frame, look, pick(rng, ("padded", "board")))
@@ -223,7 +213,6 @@ def _swivel(rng: np.random.Generator, seat: float) -> list[Mesh]:
 
 
 def _arm_rests(rng: np.random.Generator, half: float, seat: float, x: float) -> Meshes:
-    """Return two arm rests: T-shaped, or loops."""
     look, high = material("black", rng), seat + draw(rng, 0.17, 0.26)
     style, apart = pick(rng, ("T", "loop")), half + draw(rng, 0.01, 0.05)
     for s in (1, -1):
@@ -247,7 +236,6 @@ def _curved_back(
     width: float, low: float, high: float, x: float, lean: float, bow: float, thick: float, look: Material,
     lumbar: float,
 ) -> Mesh:  # fmt: skip
-    """Return a back that bends round the sitter and swells at the loins."""
     share, up = np.linspace(-1.0, 1.0, 6), np.linspace(0.0, 1.0, 6)
     swell = lumbar * np.exp(-(((up - 0.25) / 0.22) ** 2))
     wide = width / 2 * (1 - 0.22 * np.abs(up - 0.4) ** 1.5)
@@ -267,8 +255,7 @@ def _curved_back(
 
 
 @family("office chair", "task")
-def task_chair(rng: np.random.Generator) -> Parts:
-    """Return a desk chair: padded seat and a low or middling back on a bar, with or without arms."""
+def _task_chair(rng: np.random.Generator) -> Parts:
     seat, width, depth = draw(rng, 0.42, 0.55), draw(rng, 0.44, 0.52), draw(rng, 0.42, 0.5)
     look = made_of(rng, "fabric", "fabric", "black", "leather", "plastic")
     yield from _swivel(rng, seat)
@@ -286,8 +273,7 @@ def task_chair(rng: np.random.Generator) -> Parts:
 
 
 @family("office chair", "executive")
-def executive_chair(rng: np.random.Generator) -> Parts:
-    """Return a high thick back in padded rolls with closed arms, mostly of leather."""
+def _executive_chair(rng: np.random.Generator) -> Parts:
     seat, width, depth = draw(rng, 0.45, 0.54), draw(rng, 0.5, 0.58), draw(rng, 0.48, 0.54)
     look = covering(rng, 0.8)
     yield from _swivel(rng, seat)
@@ -306,8 +292,7 @@ def executive_chair(rng: np.random.Generator) -> Parts:
 
 
 @family("office chair", "mesh")
-def mesh_chair(rng: np.random.Generator) -> Parts:
-    """Return a frame with netting for a back, perhaps with a head rest, and adjustable arms."""
+def _mesh_chair(rng: np.random.Generator) -> Parts:
     seat, width, depth = draw(rng, 0.43, 0.54), draw(rng, 0.46, 0.53), draw(rng, 0.43, 0.5)
     net, frame = material("fabric", rng, (0.12, 0.12, 0.13)), made_of(rng, "black", "white", "metal")
     if chance(rng, 0.3):
@@ -338,8 +323,7 @@ def mesh_chair(rng: np.random.Generator) -> Parts:
 
 
 @family("office chair", "gaming", held_out=True)
-def gaming_chair(rng: np.random.Generator) -> Parts:
-    """Return a racing seat: raised bolsters at the seat and the back, shoulders, a cushion at the neck."""
+def _gaming_chair(rng: np.random.Generator) -> Parts:
     seat, width, depth = draw(rng, 0.44, 0.52), draw(rng, 0.5, 0.56), draw(rng, 0.48, 0.54)
     dark, accent = material("leather", rng, (0.08, 0.08, 0.09)), material("plastic", rng)
     yield from _swivel(rng, seat)

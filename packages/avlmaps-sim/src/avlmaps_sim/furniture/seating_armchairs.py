@@ -17,20 +17,17 @@ from avlmaps_sim.shapes import box, cylinder, loft, rounded_box
 
 
 @family("armchair", "block")
-def block_armchair(rng: np.random.Generator) -> Parts:
-    """Return an upholstered chair with square, soft or sloping arms."""
+def _block_armchair(rng: np.random.Generator) -> Parts:
     return couch(rng, sofa_plan(rng, 1), 1, pick(rng, ("square", "soft", "slope", "pad")))
 
 
 @family("armchair", "rolled arms")
-def rolled_armchair(rng: np.random.Generator) -> Parts:
-    """Return an old-fashioned upholstered chair whose arms roll outwards."""
+def _rolled_armchair(rng: np.random.Generator) -> Parts:
     return couch(rng, sofa_plan(rng, 1, (0.14, 0.22)), 1, "rolled")
 
 
 @family("armchair", "wing")
-def wing_chair(rng: np.random.Generator) -> Parts:
-    """Return a high-backed chair with wings beside the head."""
+def _wing_chair(rng: np.random.Generator) -> Parts:
     plan = replace(
         sofa_plan(rng, 1, (0.08, 0.16)), top=draw(rng, 1.0, 1.18), clear=draw(rng, 0.1, 0.2), back=draw(rng, 0.1, 0.16)
     )
@@ -80,8 +77,7 @@ def _round_wall(
 
 
 @family("armchair", "tub")
-def tub_chair(rng: np.random.Generator) -> Parts:
-    """Return a low round chair: back and arms are one wall, level or rising to the back, on legs or a turning foot."""
+def _tub_chair(rng: np.random.Generator) -> Parts:
     radius, seat = draw(rng, 0.34, 0.43), draw(rng, 0.38, 0.45)
     look = covering(rng, 0.35)
     back = draw(rng, 0.68, 0.86)
@@ -106,8 +102,7 @@ def tub_chair(rng: np.random.Generator) -> Parts:
 
 
 @family("armchair", "wooden frame")
-def framed_armchair(rng: np.random.Generator) -> Parts:
-    """Return two cushions in an open wooden frame."""
+def _framed_armchair(rng: np.random.Generator) -> Parts:
     plan = replace(sofa_plan(rng, 1, (0.05, 0.09)), back=0.06, lean=draw(rng, 0.12, 0.32), top=draw(rng, 0.75, 0.98))
     wood, look, half = material("wood", rng), covering(rng, 0.25), plan.width / 2
     thick = draw(rng, 0.08, 0.13)
@@ -130,15 +125,13 @@ def framed_armchair(rng: np.random.Generator) -> Parts:
 
 
 @family("armchair", "slipper")
-def slipper_chair(rng: np.random.Generator) -> Parts:
-    """Return a low easy chair without arms on slender legs."""
+def _slipper_chair(rng: np.random.Generator) -> Parts:
     plan = replace(sofa_plan(rng, 1, (0.0, 0.0)), clear=draw(rng, 0.1, 0.2), top=draw(rng, 0.68, 0.9))
     return couch(rng, replace(plan, width=draw(rng, 0.55, 0.75)), 1)
 
 
 @family("armchair", "shell lounge")
-def lounge_shell(rng: np.random.Generator) -> Parts:
-    """Return a wide moulded shell with a cushion on a star foot or wooden legs, often with a high back."""
+def _lounge_shell(rng: np.random.Generator) -> Parts:
     width, depth, seat = draw(rng, 0.62, 0.78), draw(rng, 0.52, 0.62), draw(rng, 0.34, 0.42)
     look = covering(rng, 0.5) if chance(rng, 0.7) else material("plastic", rng)
     yield shell(rng, width, depth, seat, draw(rng, 0.42, 0.75), look, draw(rng, 0.12, 0.26), draw(rng, 0.03, 0.07))
@@ -152,8 +145,7 @@ def lounge_shell(rng: np.random.Generator) -> Parts:
 
 
 @family("armchair", "recliner", held_out=True)
-def recliner(rng: np.random.Generator) -> Parts:
-    """Return a thickly padded chair with its foot rest up, or folded away."""
+def _recliner(rng: np.random.Generator) -> Parts:
     plan = replace(sofa_plan(rng, 1, (0.16, 0.25)), clear=0.03, top=draw(rng, 0.98, 1.12), lean=draw(rng, 0.1, 0.2))
     look = covering(rng, 0.65)
     laid = chance(rng, 0.5)
@@ -181,8 +173,7 @@ def recliner(rng: np.random.Generator) -> Parts:
 
 
 @family("armchair", "bent ply", held_out=True)
-def bent_ply(rng: np.random.Generator) -> Parts:
-    """Return an easy chair on two springy hoops of bent wood with one long cushion."""
+def _bent_ply(rng: np.random.Generator) -> Parts:
     width, y = draw(rng, 0.58, 0.68), draw(rng, 0.29, 0.34)
     wood, look = material("wood", rng), covering(rng, 0.25)
     wide = draw(rng, 0.05, 0.065)
@@ -217,8 +208,7 @@ def bent_ply(rng: np.random.Generator) -> Parts:
 
 
 @family("armchair", "rocker")
-def rocker(rng: np.random.Generator) -> Parts:
-    """Return a rocking chair: a wooden chair with arms and slats on two curved runners."""
+def _rocker(rng: np.random.Generator) -> Parts:
     width, seat, top = draw(rng, 0.46, 0.56), draw(rng, 0.4, 0.45), draw(rng, 0.95, 1.15)
     look = made_of(rng, "wood", "wood", "white", "black")
     y, depth = draw(rng, 0.22, 0.27), draw(rng, 0.44, 0.5)

@@ -89,8 +89,7 @@ def shell_base(rng: np.random.Generator, width: float, depth: float, seat: float
 
 
 @family("chair", "shell")
-def shell_chair(rng: np.random.Generator) -> Parts:
-    """Return a moulded seat of plastic, plywood or cloth on dowels, tubes, runners, a star or a tulip foot."""
+def _shell_chair(rng: np.random.Generator) -> Parts:
     width, depth, seat = draw(rng, 0.42, 0.52), draw(rng, 0.4, 0.47), draw(rng, 0.42, 0.47)
     look = made_of(rng, "plastic", "plastic", "white", "black", "fabric", "wood")
     wrap = draw(rng, 0.02, 0.14)
@@ -106,8 +105,7 @@ def shell_chair(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "parsons")
-def parsons_chair(rng: np.random.Generator) -> Parts:
-    """Return a chair covered with cloth or leather all over, its back straight, on short wooden legs."""
+def _parsons_chair(rng: np.random.Generator) -> Parts:
     frame = chair_frame(rng, back=draw(rng, 0.42, 0.65))
     look, thick = covering(rng, 0.35), draw(rng, 0.05, 0.1)
     low = pick(rng, (frame.seat - draw(rng, 0.1, 0.18), 0.04))
@@ -127,8 +125,7 @@ def parsons_chair(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "tube and pads")
-def tube_chair(rng: np.random.Generator) -> Parts:
-    """Return a stacking chair: a frame of bent tubes carries a pad or plywood for the seat and one for the back."""
+def _tube_chair(rng: np.random.Generator) -> Parts:
     frame = chair_frame(rng, back=draw(rng, 0.32, 0.46))
     metal = made_of(rng, "metal", "black", "painted")
     look = made_of(rng, "fabric", "wood", "plastic", "leather")
@@ -153,8 +150,7 @@ def tube_chair(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "folding")
-def folding_chair(rng: np.random.Generator) -> Parts:
-    """Return a folding chair: crossed legs of tube or wood, a thin seat, a narrow back."""
+def _folding_chair(rng: np.random.Generator) -> Parts:
     width, seat, top = draw(rng, 0.4, 0.48), draw(rng, 0.42, 0.47), draw(rng, 0.75, 0.88)
     frame = made_of(rng, "metal", "black", "wood", "white")
     look = frame if chance(rng, 0.4) else made_of(rng, "plastic", "fabric", "wood", "leather")
@@ -183,8 +179,7 @@ def folding_chair(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "monobloc")
-def monobloc(rng: np.random.Generator) -> Parts:
-    """Return a plastic garden chair: splayed legs, arms in one sweep with a slotted back."""
+def _monobloc(rng: np.random.Generator) -> Parts:
     width, seat, top = draw(rng, 0.46, 0.54), draw(rng, 0.4, 0.45), draw(rng, 0.76, 0.9)
     look = made_of(rng, "white", "white", "plastic")
     depth, arm = draw(rng, 0.4, 0.46), seat + draw(rng, 0.2, 0.25)
@@ -207,8 +202,7 @@ def monobloc(rng: np.random.Generator) -> Parts:
 
 
 @family("chair", "cantilever", held_out=True)
-def cantilever(rng: np.random.Generator) -> Parts:
-    """Return a chair on two bent tubes without rear legs: the seat hangs in front of nothing."""
+def _cantilever(rng: np.random.Generator) -> Parts:
     width, depth, seat, top = draw(rng, 0.42, 0.5), draw(rng, 0.42, 0.5), draw(rng, 0.43, 0.47), draw(rng, 0.78, 0.98)
     metal = made_of(rng, "metal", "metal", "black")
     look, r, y = made_of(rng, "leather", "fabric", "wicker", "wood"), draw(rng, 0.01, 0.014), width / 2

@@ -17,8 +17,7 @@ from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, sla
 
 
 @family("stool", "wooden legs")
-def wooden_stool(rng: np.random.Generator) -> Parts:
-    """Return a round, square or saddle seat on three or four legs, low or as high as a bar."""
+def _wooden_stool(rng: np.random.Generator) -> Parts:
     seat = draw(rng, 0.42, 0.5) if chance(rng, 0.45) else draw(rng, 0.6, 0.8)
     size = draw(rng, 0.28, 0.4)
     look = made_of(rng, "wood", "wood", "white", "black", "painted")
@@ -51,8 +50,7 @@ def wooden_stool(rng: np.random.Generator) -> Parts:
 
 
 @family("stool", "bar with a foot")
-def pedestal_stool(rng: np.random.Generator) -> Parts:
-    """Return a bar stool on one foot with a foot rest: round pad, low back or a shell."""
+def _pedestal_stool(rng: np.random.Generator) -> Parts:
     seat, size = draw(rng, 0.58, 0.82), draw(rng, 0.32, 0.44)
     metal = made_of(rng, "metal", "metal", "black")
     look = made_of(rng, "leather", "plastic", "fabric", "wood")
@@ -71,8 +69,7 @@ def pedestal_stool(rng: np.random.Generator) -> Parts:
 
 
 @family("stool", "metal")
-def metal_stool(rng: np.random.Generator) -> Parts:
-    """Return a stool of sheet metal or tubes, low or high, some with a low back."""
+def _metal_stool(rng: np.random.Generator) -> Parts:
     seat = draw(rng, 0.44, 0.5) if chance(rng, 0.4) else draw(rng, 0.62, 0.78)
     size, look = draw(rng, 0.3, 0.38), made_of(rng, "metal", "black", "painted", "white")
     top = look if chance(rng, 0.5) else made_of(rng, "wood", "leather")
@@ -106,8 +103,7 @@ def metal_stool(rng: np.random.Generator) -> Parts:
 
 
 @family("stool", "step", held_out=True)
-def step_stool(rng: np.random.Generator) -> Parts:
-    """Return a stool with one or two steps between board sides."""
+def _step_stool(rng: np.random.Generator) -> Parts:
     steps, width = count(rng, 1, 2), draw(rng, 0.34, 0.45)
     rise, tread, look = draw(rng, 0.2, 0.25), draw(rng, 0.18, 0.24), board_look(rng)
     for i in range(steps + (steps == 1)):
@@ -124,8 +120,7 @@ def _bench(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @family("bench", "board")
-def board_bench(rng: np.random.Generator) -> Parts:
-    """Return a plain board or slats on legs, slabs, trestles or bent wires, perhaps with a cushion."""
+def _board_bench(rng: np.random.Generator) -> Parts:
     depth, width, high = _bench(rng)
     look = made_of(rng, "wood", "wood", "wood", "painted", "white")
     thick = draw(rng, 0.025, 0.06)
@@ -154,8 +149,7 @@ def board_bench(rng: np.random.Generator) -> Parts:
 
 
 @family("bench", "upholstered")
-def padded_bench(rng: np.random.Generator) -> Parts:
-    """Return a long pad on legs for the foot of a bed, some with low rolled ends or a throw."""
+def _padded_bench(rng: np.random.Generator) -> Parts:
     depth, width, high = _bench(rng)
     look, legs = covering(rng, 0.3), made_of(rng, "wood", "wood", "black", "metal")
     thick = draw(rng, 0.08, 0.2)
@@ -179,8 +173,7 @@ def padded_bench(rng: np.random.Generator) -> Parts:
 
 
 @family("bench", "with back")
-def backed_bench(rng: np.random.Generator) -> Parts:
-    """Return a bench with a slatted or boarded back and arms, as in a garden or a hall."""
+def _backed_bench(rng: np.random.Generator) -> Parts:
     depth, width, high = draw(rng, 0.4, 0.52), draw(rng, 1.0, 1.7), draw(rng, 0.4, 0.46)
     look, top = made_of(rng, "wood", "wood", "white", "painted", "black"), draw(rng, 0.78, 0.98)
     y, x, rake = width / 2 - 0.03, depth / 2, draw(rng, 0.04, 0.14)
@@ -210,8 +203,7 @@ def backed_bench(rng: np.random.Generator) -> Parts:
 
 
 @family("bench", "storage", held_out=True)
-def storage_bench(rng: np.random.Generator) -> Parts:
-    """Return a box to sit on with a lid and panels, or with open bays and baskets."""
+def _storage_bench(rng: np.random.Generator) -> Parts:
     depth, width, high = draw(rng, 0.36, 0.5), draw(rng, 0.8, 1.4), draw(rng, 0.42, 0.52)
     look = board_look(rng)
     x, y = depth / 2, width / 2
@@ -235,8 +227,7 @@ def storage_bench(rng: np.random.Generator) -> Parts:
 
 
 @family("ottoman", "square")
-def square_ottoman(rng: np.random.Generator) -> Parts:
-    """Return a square or oblong pad, a full box or one on legs."""
+def _square_ottoman(rng: np.random.Generator) -> Parts:
     depth, high = draw(rng, 0.4, 0.75), draw(rng, 0.33, 0.47)
     width = depth * draw(rng, 1.0, 1.7)
     look = covering(rng, 0.35)
@@ -249,8 +240,7 @@ def square_ottoman(rng: np.random.Generator) -> Parts:
 
 
 @family("ottoman", "pouf")
-def pouf(rng: np.random.Generator) -> Parts:
-    """Return a round pouf: a drum, a flattened ball, or a pleated cushion."""
+def _pouf(rng: np.random.Generator) -> Parts:
     r, high = draw(rng, 0.2, 0.36), draw(rng, 0.28, 0.45)
     look = pick(rng, (covering(rng, 0.3), material("wicker", rng), material("fabric", rng)))
     belly = draw(rng, 1.0, 1.25)
@@ -272,8 +262,7 @@ def pouf(rng: np.random.Generator) -> Parts:
 
 
 @family("ottoman", "round legged")
-def round_ottoman(rng: np.random.Generator) -> Parts:
-    """Return a round pad on three or four short legs."""
+def _round_ottoman(rng: np.random.Generator) -> Parts:
     r, high, thick = draw(rng, 0.2, 0.42), draw(rng, 0.38, 0.47), draw(rng, 0.1, 0.24)
     look, legs = covering(rng, 0.3), made_of(rng, "wood", "metal", "black")
     yield lathe(
@@ -288,8 +277,7 @@ def round_ottoman(rng: np.random.Generator) -> Parts:
 
 
 @family("ottoman", "bean bag", held_out=True)
-def bean_bag(rng: np.random.Generator) -> Parts:
-    """Return a slack bag with a hollow where one sits."""
+def _bean_bag(rng: np.random.Generator) -> Parts:
     r, high = draw(rng, 0.35, 0.52), draw(rng, 0.4, 0.7)
     look = material("fabric", rng) if chance(rng, 0.7) else material("leather", rng)
     body = ellipsoid((0.0, 0.0, high * 0.33), (r, r * draw(rng, 0.9, 1.05), high * 0.65), look, 18, 10)

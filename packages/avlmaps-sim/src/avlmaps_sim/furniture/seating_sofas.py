@@ -27,24 +27,21 @@ from avlmaps_sim.shapes import along_y, box, loft, rounded_box, tube
 
 
 @family("sofa", "block")
-def block_sofa(rng: np.random.Generator) -> Parts:
-    """Return a sofa of plain blocks: square or soft arms, cushions for two to four."""
+def _block_sofa(rng: np.random.Generator) -> Parts:
     seats = count(rng, 2, 4)
     plan = sofa_plan(rng, seats)
     return couch(rng, plan, seats, pick(rng, ("square", "soft", "slope", "pad")))
 
 
 @family("sofa", "rolled arms")
-def rolled_sofa(rng: np.random.Generator) -> Parts:
-    """Return a sofa whose arms roll outwards."""
+def _rolled_sofa(rng: np.random.Generator) -> Parts:
     seats = count(rng, 2, 3)
     plan = sofa_plan(rng, seats, (0.15, 0.28))
     return couch(rng, plan, seats, "rolled")
 
 
 @family("sofa", "loveseat")
-def loveseat(rng: np.random.Generator) -> Parts:
-    """Return a small sofa on high legs with one seat cushion and a fixed back."""
+def _loveseat(rng: np.random.Generator) -> Parts:
     plan = replace(sofa_plan(rng, 2, (0.05, 0.14)), clear=draw(rng, 0.12, 0.2), back=draw(rng, 0.1, 0.16))
     plan = replace(plan, width=draw(rng, 0.95, 1.3), top=draw(rng, 0.7, 0.85))
     look = covering(rng)
@@ -55,8 +52,7 @@ def loveseat(rng: np.random.Generator) -> Parts:
 
 
 @family("sofa", "chesterfield")
-def chesterfield(rng: np.random.Generator) -> Parts:
-    """Return a sofa whose rolled back and arms are of one height, on low feet."""
+def _chesterfield(rng: np.random.Generator) -> Parts:
     seats = count(rng, 2, 3)
     plan = sofa_plan(rng, seats, (0.18, 0.26))
     top = draw(rng, 0.66, 0.8)
@@ -74,8 +70,7 @@ def chesterfield(rng: np.random.Generator) -> Parts:
 
 
 @family("sofa", "corner")
-def corner_sofa(rng: np.random.Generator) -> Parts:
-    """Return an L of two runs of seats that share a corner, to the left or to the right."""
+def _corner_sofa(rng: np.random.Generator) -> Parts:
     seats = count(rng, 2, 3)
     plan = replace(sofa_plan(rng, seats, (0.1, 0.24)), lean=0.0)
     look = covering(rng)
@@ -106,8 +101,7 @@ def corner_sofa(rng: np.random.Generator) -> Parts:
 
 
 @family("sofa", "chaise")
-def chaise_sofa(rng: np.random.Generator) -> Parts:
-    """Return a sofa one of whose seats is drawn out for the legs, at the left or at the right."""
+def _chaise_sofa(rng: np.random.Generator) -> Parts:
     seats = count(rng, 2, 4)
     plan = sofa_plan(rng, seats, (0.08, 0.22))
     look = covering(rng, 0.15)
@@ -128,16 +122,14 @@ def chaise_sofa(rng: np.random.Generator) -> Parts:
 
 
 @family("sofa", "armless")
-def armless_sofa(rng: np.random.Generator) -> Parts:
-    """Return a low sofa without arms, of one to three blocks side by side."""
+def _armless_sofa(rng: np.random.Generator) -> Parts:
     seats = count(rng, 2, 3)
     plan = replace(sofa_plan(rng, seats, (0.0, 0.0)), top=draw(rng, 0.62, 0.8), depth=draw(rng, 0.6, 0.85))
     return couch(rng, plan, seats)
 
 
 @family("sofa", "wooden frame", held_out=True)
-def framed_sofa(rng: np.random.Generator) -> Parts:
-    """Return loose cushions in an open wooden frame whose legs carry the arms."""
+def _framed_sofa(rng: np.random.Generator) -> Parts:
     seats = count(rng, 2, 3)
     plan = replace(sofa_plan(rng, seats, (0.06, 0.1)), back=0.06, lean=draw(rng, 0.08, 0.2))
     wood, look = material("wood", rng), covering(rng, 0.15)
@@ -153,8 +145,7 @@ def framed_sofa(rng: np.random.Generator) -> Parts:
 
 
 @family("sofa", "futon")
-def futon(rng: np.random.Generator) -> Parts:
-    """Return a folded mattress on a slatted or a tube frame."""
+def _futon(rng: np.random.Generator) -> Parts:
     width, deep, seat = draw(rng, 1.6, 2.1), draw(rng, 0.6, 0.75), draw(rng, 0.36, 0.44)
     thick, rise, lean = draw(rng, 0.12, 0.2), draw(rng, 0.42, 0.58), draw(rng, 0.2, 0.42)
     frame, look = made_of(rng, "wood", "metal", "black"), material("fabric", rng)
@@ -184,8 +175,7 @@ def futon(rng: np.random.Generator) -> Parts:
 
 
 @family("sofa", "camel back", held_out=True)
-def camel_back(rng: np.random.Generator) -> Parts:
-    """Return an old-fashioned sofa: the top of its back swings up in one or two humps, slender turned legs."""
+def _camel_back(rng: np.random.Generator) -> Parts:
     seats = count(rng, 2, 3)
     plan = replace(sofa_plan(rng, seats, (0.14, 0.2)), clear=draw(rng, 0.14, 0.22), back=draw(rng, 0.1, 0.14))
     look = covering(rng, 0.1)

@@ -52,8 +52,7 @@ def _on_top(rng: np.random.Generator, room: Room) -> list[Mesh]:
 
 
 @family("wardrobe", "hinged")
-def hinged_wardrobe(rng: np.random.Generator) -> Parts:
-    """Return a wardrobe with one to four hinged doors; one may stand open on clothes."""
+def _hinged_wardrobe(rng: np.random.Generator) -> Parts:
     number = count(rng, 1, 4)
     look = board_look(rng)
     room = _wardrobe_room(rng, (0.42 * number + 0.06, 0.56 * number + 0.08), 0.0)
@@ -67,8 +66,7 @@ def hinged_wardrobe(rng: np.random.Generator) -> Parts:
 
 
 @family("wardrobe", "doors over drawers")
-def drawer_wardrobe(rng: np.random.Generator) -> Parts:
-    """Return a wardrobe with drawers below its doors, or with small doors above them."""
+def _drawer_wardrobe(rng: np.random.Generator) -> Parts:
     number = count(rng, 2, 3)
     look = board_look(rng)
     room = _wardrobe_room(rng, (0.42 * number + 0.06, 0.55 * number + 0.08), draw(rng, 0.04, 0.1))
@@ -85,8 +83,7 @@ def drawer_wardrobe(rng: np.random.Generator) -> Parts:
 
 
 @family("wardrobe", "sliding")
-def sliding_wardrobe(rng: np.random.Generator) -> Parts:
-    """Return a wide wardrobe with two or three sliding doors, plain, banded or mirrored."""
+def _sliding_wardrobe(rng: np.random.Generator) -> Parts:
     number = count(rng, 2, 3)
     look = board_look(rng)
     room = _wardrobe_room(rng, (0.62 * number, 0.95 * number), 0.0)
@@ -113,8 +110,7 @@ def sliding_wardrobe(rng: np.random.Generator) -> Parts:
 
 
 @family("wardrobe", "mirror doors")
-def mirror_wardrobe(rng: np.random.Generator) -> Parts:
-    """Return a wardrobe one or all of whose hinged doors carry mirrors."""
+def _mirror_wardrobe(rng: np.random.Generator) -> Parts:
     number = count(rng, 2, 4)
     look = board_look(rng)
     room = _wardrobe_room(rng, (0.42 * number, 0.55 * number), draw(rng, 0.04, 0.1))
@@ -129,8 +125,7 @@ def mirror_wardrobe(rng: np.random.Generator) -> Parts:
 
 
 @family("wardrobe", "open")
-def open_wardrobe(rng: np.random.Generator) -> Parts:
-    """Return a wardrobe without doors: bays with hanging clothes, shelves with folded ones, drawers."""
+def _open_wardrobe(rng: np.random.Generator) -> Parts:
     number = count(rng, 2, 3)
     look = board_look(rng)
     room = _wardrobe_room(rng, (0.55 * number, 0.9 * number), draw(rng, 0.03, 0.08))
@@ -161,8 +156,7 @@ def open_wardrobe(rng: np.random.Generator) -> Parts:
 
 
 @family("wardrobe", "garment rack", held_out=True)
-def garment_rack(rng: np.random.Generator) -> Parts:
-    """Return clothes on a free-standing frame of metal or wood with a shelf below."""
+def _garment_rack(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.4, 0.5), draw(rng, 0.8, 1.5), draw(rng, 1.4, 1.75)
     look = made_of(rng, "metal", "black", "wood", "white")
     r, half, t = draw(rng, 0.01, 0.018), width / 2, depth / 2
@@ -181,8 +175,7 @@ def garment_rack(rng: np.random.Generator) -> Parts:
 
 
 @family("wardrobe", "armoire", held_out=True)
-def armoire(rng: np.random.Generator) -> Parts:
-    """Return an old two-door wardrobe of dark wood: arched crest, corner posts, feet, panelled doors."""
+def _armoire(rng: np.random.Generator) -> Parts:
     look = material("wood", rng)
     room = _wardrobe_room(rng, (1.05, 1.4), draw(rng, 0.12, 0.2))
     (a, b, c), (d, e, f) = room.low, room.high
@@ -224,8 +217,7 @@ def _chest(
 
 
 @family("chest of drawers", "low")
-def low_chest(rng: np.random.Generator) -> Parts:
-    """Return a broad chest with two or three columns of drawers."""
+def _low_chest(rng: np.random.Generator) -> Parts:
     columns = count(rng, 2, 3)
     rows = count(rng, 2, 4)
     size = (draw(rng, 0.38, 0.55), draw(rng, 0.48, 0.62) * columns, draw(rng, 0.2, 0.25) * rows + draw(rng, 0.1, 0.2))
@@ -235,8 +227,7 @@ def low_chest(rng: np.random.Generator) -> Parts:
 
 
 @family("chest of drawers", "high")
-def high_chest(rng: np.random.Generator) -> Parts:
-    """Return a chest of one column of drawers that grow taller downwards."""
+def _high_chest(rng: np.random.Generator) -> Parts:
     rows = count(rng, 3, 6)
     size = (draw(rng, 0.36, 0.52), draw(rng, 0.5, 0.95), draw(rng, 0.18, 0.24) * rows + draw(rng, 0.08, 0.18))
     fall = draw(rng, 0.0, 0.12)
@@ -244,8 +235,7 @@ def high_chest(rng: np.random.Generator) -> Parts:
 
 
 @family("chest of drawers", "mixed")
-def mixed_chest(rng: np.random.Generator) -> Parts:
-    """Return a chest with broad drawers below two or three small ones side by side."""
+def _mixed_chest(rng: np.random.Generator) -> Parts:
     depth, width = draw(rng, 0.4, 0.52), draw(rng, 0.75, 1.15)
     look = board_look(rng)
     style = front_style(rng, look, ("flat", "framed", "raised"))
@@ -266,8 +256,7 @@ def mixed_chest(rng: np.random.Generator) -> Parts:
 
 
 @family("chest of drawers", "door and drawers")
-def door_chest(rng: np.random.Generator) -> Parts:
-    """Return a chest with drawers at one side and a door at the other, or doors on both sides of them."""
+def _door_chest(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.38, 0.52), draw(rng, 0.8, 1.5), draw(rng, 0.7, 1.1)
     look = board_look(rng)
     style = front_style(rng, look)
@@ -287,8 +276,7 @@ def door_chest(rng: np.random.Generator) -> Parts:
 
 
 @family("chest of drawers", "on a stand")
-def stand_chest(rng: np.random.Generator) -> Parts:
-    """Return a shallow box of drawers carried by long legs, round rods or a frame of metal."""
+def _stand_chest(rng: np.random.Generator) -> Parts:
     depth, width = draw(rng, 0.38, 0.5), draw(rng, 0.7, 1.3)
     low, tall, look = draw(rng, 0.25, 0.42), draw(rng, 0.35, 0.6), board_look(rng)
     legs = look if chance(rng, 0.4) else made_of(rng, "metal", "black", "wood")
@@ -308,8 +296,7 @@ def stand_chest(rng: np.random.Generator) -> Parts:
 
 
 @family("chest of drawers", "boxes in a frame")
-def basket_chest(rng: np.random.Generator) -> Parts:
-    """Return an open frame of posts or rods with deep boxes, baskets or cloth bins for drawers."""
+def _basket_chest(rng: np.random.Generator) -> Parts:
     depth, width, rows = draw(rng, 0.36, 0.48), draw(rng, 0.36, 0.95), count(rng, 3, 5)
     columns, height = (2 if width > 0.7 else 1), 0.08 + rows * draw(rng, 0.17, 0.23)
     frame = made_of(rng, "wood", "metal", "white", "black")
@@ -328,9 +315,8 @@ def basket_chest(rng: np.random.Generator) -> Parts:
 
 
 @family("chest of drawers", "dresser with mirror", held_out=True)
-def mirror_dresser(rng: np.random.Generator) -> Parts:
-    """Return a chest on which a mirror stands between two posts, upright or swung back."""
-    chest = finished(mixed_chest(rng) if chance(rng, 0.5) else low_chest(rng))
+def _mirror_dresser(rng: np.random.Generator) -> Parts:
+    chest = finished(_mixed_chest(rng) if chance(rng, 0.5) else _low_chest(rng))
     top = max(chest.supports, key=lambda s: s.z)
     look = chest.mesh.materials[0]
     wide, tall = (top.high[1] - top.low[1]) * draw(rng, 0.4, 0.75), draw(rng, 0.5, 0.85)

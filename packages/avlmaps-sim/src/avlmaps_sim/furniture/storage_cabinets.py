@@ -26,7 +26,6 @@ def _body(
 
 
 def _bays(rng: np.random.Generator, room: Room, kinds: list[str], panels: tuple[Panel, ...], look: Material) -> Meshes:
-    """Return bays side by side in a carcass: closed by doors or drawers, open with shelves, or glazed."""
     style = front_style(rng, look, panels)
     (a, b, c), (d, e, f) = room.low, room.high
     shares = [draw(rng, 0.8, 1.25) for _ in kinds]
@@ -47,8 +46,7 @@ def _bays(rng: np.random.Generator, room: Room, kinds: list[str], panels: tuple[
 
 
 @family("cabinet", "sideboard")
-def sideboard(rng: np.random.Generator) -> Parts:
-    """Return a broad low cabinet of doors, drawers and open bays."""
+def _sideboard(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.36, 0.52), draw(rng, 1.1, 2.2), draw(rng, 0.65, 0.95)
     look = board_look(rng)
     parts, room, z = _body(rng, depth, width, height, look)
@@ -58,8 +56,7 @@ def sideboard(rng: np.random.Generator) -> Parts:
 
 
 @family("cabinet", "display")
-def display_cabinet(rng: np.random.Generator) -> Parts:
-    """Return a tall case with glass doors and things behind them, perhaps closed below."""
+def _display_cabinet(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.33, 0.48), draw(rng, 0.5, 1.3), draw(rng, 1.4, 2.15)
     look = board_look(rng)
     parts, room, _ = _body(rng, depth, width, height, look)
@@ -79,8 +76,7 @@ def display_cabinet(rng: np.random.Generator) -> Parts:
 
 
 @family("cabinet", "cupboard")
-def cupboard(rng: np.random.Generator) -> Parts:
-    """Return a plain upright cupboard of one or two doors, breast-high or taller."""
+def _cupboard(rng: np.random.Generator) -> Parts:
     depth, leaves, height = draw(rng, 0.3, 0.48), count(rng, 1, 2), draw(rng, 0.8, 1.75)
     width = draw(rng, 0.35, 0.55) * leaves
     look = board_look(rng)
@@ -96,8 +92,7 @@ def cupboard(rng: np.random.Generator) -> Parts:
 
 
 @family("cabinet", "hutch")
-def hutch(rng: np.random.Generator) -> Parts:
-    """Return a dresser: a deep cabinet with drawers and doors under a shallower one of shelves or glass."""
+def _hutch(rng: np.random.Generator) -> Parts:
     depth, width, cut = draw(rng, 0.42, 0.55), draw(rng, 0.9, 1.6), draw(rng, 0.78, 0.95)
     look = board_look(rng)
     parts, room, z = _body(rng, depth, width, cut, look)
@@ -121,8 +116,7 @@ def hutch(rng: np.random.Generator) -> Parts:
 
 
 @family("cabinet", "bar", held_out=True)
-def corner_cabinet(rng: np.random.Generator) -> Parts:
-    """Return a small cabinet on high legs or a hoop of metal with two slatted doors."""
+def _corner_cabinet(rng: np.random.Generator) -> Parts:
     depth, width = draw(rng, 0.35, 0.45), draw(rng, 0.6, 0.95)
     low, height = draw(rng, 0.35, 0.6), draw(rng, 1.05, 1.45)
     look = board_look(rng)
@@ -136,8 +130,7 @@ def corner_cabinet(rng: np.random.Generator) -> Parts:
 
 
 @family("cabinet", "glass column", held_out=True)
-def glass_column(rng: np.random.Generator) -> Parts:
-    """Return a show case of glass on all sides between slender corner posts."""
+def _glass_column(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.33, 0.45), draw(rng, 0.4, 0.95), draw(rng, 1.3, 1.9)
     look, glass = board_look(rng), material("glass", rng)
     (a, b), (d, e) = (-depth / 2, -width / 2), (depth / 2, width / 2)
@@ -152,8 +145,7 @@ def glass_column(rng: np.random.Generator) -> Parts:
 
 
 @family("tv cabinet", "low bench")
-def tv_bench(rng: np.random.Generator) -> Parts:
-    """Return a long low bench of open bays, drawers and doors."""
+def _tv_bench(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.35, 0.5), draw(rng, 1.0, 2.2), draw(rng, 0.35, 0.58)
     look = board_look(rng)
     parts, room, z = _body(rng, depth, width, height, look)
@@ -163,8 +155,7 @@ def tv_bench(rng: np.random.Generator) -> Parts:
 
 
 @family("tv cabinet", "open tiers")
-def tv_tiers(rng: np.random.Generator) -> Parts:
-    """Return two or three boards or glass sheets between posts, for the set and its boxes."""
+def _tv_tiers(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.35, 0.5), draw(rng, 0.8, 1.6), draw(rng, 0.36, 0.62)
     look = material("glass", rng) if chance(rng, 0.4) else board_look(rng)
     frame = made_of(rng, "metal", "black", "wood")
@@ -182,8 +173,7 @@ def tv_tiers(rng: np.random.Generator) -> Parts:
 
 
 @family("tv cabinet", "legged")
-def tv_sideboard(rng: np.random.Generator) -> Parts:
-    """Return a box with sliding or hinged doors round an open bay, on slender splayed legs."""
+def _tv_sideboard(rng: np.random.Generator) -> Parts:
     depth, width = draw(rng, 0.36, 0.46), draw(rng, 1.1, 1.9)
     low, height = draw(rng, 0.12, 0.22), draw(rng, 0.44, 0.62)
     look = made_of(rng, "wood", "wood", "white")
@@ -199,8 +189,7 @@ def tv_sideboard(rng: np.random.Generator) -> Parts:
 
 
 @family("tv cabinet", "media wall")
-def media_wall(rng: np.random.Generator) -> Parts:
-    """Return a bench with towers of shelves at one or both sides, free in the middle."""
+def _media_wall(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.35, 0.45), draw(rng, 1.9, 2.8), draw(rng, 0.4, 0.55)
     look, tall = board_look(rng), draw(rng, 1.4, 2.1)
     parts, room, z = _body(rng, depth, width, height, look)
@@ -221,8 +210,7 @@ def media_wall(rng: np.random.Generator) -> Parts:
 
 
 @family("tv cabinet", "corner stand", held_out=True)
-def corner_stand(rng: np.random.Generator) -> Parts:
-    """Return a stand for the corner of a room: its sides draw in towards the back."""
+def _corner_stand(rng: np.random.Generator) -> Parts:
     width, back, depth = draw(rng, 0.9, 1.25), draw(rng, 0.35, 0.55), draw(rng, 0.45, 0.55)
     height, look = draw(rng, 0.45, 0.6), board_look(rng)
 

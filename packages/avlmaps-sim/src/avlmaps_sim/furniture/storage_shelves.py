@@ -30,8 +30,7 @@ def filled(
 
 
 @family("bookshelf", "tall")
-def tall_bookshelf(rng: np.random.Generator) -> Parts:
-    """Return a tall case of shelves, filled with books and things or empty, one to three bays wide."""
+def _tall_bookshelf(rng: np.random.Generator) -> Parts:
     columns = pick(rng, (1, 1, 1, 2, 2, 3))
     depth, width, height = draw(rng, 0.22, 0.38), draw(rng, 0.5, 0.95) * columns, draw(rng, 1.5, 2.35)
     look, full = board_look(rng), _fullness(rng)
@@ -51,8 +50,7 @@ def tall_bookshelf(rng: np.random.Generator) -> Parts:
 
 
 @family("bookshelf", "low")
-def low_bookshelf(rng: np.random.Generator) -> Parts:
-    """Return a low case with two or three shelves whose top carries things."""
+def _low_bookshelf(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.25, 0.4), draw(rng, 0.7, 1.6), draw(rng, 0.65, 1.2)
     look, full = board_look(rng), _fullness(rng)
     base, lift = cabinet_base(rng, depth, width, look)
@@ -76,8 +74,7 @@ def low_bookshelf(rng: np.random.Generator) -> Parts:
 
 
 @family("bookshelf", "cubes")
-def cube_shelf(rng: np.random.Generator) -> Parts:
-    """Return a grid of square bays, open to both sides, with books, boxes, little doors or nothing in them."""
+def _cube_shelf(rng: np.random.Generator) -> Parts:
     cell, board = draw(rng, 0.32, 0.39), draw(rng, 0.018, 0.04)
     columns, rows = pick(rng, ((2, 2), (1, 4), (2, 4), (4, 2), (3, 3), (4, 4), (2, 3), (1, 3), (5, 2)))
     depth, width = draw(rng, 0.29, 0.4), cell * columns + board
@@ -114,8 +111,7 @@ def cube_shelf(rng: np.random.Generator) -> Parts:
 
 
 @family("bookshelf", "ladder")
-def ladder_shelf(rng: np.random.Generator) -> Parts:
-    """Return a leaning ladder whose shelves grow deeper downwards."""
+def _ladder_shelf(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.35, 0.5), draw(rng, 0.45, 0.95), draw(rng, 1.5, 2.0)
     look = board_look(rng)
     boards = look if chance(rng, 0.6) else board_look(rng)
@@ -140,8 +136,7 @@ def ladder_shelf(rng: np.random.Generator) -> Parts:
 
 
 @family("bookshelf", "open rack")
-def open_rack(rng: np.random.Generator) -> Parts:
-    """Return boards in an open frame of metal or wooden posts without a back."""
+def _open_rack(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.28, 0.42), draw(rng, 0.6, 1.3), draw(rng, 0.9, 2.0)
     frame, look = made_of(rng, "black", "metal", "wood", "white"), board_look(rng)
     yield four_legs(depth, width, height, leg_style(rng, 0.018, 0.035, True), frame)
@@ -163,8 +158,7 @@ def open_rack(rng: np.random.Generator) -> Parts:
 
 
 @family("bookshelf", "staggered", held_out=True)
-def staggered_shelf(rng: np.random.Generator) -> Parts:
-    """Return a room divider of boxes that zigzag: uprights change sides from level to level."""
+def _staggered_shelf(rng: np.random.Generator) -> Parts:
     depth, width = draw(rng, 0.24, 0.34), draw(rng, 0.7, 1.2)
     rows, cell, t = count(rng, 3, 6), draw(rng, 0.28, 0.38), draw(rng, 0.02, 0.035)
     look, full, books = board_look(rng), _fullness(rng), book_looks(rng)
@@ -179,8 +173,7 @@ def staggered_shelf(rng: np.random.Generator) -> Parts:
 
 
 @family("bookshelf", "with doors", held_out=True)
-def closed_bookshelf(rng: np.random.Generator) -> Parts:
-    """Return a bookcase with doors below and open shelves, or glass doors, above."""
+def _closed_bookshelf(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.3, 0.42), draw(rng, 0.75, 1.3), draw(rng, 1.7, 2.3)
     look = board_look(rng)
     style, cut = front_style(rng, look), draw(rng, 0.6, 0.9)

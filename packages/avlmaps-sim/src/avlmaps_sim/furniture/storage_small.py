@@ -39,8 +39,7 @@ def _shoes(rng: np.random.Generator, y: tuple[float, float], x: float, z: float,
 
 
 @family("shoe rack", "open tiers")
-def shoe_tiers(rng: np.random.Generator) -> Parts:
-    """Return open tiers of boards or rods between side frames, with shoes on them."""
+def _shoe_tiers(rng: np.random.Generator) -> Parts:
     depth, width, tiers = draw(rng, 0.26, 0.36), draw(rng, 0.5, 1.0), count(rng, 2, 5)
     high = 0.06 + 0.2 * tiers
     frame, look = made_of(rng, "metal", "black", "wood", "white"), board_look(rng)
@@ -56,8 +55,7 @@ def shoe_tiers(rng: np.random.Generator) -> Parts:
 
 
 @family("shoe rack", "tilting cabinet")
-def shoe_cabinet(rng: np.random.Generator) -> Parts:
-    """Return a flat cabinet with broad flaps that tilt out, one or more of them ajar."""
+def _shoe_cabinet(rng: np.random.Generator) -> Parts:
     depth, width, rows = draw(rng, 0.17, 0.3), draw(rng, 0.5, 1.0), count(rng, 2, 4)
     height = 0.1 + rows * draw(rng, 0.3, 0.4)
     look = board_look(rng)
@@ -74,8 +72,7 @@ def shoe_cabinet(rng: np.random.Generator) -> Parts:
 
 
 @family("shoe rack", "bench")
-def shoe_bench(rng: np.random.Generator) -> Parts:
-    """Return a low bench to sit on with bays for shoes below."""
+def _shoe_bench(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.3, 0.4), draw(rng, 0.6, 1.1), draw(rng, 0.42, 0.52)
     look = board_look(rng)
     room = Room((-depth / 2, -width / 2, 0.0), (depth / 2, width / 2, height - 0.05))
@@ -94,8 +91,7 @@ def shoe_bench(rng: np.random.Generator) -> Parts:
 
 
 @family("wall shelf", "boards")
-def wall_boards(rng: np.random.Generator) -> Parts:
-    """Return one to three boards on brackets or without, with books and things on them."""
+def _wall_boards(rng: np.random.Generator) -> Parts:
     depth, width, number = draw(rng, 0.15, 0.28), draw(rng, 0.4, 1.3), pick(rng, (1, 1, 2, 2, 3))
     look = board_look(rng)
     metal = made_of(rng, "metal", "black", "white")
@@ -119,8 +115,7 @@ def wall_boards(rng: np.random.Generator) -> Parts:
 
 
 @family("wall shelf", "boxes")
-def wall_boxes(rng: np.random.Generator) -> Parts:
-    """Return open boxes hung on a wall in a row or in steps."""
+def _wall_boxes(rng: np.random.Generator) -> Parts:
     depth, look, books = draw(rng, 0.15, 0.25), board_look(rng), book_looks(rng)
     y = 0.0
     for _ in range(count(rng, 1, 3)):
@@ -131,8 +126,7 @@ def wall_boxes(rng: np.random.Generator) -> Parts:
 
 
 @family("wall shelf", "bracketed rails")
-def rail_shelf(rng: np.random.Generator) -> Parts:
-    """Return boards on two upright rails screwed to the wall."""
+def _rail_shelf(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.2, 0.3), draw(rng, 0.6, 1.2), draw(rng, 0.8, 1.6)
     look, metal, books = board_look(rng), made_of(rng, "metal", "white", "black"), book_looks(rng)
     a = -depth / 2
@@ -147,8 +141,7 @@ def rail_shelf(rng: np.random.Generator) -> Parts:
 
 
 @family("filing cabinet", "vertical")
-def filing_cabinet(rng: np.random.Generator) -> Parts:
-    """Return a steel cabinet of two to four deep drawers with label frames and wide handles."""
+def _filing_cabinet(rng: np.random.Generator) -> Parts:
     depth, width, rows = draw(rng, 0.45, 0.7), draw(rng, 0.38, 0.5), count(rng, 2, 4)
     height = 0.04 + rows * draw(rng, 0.29, 0.33)
     look = made_of(rng, "metal", "white", "black", "painted")
@@ -164,8 +157,7 @@ def filing_cabinet(rng: np.random.Generator) -> Parts:
 
 
 @family("filing cabinet", "lateral")
-def lateral_file(rng: np.random.Generator) -> Parts:
-    """Return a broad filing cabinet of drawers, or with roller doors."""
+def _lateral_file(rng: np.random.Generator) -> Parts:
     depth, width, rows = draw(rng, 0.42, 0.5), draw(rng, 0.75, 1.2), count(rng, 2, 4)
     height = 0.06 + rows * draw(rng, 0.3, 0.36)
     look = made_of(rng, "metal", "white", "painted", "wood")
@@ -183,8 +175,7 @@ def lateral_file(rng: np.random.Generator) -> Parts:
 
 
 @family("filing cabinet", "rolling")
-def rolling_file(rng: np.random.Generator) -> Parts:
-    """Return a low block of drawers on castors, to go under a desk."""
+def _rolling_file(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.45, 0.6), draw(rng, 0.36, 0.44), draw(rng, 0.5, 0.64)
     look = made_of(rng, "metal", "white", "black", "wood", "painted")
     room = Room((-depth / 2, -width / 2, 0.05), (depth / 2, width / 2, height))
@@ -206,8 +197,7 @@ def _coat(rng: np.random.Generator, x: float, y: float, z: float, look: Material
 
 
 @family("coat rack", "tree")
-def coat_tree(rng: np.random.Generator) -> Parts:
-    """Return a stand in the middle of a floor with hooks round its top, and coats, bags or a hat on them."""
+def _coat_tree(rng: np.random.Generator) -> Parts:
     height = draw(rng, 1.6, 1.9)
     look = made_of(rng, "wood", "wood", "black", "metal", "white")
     reach = draw(rng, 0.2, 0.3)
@@ -232,8 +222,7 @@ def coat_tree(rng: np.random.Generator) -> Parts:
 
 
 @family("coat rack", "wall board")
-def coat_board(rng: np.random.Generator) -> Parts:
-    """Return a board with hooks for a wall, with a hat shelf or without, and coats on it."""
+def _coat_board(rng: np.random.Generator) -> Parts:
     width, look = draw(rng, 0.5, 1.2), board_look(rng)
     metal, looks, full = made_of(rng, "metal", "black"), cloth_looks(rng, 3), draw(rng, 0.0, 0.7)
     tall = draw(rng, 0.08, 0.25)
@@ -249,8 +238,7 @@ def coat_board(rng: np.random.Generator) -> Parts:
 
 
 @family("coat rack", "hall stand", held_out=True)
-def hall_stand(rng: np.random.Generator) -> Parts:
-    """Return a hall stand: a bench below, a panelled back with hooks, a shelf above."""
+def _hall_stand(rng: np.random.Generator) -> Parts:
     depth, width, height = draw(rng, 0.32, 0.42), draw(rng, 0.65, 1.1), draw(rng, 1.65, 2.0)
     look, looks = board_look(rng), cloth_looks(rng, 3)
     a, seat = -depth / 2, draw(rng, 0.42, 0.5)

@@ -100,7 +100,6 @@ def _dials(rng: np.random.Generator, x: float, low: Pair, high: Pair, look: Mate
 
 
 def _range(rng: np.random.Generator, wide: float, kind: str, back: float) -> Parts:
-    """Return a stove that stands on the floor: oven below, hob above, dials before it or on a raised back."""
     deep, z = draw(rng, 0.54, 0.66), draw(rng, 0.85, 0.94)
     look, half = enamel(rng), wide / 2
     dark = material("black", rng)
@@ -145,7 +144,6 @@ def _electric_range(rng: np.random.Generator) -> Parts:
 
 @family("stove", "range cooker")
 def _range_cooker(rng: np.random.Generator) -> Parts:
-    """Return a wide stove with several ovens beside and over each other."""
     wide, deep, z = draw(rng, 0.88, 1.25), draw(rng, 0.58, 0.68), draw(rng, 0.88, 0.94)
     look = material("painted", rng) if chance(rng, 0.6) else enamel(rng)
     half, strip, lift, metal = wide / 2, draw(rng, 0.09, 0.14), draw(rng, 0.06, 0.14), chrome(rng)
@@ -188,7 +186,6 @@ def _tall_oven(rng: np.random.Generator) -> Parts:
 
 @family("stove", "iron wood stove", held_out=True)
 def _wood_cooker(rng: np.random.Generator) -> Parts:
-    """Return a solid-fuel kitchen stove: enamel body, small doors, lids over the hotplates, a rail, a pipe."""
     wide, deep, z = draw(rng, 0.6, 1.05), draw(rng, 0.5, 0.65), draw(rng, 0.8, 0.92)
     look = material("painted", rng,
                     pick(rng, ((0.93, 0.9, 0.82), (0.15, 0.15, 0.15), (0.2, 0.3, 0.25), (0.5, 0.12, 0.1),

@@ -62,7 +62,6 @@ def table_look(rng: np.random.Generator, stone: float = 0.06) -> Material:
 
 
 def _clawed(rng: np.random.Generator, high: float, reach: float, look: Material) -> Mesh:
-    """Return a turned column on three or four curved feet."""
     r = draw(rng, 0.035, 0.08)
     profile = [(r, 0.2), (0.7 * r, 0.35), (1.3 * r, 0.5), (0.7 * r, 0.7), (1.1 * r, 1.0)]
     parts = [lathe([(radius, share * high) for radius, share in profile], look, sides=10)]

@@ -35,8 +35,7 @@ def _dining(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @family("dining table", "four legs")
-def legged_table(rng: np.random.Generator) -> Parts:
-    """Return a rectangular table: a top on an apron and four legs at the corners."""
+def _legged_table(rng: np.random.Generator) -> Parts:
     depth, width, high = _dining(rng)
     look = table_look(rng)
     legs = look if chance(rng, 0.7) else table_look(rng, 0.0)
@@ -55,8 +54,7 @@ def legged_table(rng: np.random.Generator) -> Parts:
 
 
 @family("dining table", "round pedestal")
-def pedestal_table(rng: np.random.Generator) -> Parts:
-    """Return a round, oval or eight-sided top on one foot in the middle."""
+def _pedestal_table(rng: np.random.Generator) -> Parts:
     depth = draw(rng, 0.75, 1.35)
     width = depth * (draw(rng, 1.15, 1.5) if chance(rng, 0.3) else 1.0)
     high, thick = draw(rng, 0.71, 0.78), draw(rng, 0.02, 0.045)
@@ -71,8 +69,7 @@ def pedestal_table(rng: np.random.Generator) -> Parts:
 
 
 @family("dining table", "round legged")
-def round_table(rng: np.random.Generator) -> Parts:
-    """Return a round or oval top on three or four legs that stand apart or straight."""
+def _round_table(rng: np.random.Generator) -> Parts:
     depth = draw(rng, 0.8, 1.35)
     width = depth * (draw(rng, 1.2, 1.8) if chance(rng, 0.4) else 1.0)
     high, thick = draw(rng, 0.71, 0.77), draw(rng, 0.018, 0.04)
@@ -92,8 +89,7 @@ def round_table(rng: np.random.Generator) -> Parts:
 
 
 @family("dining table", "trestle")
-def trestle_table(rng: np.random.Generator) -> Parts:
-    """Return a long top on two trestles, frames or boards."""
+def _trestle_table(rng: np.random.Generator) -> Parts:
     depth, width, high = draw(rng, 0.75, 1.05), draw(rng, 1.4, 2.5), draw(rng, 0.72, 0.78)
     look = table_look(rng)
     stand = look if chance(rng, 0.5) else _metal(rng)
@@ -105,8 +101,7 @@ def trestle_table(rng: np.random.Generator) -> Parts:
 
 
 @family("dining table", "glass top")
-def glass_table(rng: np.random.Generator) -> Parts:
-    """Return a glass sheet on a metal frame, on blocks or on a foot in the middle."""
+def _glass_table(rng: np.random.Generator) -> Parts:
     depth, width, high = _dining(rng)
     kind: Outline = pick(rng, ("rectangle", "rounded", "oval"))
     glass = material("glass", rng)
@@ -125,8 +120,7 @@ def glass_table(rng: np.random.Generator) -> Parts:
 
 
 @family("dining table", "metal frame")
-def framed_table(rng: np.random.Generator) -> Parts:
-    """Return a board on a frame of square steel bars or on bent wires."""
+def _framed_table(rng: np.random.Generator) -> Parts:
     depth, width, high = _dining(rng)
     look, frame = table_look(rng), _metal(rng)
     thick = draw(rng, 0.02, 0.05)
@@ -139,8 +133,7 @@ def framed_table(rng: np.random.Generator) -> Parts:
 
 
 @family("dining table", "drop leaf", held_out=True)
-def drop_leaf(rng: np.random.Generator) -> Parts:
-    """Return a table whose sides hang down on hinges, one or both."""
+def _drop_leaf(rng: np.random.Generator) -> Parts:
     depth, core, leaf = draw(rng, 0.75, 0.95), draw(rng, 0.3, 0.6), draw(rng, 0.3, 0.5)
     high, look = draw(rng, 0.72, 0.77), table_look(rng, 0.0)
     yield table_top("rectangle", depth, core, high, 0.025, look)
@@ -167,8 +160,7 @@ def drop_leaf(rng: np.random.Generator) -> Parts:
 
 
 @family("dining table", "double pedestal", held_out=True)
-def double_pedestal(rng: np.random.Generator) -> Parts:
-    """Return a long oval or rounded top on two columns with claws."""
+def _double_pedestal(rng: np.random.Generator) -> Parts:
     depth, width, high = draw(rng, 0.9, 1.15), draw(rng, 1.7, 2.4), draw(rng, 0.73, 0.78)
     look = material("wood", rng)
     kind: Outline = pick(rng, ("oval", "rounded", "stadium"))
@@ -186,7 +178,6 @@ def _drawer_stack(
     rng: np.random.Generator, depth: float, y: tuple[float, float], z: tuple[float, float], front_x: float,
     look_style: tuple[Material, FrontStyle],
 ) -> list[Mesh]:  # fmt: skip
-    """Return a block of drawers, or one with a door, under a desk's top."""
     look, style = look_style
     room = Room((front_x - depth, y[0], z[0]), (front_x, y[1], z[1]))
     if z[1] - z[0] > 0.5 and chance(rng, 0.25):
@@ -199,8 +190,7 @@ def _drawer_stack(
 
 
 @family("desk", "writing table")
-def writing_desk(rng: np.random.Generator) -> Parts:
-    """Return a table on four legs, often with a row of flat drawers under its top."""
+def _writing_desk(rng: np.random.Generator) -> Parts:
     depth, width, high, thick = _desk(rng)
     look = board_look(rng)
     top = look if chance(rng, 0.7) else table_look(rng, 0.0)
@@ -223,8 +213,7 @@ def writing_desk(rng: np.random.Generator) -> Parts:
 
 
 @family("desk", "one block")
-def block_desk(rng: np.random.Generator) -> Parts:
-    """Return a desk with a block of drawers at one side and legs, a board or a frame at the other."""
+def _block_desk(rng: np.random.Generator) -> Parts:
     depth, width, high, thick = _desk(rng)
     look = board_look(rng)
     style = front_style(rng, look)
@@ -251,8 +240,7 @@ def block_desk(rng: np.random.Generator) -> Parts:
 
 
 @family("desk", "two blocks")
-def executive_desk(rng: np.random.Generator) -> Parts:
-    """Return a heavy desk: drawers at both sides of the knees, a board behind, a row of drawers above."""
+def _executive_desk(rng: np.random.Generator) -> Parts:
     depth, width, high = draw(rng, 0.6, 0.9), draw(rng, 1.3, 1.9), draw(rng, 0.73, 0.78)
     look = made_of(rng, "wood", "wood", "wood", "white", "painted")
     style = front_style(rng, look, ("flat", "framed", "raised"))
@@ -271,8 +259,7 @@ def executive_desk(rng: np.random.Generator) -> Parts:
 
 
 @family("desk", "trestles")
-def trestle_desk(rng: np.random.Generator) -> Parts:
-    """Return a board on two trestles or steel frames, perhaps with a shelf for the monitor."""
+def _trestle_desk(rng: np.random.Generator) -> Parts:
     depth, width, high, thick = _desk(rng)
     look = table_look(rng, 0.0)
     kind: Outline = pick(rng, ("rectangle", "rectangle", "rounded"))
@@ -290,8 +277,7 @@ def trestle_desk(rng: np.random.Generator) -> Parts:
 
 
 @family("desk", "standing")
-def standing_desk(rng: np.random.Generator) -> Parts:
-    """Return a desk on two telescopes with long feet, low or raised to stand at."""
+def _standing_desk(rng: np.random.Generator) -> Parts:
     depth, width, _, thick = _desk(rng)
     high = draw(rng, 0.7, 0.78) if chance(rng, 0.65) else draw(rng, 0.95, 1.18)
     look, frame = table_look(rng, 0.0), _metal(rng)
@@ -309,8 +295,7 @@ def standing_desk(rng: np.random.Generator) -> Parts:
 
 
 @family("desk", "with hutch")
-def hutch_desk(rng: np.random.Generator) -> Parts:
-    """Return a desk of boards with shelves above its rear edge, filled with books and things."""
+def _hutch_desk(rng: np.random.Generator) -> Parts:
     depth, width, high, thick = _desk(rng)
     look = board_look(rng)
     style = front_style(rng, look)
@@ -342,8 +327,7 @@ def hutch_desk(rng: np.random.Generator) -> Parts:
 
 
 @family("desk", "corner", held_out=True)
-def corner_desk(rng: np.random.Generator) -> Parts:
-    """Return an L of two tops that meet in a corner."""
+def _corner_desk(rng: np.random.Generator) -> Parts:
     depth, width, high, thick = _desk(rng)
     look, frame = table_look(rng, 0.0), _metal(rng)
     width, run, side = max(width, 1.3), draw(rng, 0.5, 1.0), pick(rng, (1, -1))
@@ -362,8 +346,7 @@ def corner_desk(rng: np.random.Generator) -> Parts:
 
 
 @family("desk", "secretary", held_out=True)
-def secretary(rng: np.random.Generator) -> Parts:
-    """Return a chest of drawers whose sloping lid is let down to write on."""
+def _secretary(rng: np.random.Generator) -> Parts:
     depth, width = draw(rng, 0.4, 0.5), draw(rng, 0.75, 1.05)
     look = material("wood", rng)
     style = front_style(rng, look, ("flat", "framed", "raised"))

@@ -32,8 +32,7 @@ def _coffee(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @family("coffee table", "four legs")
-def legged_coffee(rng: np.random.Generator) -> Parts:
-    """Return a low rectangular table on four legs, often with a shelf or a drawer below."""
+def _legged_coffee(rng: np.random.Generator) -> Parts:
     depth, width, high = _coffee(rng)
     look = table_look(rng)
     legs = look if chance(rng, 0.7) else table_look(rng, 0.0)
@@ -55,8 +54,7 @@ def legged_coffee(rng: np.random.Generator) -> Parts:
 
 
 @family("coffee table", "round")
-def round_coffee(rng: np.random.Generator) -> Parts:
-    """Return a low round, oval or eight-sided table on splayed legs, a ring of rods or one foot."""
+def _round_coffee(rng: np.random.Generator) -> Parts:
     depth = draw(rng, 0.5, 0.95)
     width = depth * (draw(rng, 1.2, 1.8) if chance(rng, 0.35) else 1.0)
     high, thick = draw(rng, 0.32, 0.5), draw(rng, 0.012, 0.04)
@@ -84,8 +82,7 @@ def round_coffee(rng: np.random.Generator) -> Parts:
 
 
 @family("coffee table", "glass and metal")
-def glass_coffee(rng: np.random.Generator) -> Parts:
-    """Return a glass sheet on a metal frame, runners or wooden trestles, perhaps with a shelf."""
+def _glass_coffee(rng: np.random.Generator) -> Parts:
     depth, width, high = _coffee(rng)
     kind: Outline = pick(rng, ("rectangle", "rectangle", "rounded"))
     yield table_top(kind, depth, width, high, 0.01, material("glass", rng))
@@ -104,8 +101,7 @@ def glass_coffee(rng: np.random.Generator) -> Parts:
 
 
 @family("coffee table", "block")
-def block_coffee(rng: np.random.Generator) -> Parts:
-    """Return a solid block, an open box or one with drawers and bays, low on the floor."""
+def _block_coffee(rng: np.random.Generator) -> Parts:
     depth, width, high = _coffee(rng)
     look = board_look(rng)
     style = pick(rng, ("solid", "tunnel", "drawers"))
@@ -129,8 +125,7 @@ def block_coffee(rng: np.random.Generator) -> Parts:
 
 
 @family("coffee table", "runners")
-def runner_coffee(rng: np.random.Generator) -> Parts:
-    """Return a board on bent wires, steel runners, X-shaped or slab ends."""
+def _runner_coffee(rng: np.random.Generator) -> Parts:
     depth, width, high = _coffee(rng)
     look = table_look(rng)
     kind: Outline = pick(rng, ("rectangle", "rounded", "boat"))
@@ -149,8 +144,7 @@ def runner_coffee(rng: np.random.Generator) -> Parts:
 
 
 @family("coffee table", "trunk", held_out=True)
-def trunk(rng: np.random.Generator) -> Parts:
-    """Return a chest with a lid, bands and a lock, used as a table."""
+def _trunk(rng: np.random.Generator) -> Parts:
     depth, width, high = draw(rng, 0.42, 0.6), draw(rng, 0.8, 1.15), draw(rng, 0.4, 0.5)
     look, band = made_of(rng, "wood", "leather", "wicker", "painted"), made_of(rng, "metal", "leather", "black")
     lid = high - draw(rng, 0.06, 0.12)
@@ -164,8 +158,7 @@ def trunk(rng: np.random.Generator) -> Parts:
 
 
 @family("coffee table", "nested", held_out=True)
-def nested_tables(rng: np.random.Generator) -> Parts:
-    """Return two or three tables of falling size, pushed partly under each other."""
+def _nested_tables(rng: np.random.Generator) -> Parts:
     look, legs = table_look(rng), _metal(rng) if chance(rng, 0.5) else table_look(rng, 0.0)
     kind: Outline = pick(rng, ("rectangle", "rounded", "oval"))
     depth, width, high = draw(rng, 0.5, 0.7), draw(rng, 0.6, 0.9), draw(rng, 0.42, 0.52)
@@ -184,8 +177,7 @@ def nested_tables(rng: np.random.Generator) -> Parts:
 
 
 @family("coffee table", "drum")
-def drum_table(rng: np.random.Generator) -> Parts:
-    """Return a round drum: straight, waisted or swelling, or a bowl under a flat top."""
+def _drum_table(rng: np.random.Generator) -> Parts:
     r, high = draw(rng, 0.28, 0.48), draw(rng, 0.3, 0.46)
     look = made_of(rng, "wood", "metal", "stone", "painted", "wicker")
     waist = pick(rng, (1.0, 0.6, 0.75, 1.12))
@@ -202,8 +194,7 @@ def drum_table(rng: np.random.Generator) -> Parts:
 
 
 @family("side table", "one foot")
-def foot_side(rng: np.random.Generator) -> Parts:
-    """Return a small round or square table on one foot."""
+def _foot_side(rng: np.random.Generator) -> Parts:
     size, high = draw(rng, 0.3, 0.55), draw(rng, 0.45, 0.7)
     kind: Outline = pick(rng, ("oval", "oval", "rounded", "octagon"))
     look = table_look(rng, 0.15)
@@ -213,8 +204,7 @@ def foot_side(rng: np.random.Generator) -> Parts:
 
 
 @family("side table", "legs")
-def legged_side(rng: np.random.Generator) -> Parts:
-    """Return a small table on three or four legs, with a shelf or a drawer or neither."""
+def _legged_side(rng: np.random.Generator) -> Parts:
     depth, high = draw(rng, 0.32, 0.55), draw(rng, 0.42, 0.68)
     width = depth * draw(rng, 0.9, 1.4)
     look = table_look(rng)
@@ -237,8 +227,7 @@ def legged_side(rng: np.random.Generator) -> Parts:
 
 
 @family("side table", "C-shaped")
-def c_table(rng: np.random.Generator) -> Parts:
-    """Return a table whose foot and post stand at one side, to push over a sofa."""
+def _c_table(rng: np.random.Generator) -> Parts:
     depth, width, high = draw(rng, 0.28, 0.4), draw(rng, 0.4, 0.55), draw(rng, 0.5, 0.68)
     look, frame, t = table_look(rng), _metal(rng), draw(rng, 0.015, 0.03)
     yield table_top("rectangle", depth, width, high, 0.02, look)
@@ -256,8 +245,7 @@ def c_table(rng: np.random.Generator) -> Parts:
 
 
 @family("side table", "tray", held_out=True)
-def tray_table(rng: np.random.Generator) -> Parts:
-    """Return a tray with a rim on crossed or bent legs."""
+def _tray_table(rng: np.random.Generator) -> Parts:
     r, high = draw(rng, 0.2, 0.3), draw(rng, 0.45, 0.6)
     look, frame = made_of(rng, "metal", "wood", "black", "white"), _metal(rng)
     yield lathe(
@@ -275,8 +263,7 @@ def _console(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @family("console table", "legs and drawers")
-def drawer_console(rng: np.random.Generator) -> Parts:
-    """Return a narrow table on four legs with drawers under its top, perhaps a shelf near the floor."""
+def _drawer_console(rng: np.random.Generator) -> Parts:
     depth, width, high = _console(rng)
     look = board_look(rng)
     tall = draw(rng, 0.1, 0.18)
@@ -297,8 +284,7 @@ def drawer_console(rng: np.random.Generator) -> Parts:
 
 
 @family("console table", "metal frame")
-def framed_console(rng: np.random.Generator) -> Parts:
-    """Return a narrow board or glass sheet on a metal frame or runners, with one or two shelves."""
+def _framed_console(rng: np.random.Generator) -> Parts:
     depth, width, high = _console(rng)
     look = material("glass", rng) if chance(rng, 0.25) else table_look(rng, 0.12)
     frame = _metal(rng)
@@ -310,8 +296,7 @@ def framed_console(rng: np.random.Generator) -> Parts:
 
 
 @family("console table", "waterfall")
-def waterfall_console(rng: np.random.Generator) -> Parts:
-    """Return one thick board that turns down at both ends, or two trestles under it."""
+def _waterfall_console(rng: np.random.Generator) -> Parts:
     depth, width, high = _console(rng)
     look, t = table_look(rng, 0.15), draw(rng, 0.03, 0.07)
     yield slab(0.0, 0.0, high - t, depth, width, t, look)
@@ -323,8 +308,7 @@ def waterfall_console(rng: np.random.Generator) -> Parts:
 
 
 @family("console table", "half-moon", held_out=True)
-def half_moon(rng: np.random.Generator) -> Parts:
-    """Return a half-round table for a wall on three or four turned legs."""
+def _half_moon(rng: np.random.Generator) -> Parts:
     width, high = draw(rng, 0.75, 1.2), draw(rng, 0.74, 0.85)
     depth, look = draw(rng, 0.32, 0.45), made_of(rng, "wood", "white", "painted")
     angle = np.linspace(-np.pi / 2, np.pi / 2, 13)

@@ -11,7 +11,6 @@ from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, loft, rounded
 
 
 def _vessel(rng: np.random.Generator, tall: float, wide: float, kind: str, look: Material) -> Mesh:
-    """Return a hollow vase of a form, its mouth open."""
     rows = {"belly": [(0.45, 0.0), (0.85, 0.2), (1.0, 0.42), (0.8, 0.65), (0.42, 0.85), (0.5, 1.0), (0.3, 0.8)],
             "bottle": [(0.8, 0.0), (1.0, 0.15), (0.95, 0.35), (0.3, 0.55), (0.22, 0.9), (0.32, 1.0), (0.2, 0.97)],
             "trumpet": [(0.6, 0.0), (0.35, 0.1), (0.4, 0.5), (0.65, 0.85), (1.0, 1.0), (0.9, 0.98), (0.4, 0.6)],

@@ -23,7 +23,6 @@ def _rotor(rng: np.random.Generator, radius: float, x: float, z: float, look: Ma
 
 
 def _cage(radius: float, x: float, z: float, depth: float, wires: int, look: Material) -> Meshes:
-    """Return a fan's wire cage: rings at front and back joined by bent wires."""
     for r, at in ((radius, x), (radius * 0.6, x + depth * 0.8), (radius * 0.6, x - depth * 0.8)):
         ring = [(at, float(p[0]), float(p[1]) + z) for p in circle(r, 20)]
         yield tube(ring, 0.005 if r == radius else 0.0025, look, 4, closed=True)

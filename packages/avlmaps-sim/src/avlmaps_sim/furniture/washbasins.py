@@ -61,7 +61,6 @@ def _pedestal(rng: np.random.Generator) -> Parts:
 
 
 def _cabinet(rng: np.random.Generator, deep: float, wide: float, z: Pair) -> Meshes:
-    """Return a vanity's body with doors or drawers between two heights."""
     style = front_style(rng)
     half, columns = wide / 2, max(1, round(wide / draw(rng, 0.35, 0.6)))
     yield box((0.0, -half, z[0]), (deep, half, z[1]), style.look)
@@ -176,7 +175,6 @@ def _counter_vessel(rng: np.random.Generator) -> Parts:
 
 
 def _kitchen_bowls(rng: np.random.Generator, look: Material, bowls: int, board: bool, deep: float) -> list[Mesh]:
-    """Return a drop-in kitchen sink on a worktop: a rim with shallow hollows, a draining board, a tap."""
     size, gap, rim_z = draw(rng, 0.32, 0.42), draw(rng, 0.025, 0.05), 0.022
     wide_one = size * draw(rng, 0.95, 1.3)
     wide = bowls * wide_one + (bowls + 1) * gap
@@ -248,7 +246,6 @@ def _sink_cabinet(rng: np.random.Generator) -> Parts:
 
 @family("sink", "trough", held_out=True)
 def _trough(rng: np.random.Generator) -> Parts:
-    """Return a utility sink: one deep box on legs, a wall or a stand."""
     deep, wide, z, hollow = draw(rng, 0.45, 0.6), draw(rng, 0.5, 1.1), draw(rng, 0.8, 0.9), draw(rng, 0.22, 0.32)
     look = made_of(rng, "ceramic", "plastic", "stone", "metal")
     outer = outline(deep, wide, 24.0, 24, middle=(deep / 2, 0.0))

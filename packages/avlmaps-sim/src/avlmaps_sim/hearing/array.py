@@ -199,7 +199,6 @@ def _distances(
 
 
 def _pulses(at: Float[np.ndarray, " p"], amplitude: Float[np.ndarray, " p"], length: int) -> Float[np.ndarray, " t"]:
-    """Return pulses at fractional samples, each a sinc in a Hann window."""
     out = np.zeros(length)
     whole = np.floor(at).astype(int)
     offset = np.arange(-_SINC_HALF + 1, _SINC_HALF + 1)

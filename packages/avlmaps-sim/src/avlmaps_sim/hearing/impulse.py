@@ -106,7 +106,6 @@ class Acoustics:
         return out if late is None else out + np.sqrt(fade) * late
 
     def _late(self, rooms: Rooms, own: int, rng: np.random.Generator) -> Float[np.ndarray, "r t"] | None:
-        """Return the late field in every room of a source in one of them."""
         envelope = self.late_envelope(rooms, own)
         if envelope is None:
             return None

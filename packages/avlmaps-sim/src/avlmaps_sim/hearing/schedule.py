@@ -123,7 +123,6 @@ class _Planner:
         return Sounding(source, onset_s, onset_s + source.sound.duration_s, robot)
 
     def _mean_distance_m(self, source: Source) -> Float[np.ndarray, " onsets"]:
-        """Return for every onset that leaves room how far away the robot is while it sounds, on average."""
         if self._areas is None:
             self._areas = np.array([self.scene.area_at(place) for place in self.walk.position])
         distance_m = np.linalg.norm(self.walk.position - np.asarray(source.position), axis=1)

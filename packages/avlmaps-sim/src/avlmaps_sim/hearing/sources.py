@@ -80,7 +80,6 @@ def _source(name: str, place: _Place, bank: Bank, rng: np.random.Generator) -> S
 def _places(
     scene: Scene, kind: SoundKind, rng: np.random.Generator, walk: Float[np.ndarray, "n 3"] | None
 ) -> list[_Place]:
-    """Return where a kind may sound, in a random order: at things of the likeliest category first."""
     found: list[_Place] = []
     for category in kind.objects:
         own = [i for i, thing in enumerate(scene.objects) if thing.category == category]

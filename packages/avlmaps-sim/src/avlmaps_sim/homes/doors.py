@@ -154,7 +154,6 @@ def _swung_free(rooms: list[Room], walls: list[Wall], index: int, leaves: dict[i
 
 
 def _leaf_places(wall: Wall, hole: Hole) -> np.ndarray:
-    """Return places along the open leaves of a door, the last at the edge of the last."""
     into = wall.to_left if hole.to_left else -wall.to_left
     wide = hole.width_m > 1.2
     reach = hole.width_m / 2 if wide else hole.width_m

@@ -94,7 +94,6 @@ class Placer:
         return bool(np.isinf(nearest_m).all())
 
     def _places(self) -> "KDTree":
-        """Return a tree of every place where a sound plays already."""
         from scipy.spatial import KDTree
 
         if self._tree is None or self._in_tree != len(self.onsets_s):

@@ -44,7 +44,6 @@ def _desktop(rng: np.random.Generator, size: int) -> Picture:
 
 
 def _page(rng: np.random.Generator, size: int) -> Picture:
-    """Return a text editor, a table or a chart."""
     dark = rng.random() < 0.5
     image = np.full((size, size, 3), 0.11 if dark else 0.96, np.float32)
     if rng.random() < 0.3:
@@ -92,7 +91,6 @@ def books(rng: np.random.Generator) -> Texture:
 
 
 def _spine(rng: np.random.Generator, spine: Picture, ink: tuple[float, float, float]) -> None:
-    """Print a title along the spine and bands across it."""
     high, wide = spine.shape[:2]
     if wide >= 6 and rng.random() < 0.8:
         start, stop = int(high * rng.uniform(0.08, 0.3)), int(high * rng.uniform(0.45, 0.85))

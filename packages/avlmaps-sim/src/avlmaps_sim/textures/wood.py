@@ -18,7 +18,6 @@ def _grain(rng: np.random.Generator, size: int) -> Float32[np.ndarray, "s s"]:
 
 
 def _knotted(rng: np.random.Generator, grain: Float32[np.ndarray, "s s"]) -> Float32[np.ndarray, "s s"]:
-    """Return grain that bends round a few knots."""
     size = len(grain)
     x, y = grid(size)
     push, dark = np.zeros_like(grain), np.zeros_like(grain)

@@ -137,7 +137,6 @@ def brier(
 
 
 def _brier_interval(answers: Sequence[Judged]) -> str:
-    """Return the 95 % interval of a Brier score, bootstrapped by whole scenes; nothing of one scene."""
     scenes = sorted({one.scene for one in answers})
     if len(scenes) < 2:
         return ""

@@ -103,7 +103,6 @@ def _packed(index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
 
 
 def _spread(corners: Float[np.ndarray, "t 3 3"], spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return points spread evenly over every triangle, about two for each square of the spacing, and whose they are."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
     count = 1 + np.ceil(2.0 * area / spacing_m**2).astype(np.int64)

@@ -289,7 +289,6 @@ def _equality(one: MapData, other: MapData) -> str:
 
 
 def _goals(one: AVLMap, other: AVLMap) -> tuple[list[float], int]:
-    """Return how far the goals of each name that both find are apart, and how many names one finds alone."""
     apart_m: list[float] = []
     alone = 0
     for word in one.encoders.pixels.vocabulary:

@@ -201,7 +201,6 @@ class RoomWalk:
         return boxes
 
     def _strayed(self, truth: Float[np.ndarray, "n 4 4"], rng: np.random.Generator) -> Float[np.ndarray, "n 4 4"]:
-        """Return the path with a small mistake in each step, as odometry makes them."""
         if not self.drift:
             return truth
         steps = np.linalg.inv(truth[:-1]) @ truth[1:]

@@ -126,7 +126,6 @@ class _Source:
 
 
 def _cases(sources: Sequence[_Source], seed: int) -> list[Case]:
-    """Make every mistake of every source, as far as its format can hold it; several at a time."""
     tasks = [
         (source, numbers[first : first + _A_TASK], seed)
         for source in sources
