@@ -14,7 +14,7 @@ from avlmaps.query.modalities.area import AREA_NAMES
 from avlmaps_models.common.prompts import THINGS
 from avlmaps_sim.demo import questions
 from avlmaps_sim.furniture import categories
-from avlmaps_sim.hearing import KINDS as SOUND_KINDS
+from avlmaps_sim.hearing.sound_library import KINDS as SOUND_KINDS
 from avlmaps_sim.homes.furnish import HANGING_M
 from avlmaps_sim.homes.layout import home_programme, office_programme
 

@@ -16,7 +16,7 @@ from avlmaps.perception.embedded.sounds import EmbeddedSounds
 from avlmaps.perception.embedded.words import EmbeddedWords
 from avlmaps.recordings.types import Frame, Ground
 from avlmaps_sim.bench.words import heldout, places
-from avlmaps_sim.hearing import Synthesised
+from avlmaps_sim.hearing.sound_library import Synthesised
 from avlmaps_sim.render import Renderer
 from avlmaps_sim.scenes import open_scene
 from avlmaps_sim.views import random_views

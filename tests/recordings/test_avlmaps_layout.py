@@ -23,7 +23,7 @@ from avlmaps.recordings.formats.avlmaps_layout import (
     reference_map_from_world,
 )
 from avlmaps.recordings.open import open_recording
-from avlmaps_sim.mixing.copying import write_recording
+from avlmaps_sim.mixing.add_sounds import write_recording
 
 
 def _base_pose(index: int) -> np.ndarray:

@@ -25,7 +25,7 @@ from avlmaps.recordings.microphones import Microphones, microphones_named
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
-from avlmaps_sim.mixing.copying import write_recording
+from avlmaps_sim.mixing.add_sounds import write_recording
 
 RATE_HZ = 16_000
 RIG = Rig(*(Pinhole(50.0, 50.0, 32.0, 24.0, 64, 48),) * 2)

@@ -26,7 +26,7 @@ from avlmaps.recordings.corrections import (
 )
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.validate import validate
-from avlmaps_sim.mixing.copying import write_recording
+from avlmaps_sim.mixing.add_sounds import write_recording
 
 QUATERNIONS = st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1)
 

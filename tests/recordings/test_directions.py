@@ -18,7 +18,7 @@ from avlmaps.recordings.directions import DIRECTIONS, DirectionTrack, read_direc
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
-from avlmaps_sim.mixing.copying import write_recording
+from avlmaps_sim.mixing.add_sounds import write_recording
 
 RIG = Rig(*(Pinhole(50.0, 50.0, 32.0, 24.0, 64, 48),) * 2)
 TRACK = DirectionTrack.of([0.1, 0.2, 1.5], [0.5, -3.1, 6.2], np.array([0.1, np.nan, -0.2]), np.array([1.0, 0.5, 0.0]))

@@ -23,7 +23,7 @@ from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame, Recording
 from avlmaps.recordings.validate import validate
 from avlmaps.recordings.writer import RecordingWriter
-from avlmaps_sim.mixing.copying import write_recording
+from avlmaps_sim.mixing.add_sounds import write_recording
 
 
 def _frame(index: int, stamp_s: float, name: str | None = None) -> Frame:

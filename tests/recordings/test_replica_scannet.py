@@ -9,7 +9,7 @@ from recording_scenes import CAMERA, save_depth, save_rgb, shot, shots
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.recordings.open import open_recording
-from avlmaps_sim.mixing.copying import write_recording
+from avlmaps_sim.mixing.add_sounds import write_recording
 
 
 def _write_replica(path: Path, params: Path | None) -> Path:

@@ -11,7 +11,7 @@ from avlmaps.core import poses
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import BaseHeight
-from avlmaps_sim.mixing.copying import write_recording
+from avlmaps_sim.mixing.add_sounds import write_recording
 
 START = 1305031102.0
 

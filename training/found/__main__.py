@@ -11,7 +11,7 @@ from training.found.rows import Row, balanced, read_rows, write_rows
 import avlmaps.query
 from avlmaps_sim.bench.found.answers import judged_scene
 from avlmaps_sim.bench.found.suite import brier
-from avlmaps_sim.bench.indexing import IndexingSettings
+from avlmaps_sim.bench.indexing.runs import IndexingSettings
 
 SCENES = tuple(f"house:{seed}:held-out" for seed in range(1_200_000, 1_200_014))
 WEIGHTS = Path(avlmaps.query.__path__[0]) / "found.json"

@@ -30,10 +30,9 @@ from avlmaps.query.modalities.sound import sound_factor
 from avlmaps.query.settings import HeatSettings, SoundSettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import AudioTrack, Sound, resample, write_flac
-from avlmaps_sim.bench.harness.clips import unheard_folder
 from avlmaps_sim.bench.harness.evidence import LEAST_SEEN, Event, Evidence
 from avlmaps_sim.bench.harness.factors import true_things
-from avlmaps_sim.bench.harness.settings import Recorded
+from avlmaps_sim.bench.harness.settings import Recorded, unheard_folder
 from avlmaps_sim.bench.harness.workplace import SceneJob, called
 from avlmaps_sim.bench.indexing.runs import DEFAULT_SCENES
 from avlmaps_sim.bench.indexing.tasks import Task, TaskKind, near_sound_tasks, sound_tasks

@@ -20,12 +20,10 @@ from avlmaps_sim import furniture
 from avlmaps_sim.demo import run_demo
 from avlmaps_sim.demo.drive import Drive, command_for
 from avlmaps_sim.demo.evidence import Box, Evidence
-from avlmaps_sim.demo.home import FIRST_SEED, choose_home, fits
-from avlmaps_sim.demo.outcome import DemoReport, Step
-from avlmaps_sim.demo.pictures import colour_of, envelope, from_above
 from avlmaps_sim.demo.questions import FURNITURE, RARE, REACH_M, SMALL, SPOKEN, PhotoView, choose_questions
-from avlmaps_sim.demo.run import DemoSettings, record_settings
-from avlmaps_sim.demo.svg import Sheet
+from avlmaps_sim.demo.report import DemoReport, Step
+from avlmaps_sim.demo.run import FIRST_SEED, DemoSettings, choose_home, fits, record_settings
+from avlmaps_sim.demo.svg import Sheet, colour_of, envelope, from_above
 from avlmaps_sim.materials import material
 from avlmaps_sim.scene import Area, Scene, SceneBuilder, SceneObject
 from avlmaps_sim.shapes import slab
@@ -248,7 +246,7 @@ def test_saying_that_there_is_none_is_right_only_where_there_is_none(tmp_path: P
 @pytest.mark.nightly
 def test_the_chosen_home_is_one_that_no_training_has_seen_and_can_be_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     assert FIRST_SEED == 3_000_000
-    monkeypatch.setattr("avlmaps_sim.demo.home.FIRST_SEED", FIRST_SEED + 3)  # those before do not fit, nor does it
+    monkeypatch.setattr("avlmaps_sim.demo.run.FIRST_SEED", FIRST_SEED + 3)  # those before do not fit, nor does it
     scene = choose_home(0)
     assert fits(scene)
     assert scene.name == "house:3000004:held-out"

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Int32, UInt8
 
-from avlmaps_sim import lighting_kernels, sampling_kernels
+from avlmaps_sim import lighting_kernels
 from avlmaps_sim.mesh import Mesh
 from avlmaps_sim.scene import Light, Scene
 
@@ -157,7 +157,7 @@ def _smooth_corners(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     incident = np.argsort(mesh.triangle.reshape(-1), kind="stable").astype(np.int64)
     first = np.concatenate([[0], np.cumsum(np.bincount(mesh.triangle.reshape(-1), minlength=len(mesh.vertex)))])
     smooth = np.zeros((len(mesh.triangle), 3, 3), np.float32)
-    sampling_kernels.corner_normals(mesh.triangle, mesh.normals(), mesh.areas_m2(), first, incident, smooth)
+    lighting_kernels.corner_normals(mesh.triangle, mesh.normals(), mesh.areas_m2(), first, incident, smooth)
     return smooth, first, incident
 
 
@@ -165,7 +165,7 @@ def _corner_samples(mesh: Mesh, chosen: Bool[np.ndarray, " t"], smooth: np.ndarr
                     incident: np.ndarray) -> tuple[_Samples, Int32[np.ndarray, "t 3"]]:  # fmt: skip
     sample = np.full((len(mesh.triangle), 3), -1, np.int32)
     stands = np.zeros(3 * len(mesh.triangle), np.int64)
-    count = sampling_kernels.share_corners(mesh.triangle, smooth, first, incident, chosen, sample, stands)
+    count = lighting_kernels.share_corners(mesh.triangle, smooth, first, incident, chosen, sample, stands)
     t, k = stands[:count] // 3, stands[:count] % 3
     corners = mesh.corners().astype(np.float64)
     inward = corners[t].mean(axis=1) - corners[t, k]
@@ -223,7 +223,7 @@ def _texel_samples(mesh: Mesh, chosen: Int[np.ndarray, " n"], patches: _Patches)
     flat = np.take_along_axis(corners, axes[:, None, :].repeat(3, 1), 2)
     place, distance = np.zeros((total, 2)), np.full(total, 1e9)
     owner = np.zeros(total, np.int64)
-    sampling_kernels.place_texels(flat, patches.group, patches.first, patches.low, patches.columns, _TEXEL_M,
+    lighting_kernels.place_texels(flat, patches.group, patches.first, patches.low, patches.columns, _TEXEL_M,
                                   2 * _TEXEL_M, place, distance, owner)  # fmt: skip
     normal = mesh.normals()[chosen].astype(np.float64)
     normal = np.where(patches.turned[:, None], -normal, normal)[owner]
@@ -314,7 +314,7 @@ def light_map(scene: Scene, albedo: Float[np.ndarray, "m 3"]) -> LightMap:
                                        glow[material[needed]])  # fmt: skip
     begin = len(at_corner.place)
     filled = np.where(free[..., None], light, _around(samples.place, light, free)[:, None])
-    sampling_kernels.fill_texels(begin + patches.first, patches.rows, patches.columns, light, free, filled)
+    lighting_kernels.fill_texels(begin + patches.first, patches.rows, patches.columns, light, free, filled)
     turned = np.zeros(len(mesh.triangle), bool)
     turned[chosen], sample[chosen, 1] = patches.turned, patches.group
     return LightMap(sample, turned, begin + patches.first, patches.axes, patches.low, patches.columns, filled)

@@ -25,7 +25,8 @@ from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.microphones import LEVEL_CAMERA_FROM_ROBOT, Microphones, microphones_named
 from avlmaps.recordings.writer import RecordingWriter
 from avlmaps_sim.coverage import FloorCoverage, coverage_of_walk, require_floor
-from avlmaps_sim.hearing import Recorded, ScheduleRule, Sounding, Synthesised, candidates, schedule
+from avlmaps_sim.hearing.schedule import ScheduleRule, Sounding, candidates, schedule
+from avlmaps_sim.hearing.sound_library import Recorded, Synthesised
 from avlmaps_sim.processes import end_with_parent, fresh_processes
 from avlmaps_sim.rearranged import Change, to_json
 from avlmaps_sim.render import Renderer
@@ -279,7 +280,7 @@ def _track(
     if settings.hearing == "none":
         return None
     if settings.hearing == "overlay":
-        from avlmaps_sim.hearing import overlay
+        from avlmaps_sim.hearing.acoustic import overlay
 
         return overlay(soundings, trip.duration_s, rng, settings.rate_hz, snr_db=settings.snr_db)
     from avlmaps_sim.hearing.acoustic import AcousticSettings, acoustic

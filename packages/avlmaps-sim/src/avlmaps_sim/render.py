@@ -8,16 +8,197 @@ near to far, and leaves out those that lie behind what is drawn. Only pixels tha
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int, Int32, UInt8
+from jaxtyping import Bool, Float, Float32, Int, Int32, Int64, UInt8, UInt32
 
 from avlmaps.core.camera import Pinhole
 from avlmaps_sim import raster_kernels, shade_kernels
-from avlmaps_sim.atlas import Atlas, atlas_of, picture_maps
 from avlmaps_sim.lighting import light_map
-from avlmaps_sim.mesh import Mesh
-from avlmaps_sim.reflections import Plane, in_front_of, planes_shown, reflected
+from avlmaps_sim.mesh import Material, Mesh
 from avlmaps_sim.scene import NOTHING, Scene
+
+_MOST_LEVELS = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Atlas:
+    """Pictures by material.
+
+    Attributes:
+        texel: all pictures, row by row, red in the lowest byte, then green and blue.
+        table: (m, levels, 4) by material and level: first texel in ``texel``, width, height, and in level 0 how
+            many levels there are (0: no picture).
+        mean: (m, 3) mean colour with the material's own, linear.
+        colour: (m, 3) the material's own colour, linear.
+        per_unit: (m, 2) repeats of the picture per unit of (u, v).
+    """
+
+    texel: UInt32[np.ndarray, " n"]
+    table: Int64[np.ndarray, "m levels 4"]
+    mean: Float32[np.ndarray, "m 3"]
+    colour: Float32[np.ndarray, "m 3"]
+    per_unit: Float[np.ndarray, "m 2"]
+
+
+def _halvings(picture: UInt8[np.ndarray, "h w 3"]) -> list[UInt8[np.ndarray, "..."]]:
+    levels = [np.ascontiguousarray(picture)]
+    linear = np.square(picture.astype(np.float32))
+    while max(linear.shape[:2]) > 2 and len(levels) < _MOST_LEVELS:
+        height, width = linear.shape[:2]
+        linear = cv2.resize(linear, (max(1, width // 2), max(1, height // 2)), interpolation=cv2.INTER_AREA)
+        levels.append(np.round(np.sqrt(linear)).astype(np.uint8))
+    return levels
+
+
+def atlas_of(materials: tuple[Material, ...]) -> Atlas:
+    """Gather the pictures of materials; a picture that several share is stored once."""
+    table = np.zeros((max(len(materials), 1), _MOST_LEVELS, 4), np.int64)
+    kept: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    texels: list[np.ndarray] = []
+    start = 0
+    colour = np.square(np.array([m.colour for m in materials], np.float32).reshape(-1, 3))
+    mean = colour.copy()
+    for index, material in enumerate(materials):
+        if material.texture is None:
+            continue
+        if id(material.texture) not in kept:
+            rows = np.zeros((_MOST_LEVELS, 4), np.int64)
+            levels = _halvings(material.texture)
+            for level, picture in enumerate(levels):
+                rows[level] = (start, picture.shape[1], picture.shape[0], len(levels))
+                texels.append(picture.reshape(-1, 3).astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], np.uint32))
+                start += picture.shape[0] * picture.shape[1]
+            kept[id(material.texture)] = (rows, np.square(levels[-1].reshape(-1, 3) / 255.0).mean(axis=0))
+        table[index], average = kept[id(material.texture)]
+        mean[index] *= average
+    size = np.array([m.texture_size_m for m in materials], np.float64).reshape(-1, 2)
+    texel = np.concatenate(texels) if texels else np.zeros(1, np.uint32)
+    return Atlas(texel, table, mean, colour, 1.0 / np.maximum(size, 1e-6))
+
+
+def picture_maps(
+    mesh: Mesh, order: Int[np.ndarray, " t"], atlas: Atlas
+) -> tuple[Float32[np.ndarray, "t 8"], Float32[np.ndarray, "t 8"], Float32[np.ndarray, " t"]]:
+    """Return for triangles in an order the affine maps that shading needs.
+
+    Returns:
+        From a place in the world to repeats of its picture, as two rows of four; from there to the fractions along
+        the triangle's first and second edge, likewise; and how many texels a metre on it covers.
+    """
+    corners = mesh.corners()[order].astype(np.float64)
+    material = mesh.material[order]
+    uv = mesh.uv[order].astype(np.float64) * atlas.per_unit[material][:, None, :]
+    edge, uv_edge = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
+    dual = _dual(edge)
+    linear = np.einsum("tji,tjk->tki", dual, uv_edge)
+    place = np.concatenate([linear, (uv[:, 0] - np.einsum("tki,ti->tk", linear, corners[:, 0]))[..., None]], axis=2)
+    fraction = np.concatenate([dual, -np.einsum("tki,ti->tk", dual, corners[:, 0])[..., None]], axis=2)
+    size = atlas.table[material, 0, 1:3]
+    texels_a_metre = (np.linalg.norm(linear, axis=2) * size).max(axis=1)
+    return (place.reshape(-1, 8).astype(np.float32), fraction.reshape(-1, 8).astype(np.float32),
+            texels_a_metre.astype(np.float32))  # fmt: skip
+
+
+def _dual(edge: Float[np.ndarray, "t 2 3"]) -> Float[np.ndarray, "t 2 3"]:
+    a, b = edge[:, 0], edge[:, 1]
+    aa, bb, ab = (np.einsum("ti,ti->t", p, q)[:, None] for p, q in ((a, a), (b, b), (a, b)))
+    area = aa * bb - ab * ab
+    safe = np.where(area > 1e-18, area, np.inf)
+    return np.stack([(bb * a - ab * b) / safe, (aa * b - ab * a) / safe], axis=1)
+
+
+_FEWEST_PIXELS = 24  # mirrors that show fewer pixels are not worth another view
+_MOST = 4  # planes of one view: a wardrobe's doors lie in one
+_ROUGH = 1e-3  # metres: what lies no farther in front of a mirror than this lies in its glass
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plane:
+    """A plane: the points x with normal · x = offset; the normal points to the camera's side.
+
+    Attributes:
+        normal: unit vector, world.
+        offset_m: metres.
+    """
+
+    normal: Float[np.ndarray, "3"]
+    offset_m: float
+
+
+def planes_shown(
+    shown: Int32[np.ndarray, " n"],
+    mirror: Bool[np.ndarray, " t"],
+    corner: Float32[np.ndarray, "t 9"],
+    normal: Float32[np.ndarray, "t 3"],
+    origin: Float[np.ndarray, "3"],
+) -> list[tuple[Int[np.ndarray, " m"], Plane]]:
+    """Return the planes of the mirrors that a view shows, the largest first, and each one's pixels.
+
+    ``shown`` is the triangle of each pixel, -1 for none.
+    """
+    pixels = np.flatnonzero((shown >= 0) & mirror[shown])
+    if not len(pixels):
+        return []
+    triangle = shown[pixels]
+    across = normal[triangle].astype(np.float64)
+    offset = np.einsum("ni,ni->n", across, corner[triangle, :3].astype(np.float64))
+    side = np.where(across @ origin - offset >= 0, 1.0, -1.0)
+    across, offset = across * side[:, None], offset * side
+    key = np.column_stack([np.rint(across * 200), np.rint(offset * 100)]).astype(np.int64)
+    _, first, which, count = np.unique(key, axis=0, return_index=True, return_inverse=True, return_counts=True)
+    which = which.reshape(-1)
+    return [
+        (pixels[which == number], Plane(across[first[number]], float(offset[first[number]])))
+        for number in np.argsort(-count, kind="stable")[:_MOST]
+        if count[number] >= _FEWEST_PIXELS
+    ]
+
+
+def reflected(
+    plane: Plane, rotation: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, "3"]
+) -> tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "3"]]:
+    """Return ``camera from world`` for a world that is reflected in a plane; the rotation then has determinant -1."""
+    turned = np.eye(3) - 2.0 * np.outer(plane.normal, plane.normal)
+    return rotation @ turned, shift + rotation @ (2.0 * plane.offset_m * plane.normal)
+
+
+def in_front_of(
+    plane: Plane, corner: Float32[np.ndarray, "t 9"]
+) -> tuple[Float32[np.ndarray, "t 9"], Float32[np.ndarray, "t 9"]]:
+    """Return what of each triangle lies in front of a plane, as two triangles; either may have shrunk to a point.
+
+    What lies behind a mirror, or in its glass, is not reflected. A triangle that has two corners in front leaves
+    a quadrangle, hence the second.
+    """
+    at = corner.reshape(-1, 3, 3).astype(np.float64)
+    height = at @ plane.normal - plane.offset_m
+    ahead = height > _ROUGH
+    count = ahead.sum(axis=1)
+    first, second = corner.copy(), np.zeros_like(corner)
+    first[count == 0] = 0.0
+    one, two = np.flatnonzero(count == 1), np.flatnonzero(count == 2)
+    (a, b, c), (ha, hb, hc) = _from_corner(ahead[one].argmax(axis=1), at[one], height[one])
+    first[one] = np.concatenate([a, _cut(a, b, ha, hb), _cut(a, c, ha, hc)], axis=1)
+    (c, a, b), (hc, ha, hb) = _from_corner(ahead[two].argmin(axis=1), at[two], height[two])
+    right, left = _cut(b, c, hb, hc), _cut(a, c, ha, hc)
+    first[two] = np.concatenate([a, b, right], axis=1)
+    second[two] = np.concatenate([a, right, left], axis=1)
+    return first, second
+
+
+def _from_corner(
+    start: Int[np.ndarray, " n"], at: Float[np.ndarray, "n 3 3"], height: Float[np.ndarray, "n 3"]
+) -> tuple[Float[np.ndarray, "3 n 3"], Float[np.ndarray, "3 n 1"]]:
+    rows, turn = np.arange(len(start)), [(start + k) % 3 for k in range(3)]
+    return np.stack([at[rows, k] for k in turn]), np.stack([height[rows, k] for k in turn])[..., None]
+
+
+def _cut(
+    ahead: Float[np.ndarray, "n 3"], behind: Float[np.ndarray, "n 3"], above: np.ndarray, below: np.ndarray
+) -> Float[np.ndarray, "n 3"]:
+    return ahead + (behind - ahead) * (above / (above - below))
+
 
 SKY = (178, 204, 232)  # sRGB of pixels that show no triangle
 

@@ -16,7 +16,7 @@ from avlmaps.core import poses
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.recordings.layout import DESCRIPTION, POSES_HEADER, UNFINISHED
-from avlmaps_sim.hearing import Sounding
+from avlmaps_sim.hearing.schedule import Sounding
 from avlmaps_sim.mesh import Triple
 from avlmaps_sim.mixing.add_sounds import EVENTS
 from avlmaps_sim.mixing.add_sounds import EVENTS_HEADER as COMMON_HEADER

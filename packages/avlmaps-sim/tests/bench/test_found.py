@@ -11,8 +11,7 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Modality, Role
 from avlmaps.query.goals import FACTORS, probability_of
 from avlmaps.query.goals import GoalEvidence as QueryEvidence
-from avlmaps_sim.bench.found.answers import Judged
-from avlmaps_sim.bench.found.queries import FAR_M, NEAR_M, labelled_queries
+from avlmaps_sim.bench.found.answers import FAR_M, NEAR_M, Judged, labelled_queries
 from avlmaps_sim.bench.found.suite import brier, factors_table, kinds_table, reliability_table
 from avlmaps_sim.bench.harness.evidence import Event, Evidence
 from avlmaps_sim.bench.indexing.tasks import area_tasks, between_m, near_sound_tasks, sound_tasks

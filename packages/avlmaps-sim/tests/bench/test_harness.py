@@ -17,7 +17,6 @@ from avlmaps.perception.encoders import choose_models
 from avlmaps.recordings.audio import Sound, write_flac
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
-from avlmaps_sim.bench.harness.clips import unheard_folder, unheard_rows
 from avlmaps_sim.bench.harness.evidence import Box
 from avlmaps_sim.bench.harness.figures import (
     as_csv,
@@ -31,12 +30,11 @@ from avlmaps_sim.bench.harness.figures import (
     write_answer,
 )
 from avlmaps_sim.bench.harness.own_recording import OwnRecording, is_recording
-from avlmaps_sim.bench.harness.settings import TaskError, shipped_checksums
-from avlmaps_sim.bench.indexing import IndexingSettings, run
-from avlmaps_sim.bench.indexing.runs import PAPER_SIZES, _in_turn
+from avlmaps_sim.bench.harness.settings import TaskError, shipped_checksums, unheard_folder, unheard_rows
+from avlmaps_sim.bench.indexing.runs import PAPER_SIZES, IndexingSettings, _in_turn, run
 from avlmaps_sim.bench.indexing.scene_queries import cut_out, mixed, surface_regions
 from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
-from avlmaps_sim.bench.navigation import NavigationSettings
+from avlmaps_sim.bench.navigation.missions import NavigationSettings
 from avlmaps_sim.bench.navigation.runs import run as run_navigation
 from avlmaps_sim.mixing.clips import find_clips
 from avlmaps_sim.render import Renderer
@@ -70,7 +68,7 @@ def test_clips_with_a_fold_trained_the_encoder_and_are_left_out(tmp_path: Path):
 def test_clips_of_recordings_that_the_weights_name_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     rows = [("a/4-1234-A-3.flac", "rain", ""), ("a/4-1235-A-3.flac", "rain", ""), ("a/mine.flac", "rain", "")]
     source = clips(tmp_path / "c", rows)
-    monkeypatch.setattr("avlmaps_sim.bench.harness.clips.trained_sources", lambda: frozenset({1234}))
+    monkeypatch.setattr("avlmaps_sim.bench.harness.settings.trained_sources", lambda: frozenset({1234}))
     assert [row["path"] for row in unheard_rows(source)] == ["a/4-1235-A-3.flac", "a/mine.flac"]
 
 

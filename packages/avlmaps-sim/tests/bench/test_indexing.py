@@ -36,7 +36,7 @@ from avlmaps_sim.bench.indexing.tasks import (
     photo_tasks,
     sound_tasks,
 )
-from avlmaps_sim.hearing import Synthesised
+from avlmaps_sim.hearing.sound_library import Synthesised
 from avlmaps_sim.mesh import Material
 from avlmaps_sim.scene import Area, Scene, SceneBuilder
 from avlmaps_sim.shapes import box

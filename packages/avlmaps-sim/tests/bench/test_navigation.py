@@ -15,33 +15,41 @@ from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps_sim.bench.harness.evidence import Box, Event, Evidence, Photo
 from avlmaps_sim.bench.harness.settings import Recorded
 from avlmaps_sim.bench.indexing.tasks import near_sound_tasks, photo_tasks
-from avlmaps_sim.bench.navigation import Episode, Leg, MissionSet, Outcome
-from avlmaps_sim.bench.navigation.commands import COMMANDS, SPATIAL, command_missions
+from avlmaps_sim.bench.navigation.commands import (
+    COMMANDS,
+    SPATIAL,
+    command_missions,
+    image_missions,
+    pair_missions,
+    range_of,
+    sound_missions,
+)
 from avlmaps_sim.bench.navigation.episode_runner import Foreknowledge, WatchedBody
-from avlmaps_sim.bench.navigation.evidence import Ground
-from avlmaps_sim.bench.navigation.floor import Floor
-from avlmaps_sim.bench.navigation.map_variants import CEILING, CONFIGURATIONS, OURS, configurations
-from avlmaps_sim.bench.navigation.metrics import (
+from avlmaps_sim.bench.navigation.episodes import (
+    Episode,
+    Leg,
     grouped_interval,
     in_a_row,
     independent,
     path_weight,
 )
+from avlmaps_sim.bench.navigation.evidence import Floor, Ground
+from avlmaps_sim.bench.navigation.map_variants import CEILING, CONFIGURATIONS, OURS, configurations
 from avlmaps_sim.bench.navigation.missions import (
     Goal,
     GoalKind,
     Mission,
+    MissionSet,
     NavigationSettings,
     Series,
+    an_object,
     beside,
     between,
     joined,
     left_of,
     room_distance_m,
 )
-from avlmaps_sim.bench.navigation.phrases import an_object
-from avlmaps_sim.bench.navigation.rules import image_missions, pair_missions, range_of, sound_missions
-from avlmaps_sim.bench.navigation.runs import SceneFacts
+from avlmaps_sim.bench.navigation.runs import Outcome, SceneFacts
 from avlmaps_sim.bench.navigation.suite import TITLE, tables
 from helpers.small_home import HEARD, furnished
 

@@ -19,7 +19,7 @@ from avlmaps_sim.bench.harness.evidence import Box
 from avlmaps_sim.bench.harness.workplace import TrueVoxels
 from avlmaps_sim.bench.navigation.episode_runner import Pilot
 from avlmaps_sim.bench.navigation.episodes import Episode
-from avlmaps_sim.bench.navigation.floor import Floor
+from avlmaps_sim.bench.navigation.evidence import Floor
 from avlmaps_sim.bench.navigation.map_variants import (
     CEILING,
     Configuration,
@@ -28,8 +28,16 @@ from avlmaps_sim.bench.navigation.map_variants import (
     Senses,
     configurations,
 )
-from avlmaps_sim.bench.navigation.missions import Goal, GoalKind, Mission, NavigationSettings, Series
-from avlmaps_sim.bench.navigation.phrases import a_sound, an_object, near_sound
+from avlmaps_sim.bench.navigation.missions import (
+    Goal,
+    GoalKind,
+    Mission,
+    NavigationSettings,
+    Series,
+    a_sound,
+    an_object,
+    near_sound,
+)
 from avlmaps_sim.bench.navigation.runs import run
 from avlmaps_sim.bench.navigation.suite import run_navigation, tables
 from avlmaps_sim.truth import HeardEvent, Truth
@@ -225,7 +233,7 @@ def shown(episodes: list[Episode]) -> list[tuple[object, ...]]:
 def test_a_run_that_was_broken_off_goes_on_and_ends_with_the_same_tables(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr("avlmaps_sim.bench.navigation.scene_setup._PHOTOS", 30)  # enough for one sequence
+    monkeypatch.setattr("avlmaps_sim.bench.navigation.runs._PHOTOS", 30)  # enough for one sequence
     first = run(small_settings(), tmp_path, opener([]))  # pyright: ignore[reportArgumentType]
     true = [leg for e in first.episodes if e.configuration == CEILING for leg in e.legs if leg.reachable]
     assert len(true) >= 10

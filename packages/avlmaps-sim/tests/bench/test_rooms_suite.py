@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps_sim.bench.harness.figures import median_interval
-from avlmaps_sim.bench.rooms.scores import CELL_M, Floor, Listed, floors_of, judged
+from avlmaps_sim.bench.rooms.suite import CELL_M, Floor, Listed, floors_of, judged
 from avlmaps_sim.scene import Area
 
 KITCHEN = Area("kitchen", np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]]))

@@ -9,7 +9,7 @@ import soundfile
 from avlmaps.core.errors import AudioError
 from avlmaps.perception.embedded.sounds import EmbeddedSounds
 from avlmaps_sim.bench import sound_clips
-from avlmaps_sim.bench.harness.clips import unheard_rows
+from avlmaps_sim.bench.harness.settings import unheard_rows
 from avlmaps_sim.bench.sound_clips import ESC10, ESC50
 from avlmaps_sim.mixing.clips import find_clips
 

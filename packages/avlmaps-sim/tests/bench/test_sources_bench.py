@@ -21,16 +21,18 @@ from avlmaps_sim.bench.sources.homes import (
     matched,
     nearest_held,
 )
-from avlmaps_sim.bench.sources.measured import (
+from avlmaps_sim.bench.sources.suite import (
     SOURCE_M,
     MeasuredRoom,
     arrays_of_four,
     direct_to_reverberant_db,
     table,
+    table_of_homes,
+    table_of_mended,
+    table_of_regions,
     walks_of_ratios,
 )
-from avlmaps_sim.bench.sources.suite import table_of_homes, table_of_mended, table_of_regions
-from avlmaps_sim.hearing import AcousticSettings
+from avlmaps_sim.hearing.acoustic import AcousticSettings
 from avlmaps_sim.truth import HeardEvent
 from helpers.hearing_scenes import area
 
@@ -128,7 +130,7 @@ def test_the_ratio_of_direct_sound_falls_as_the_reverberation_grows() -> None:
 @pytest.mark.few(1)
 @pytest.mark.parametrize("front_db", [0.0, 5.0])
 def test_ratios_find_the_source_whichever_way_it_faces(front_db: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps_sim.bench.sources.measured._WALKS", 25)
+    monkeypatch.setattr("avlmaps_sim.bench.sources.suite._WALKS", 25)
     rows, columns = np.divmod(np.arange(25), 5)
     place = np.column_stack([3.68 - 0.5 * columns, 3.0 + 0.5 * rows, np.full(25, 1.2)])
     away = place - np.array([3.36, 2.0, 1.5])

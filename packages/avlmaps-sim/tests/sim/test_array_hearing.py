@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.microphones import Microphones, microphones_named
-from avlmaps_sim.hearing import AcousticSettings, Sounding, Source
+from avlmaps_sim.hearing.acoustic import AcousticSettings
 from avlmaps_sim.hearing.array import heard_by_array, responses
 from avlmaps_sim.hearing.impulse import LATE_FROM_S, Acoustics
 from avlmaps_sim.hearing.rooms import SPEED_M_S
+from avlmaps_sim.hearing.schedule import Sounding, Source
 from helpers.hearing_scenes import open_air, shoebox, two_rooms
 
 RATE_HZ = 16_000

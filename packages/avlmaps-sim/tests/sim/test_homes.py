@@ -15,8 +15,20 @@ from avlmaps_sim.homes import lived_in, make_home, make_office
 from avlmaps_sim.homes.doors import _opened  # pyright: ignore[reportPrivateUsage]
 from avlmaps_sim.homes.layout import cut, floor_of, home_programme
 from avlmaps_sim.homes.lived_in import with_curtains_apart
-from avlmaps_sim.homes.plan import OUTSIDE, Room, Wall, walls_between
-from avlmaps_sim.homes.polygons import area_m2, corners_of, half, inside, overlapping, rectangle, shrunk, widths_m
+from avlmaps_sim.homes.plan import (
+    OUTSIDE,
+    Room,
+    Wall,
+    area_m2,
+    corners_of,
+    half,
+    inside,
+    overlapping,
+    rectangle,
+    shrunk,
+    walls_between,
+    widths_m,
+)
 from avlmaps_sim.scene import Scene, SceneBuilder
 from avlmaps_sim.scenes import SceneError, open_scene
 

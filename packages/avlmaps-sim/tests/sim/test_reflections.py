@@ -11,8 +11,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps_sim import shapes
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, triangles_of
-from avlmaps_sim.reflections import Plane, in_front_of, reflected
-from avlmaps_sim.render import Renderer
+from avlmaps_sim.render import Plane, Renderer, in_front_of, reflected
 from avlmaps_sim.scene import Scene, SceneBuilder
 from avlmaps_sim.views import camera_poses
 

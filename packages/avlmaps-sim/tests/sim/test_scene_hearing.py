@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.signal import butter, fftconvolve, sosfilt
 
 from avlmaps.recordings.audio import Sound
-from avlmaps_sim.hearing import AcousticSettings, Sounding, Source, acoustic, overlay
-from avlmaps_sim.hearing.filters import shaped_impulse, split
-from avlmaps_sim.hearing.impulse import Acoustics, arrivals
+from avlmaps_sim.hearing.acoustic import AcousticSettings, acoustic, overlay
+from avlmaps_sim.hearing.impulse import Acoustics, arrivals, shaped_impulse, split
 from avlmaps_sim.hearing.rooms import BANDS_HZ, SPEED_M_S, WALL_DB, Rooms
+from avlmaps_sim.hearing.schedule import Sounding, Source
 from avlmaps_sim.mesh import Material
 from avlmaps_sim.mixing.clips import loudness_db
 from avlmaps_sim.scene import Scene, SceneBuilder

@@ -6,7 +6,8 @@ import pytest
 from avlmaps.core.errors import AudioError
 from avlmaps.recordings.audio import Sound
 from avlmaps_sim.furniture.catalogue import categories
-from avlmaps_sim.hearing import KINDS, Recorded, ScheduleRule, Source, Synthesised, candidates, kind_of, schedule
+from avlmaps_sim.hearing.schedule import ScheduleRule, Source, candidates, schedule
+from avlmaps_sim.hearing.sound_library import KINDS, Recorded, Synthesised, kind_of
 from avlmaps_sim.synthesis import MAKERS
 from helpers.hearing_scenes import flat
 

@@ -25,8 +25,9 @@ from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import with_microphones, write_channels
 from avlmaps.recordings.microphones import microphones_named
 from avlmaps.recordings.open import open_recording
-from avlmaps_sim.hearing import AcousticSettings, Sounding, Source
+from avlmaps_sim.hearing.acoustic import AcousticSettings
 from avlmaps_sim.hearing.array import heard_by_array
+from avlmaps_sim.hearing.schedule import Sounding, Source
 from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.truth import read_truth
 from helpers.heard_flat import heard_flat

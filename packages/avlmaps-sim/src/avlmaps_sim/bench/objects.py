@@ -37,7 +37,7 @@ from avlmaps_sim.scene import SceneObject
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps_sim.bench.indexing import IndexingSettings
+    from avlmaps_sim.bench.indexing.runs import IndexingSettings
 
 STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
 # A box is grown by this: voxels and poses are that coarse.

@@ -14,9 +14,9 @@ from avlmaps_sim.bench.harness.settings import checksums, shipped_checksums
 
 if TYPE_CHECKING:
     from avlmaps_sim.bench.harness.settings import SceneSettings
-    from avlmaps_sim.bench.indexing import IndexingSettings
+    from avlmaps_sim.bench.indexing.runs import IndexingSettings
     from avlmaps_sim.bench.live.suite import LiveBench
-    from avlmaps_sim.bench.navigation import NavigationSettings
+    from avlmaps_sim.bench.navigation.missions import NavigationSettings
     from avlmaps_sim.bench.sources.suite import SourcesBench
 
 

@@ -18,10 +18,8 @@ from jaxtyping import Complex, Float
 
 from avlmaps.recordings.channels import ChannelSound
 from avlmaps.recordings.microphones import Microphones
-from avlmaps_sim.hearing.acoustic import AcousticSettings, dry_clip, unclipped
-from avlmaps_sim.hearing.filters import shaped_impulse
-from avlmaps_sim.hearing.impulse import LATE_BY_S, LATE_FROM_S, NEAREST_M, Acoustics, arrivals
-from avlmaps_sim.hearing.overlay import room_noise
+from avlmaps_sim.hearing.acoustic import AcousticSettings, dry_clip, room_noise, unclipped
+from avlmaps_sim.hearing.impulse import LATE_BY_S, LATE_FROM_S, NEAREST_M, Acoustics, arrivals, shaped_impulse
 from avlmaps_sim.hearing.rooms import SPEED_M_S, Rooms
 from avlmaps_sim.hearing.schedule import Sounding
 from avlmaps_sim.hearing.sound_paths import Air, Way

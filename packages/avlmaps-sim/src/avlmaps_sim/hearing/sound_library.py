@@ -1,4 +1,4 @@
-"""Where the sounds themselves come from: a folder of recordings, or rules."""
+"""The kinds of sound, and where the sounds themselves come from: a folder of recordings, or rules."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,9 +7,79 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from avlmaps.core.errors import AudioError
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.recordings.audio import Sound
-from avlmaps_sim.hearing.kinds import kind_of
 from avlmaps_sim.mixing.clips import Clip, audible, audible_part, find_clips
+
+ANYWHERE = ("*",)
+
+
+@dataclass(frozen=True, slots=True)
+class SoundKind:
+    """A kind of sound and where a home has it.
+
+    Attributes:
+        names: what clips of it are called; the first is ours.
+        objects: categories of objects that make it, the likeliest first.
+        floor: kinds of rooms in which it is also heard where nothing that makes it stands; ``("*",)``: in any.
+        height_m: height over the floor there.
+        level_db: loudness at 1 m against other kinds.
+        indoors: whether homes make it; sounds from outdoors come in by the windows and only on request.
+    """
+
+    names: tuple[str, ...]
+    objects: tuple[str, ...] = ()
+    floor: tuple[str, ...] = ()
+    height_m: float = 1.0
+    level_db: float = 0.0
+    indoors: bool = True
+
+
+# Height over the floor where nothing that makes it stands, metres, and loudness at 1 m against other kinds, dB.
+_INDOORS = {
+    "running water": (1.0, 0.0), "water drops": (0.9, -6.0), "pouring water": (1.0, -3.0),
+    "brushing teeth": (1.3, -4.0), "toilet flush": (0.7, 0.0), "hair dryer": (1.3, 2.0),
+    "microwave beep": (1.2, 0.0), "kettle boiling": (1.0, 0.0), "frying": (1.0, -3.0), "blender": (1.0, 4.0),
+    "dishes clattering": (1.0, 0.0), "can opening": (1.0, -2.0), "drinking or sipping": (1.1, -6.0),
+    "washing machine": (0.5, 0.0), "vacuum cleaner": (0.3, 4.0), "fan or air conditioner": (1.5, -4.0),
+    "crackling fire": (0.5, -2.0), "door knock": (1.3, 0.0), "door opening or closing": (1.0, 2.0),
+    "creaking door": (1.0, -3.0), "doorbell": (1.8, 2.0), "chest open close": (0.8, -2.0),
+    "clock tick": (1.6, -8.0), "alarm clock": (0.6, 2.0), "smoke alarm": (2.3, 4.0), "phone ringing": (0.9, 0.0),
+    "keyboard typing": (0.8, -5.0), "mouse click": (0.8, -8.0), "television or music": (1.0, 0.0),
+    "piano": (1.0, 2.0), "guitar": (0.8, 0.0), "crying baby": (0.6, 4.0), "snoring": (0.6, -3.0),
+    "breathing": (0.6, -8.0), "dog bark": (0.4, 4.0), "cat meowing": (0.3, 0.0), "mouse squeaking": (0.1, -6.0),
+    "buzzing insects": (1.5, -6.0), "glass breaking": (0.2, 3.0), "footsteps": (0.1, -3.0), "coughing": (1.4, 0.0),
+    "sneezing": (1.4, 2.0), "laughing": (1.4, 0.0), "talking": (1.4, 0.0), "whistling": (1.5, 0.0),
+    "clapping": (1.2, 0.0), "children playing": (0.7, 2.0), "electric drill": (1.2, 4.0), "hammering": (1.5, 3.0),
+    "hand saw": (0.8, 2.0), "bicycle bell": (1.0, 0.0),
+}  # fmt: skip
+_OUTDOORS = {
+    "crowd cheering": (1.0, 0.0), "rain": (1.5, 0.0),
+}  # fmt: skip
+# Homes of the simulator call a storage room so.
+_AREA = {"storage room": "storage"}
+
+
+def _kind(name: str, height_m: float, level_db: float, indoors: bool) -> SoundKind:
+    entry = lexicon().named(name, EntryKind.SOUND)
+    floor = tuple(_AREA.get(room, room) for room in entry.rooms)
+    return SoundKind((name, *entry.synonyms), entry.makers, floor, height_m, level_db, indoors)
+
+
+KINDS: tuple[SoundKind, ...] = tuple(
+    _kind(name, *measures, indoors=table is _INDOORS)
+    for table in (_INDOORS, _OUTDOORS)
+    for name, measures in table.items()
+)
+_BY_NAME = {kind.names[0]: kind for kind in KINDS}
+_FOREIGN = SoundKind(("",), ("window",), ANYWHERE, 1.5, indoors=False)
+
+
+def kind_of(name: str) -> SoundKind:
+    """Return the kind of a sound by its name; one that no home makes comes in by the windows, or from anywhere."""
+    entry = lexicon().find(name.replace("_", " "), EntryKind.SOUND)
+    return _FOREIGN if entry is None else _BY_NAME.get(entry.name, _FOREIGN)
+
 
 _LONGEST_S = 5.0
 

@@ -7,7 +7,7 @@ import numpy as np
 from avlmaps_sim.furniture import Piece, Support
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.homes.furnish import Among, Furnisher, PlacedPiece, floor_standing, footprint
-from avlmaps_sim.homes.polygons import corners_of, overlapping
+from avlmaps_sim.homes.plan import corners_of, overlapping
 
 # Things found on the tops of furniture.
 ON_TOP: dict[str, tuple[str, ...]] = {

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick
-from avlmaps_sim.homes.plan import OUTSIDE, WELL, Hole, HoleKind, Room, Wall
-from avlmaps_sim.homes.polygons import inside
+from avlmaps_sim.homes.plan import OUTSIDE, WELL, Hole, HoleKind, Room, Wall, inside
 
 HUBS = ("hallway", "corridor", "entrance hall", "open-plan office", "reception")
 SOCIAL = ("living room", "kitchen", "dining room")

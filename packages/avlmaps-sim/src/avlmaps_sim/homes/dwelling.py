@@ -7,13 +7,12 @@ import numpy as np
 
 from avlmaps_sim.furniture import Families
 from avlmaps_sim.furniture.recipe_helpers import chance, draw
-from avlmaps_sim.homes import offices, rooms, service
+from avlmaps_sim.homes import rooms, service
 from avlmaps_sim.homes.clutter import dress, litter
 from avlmaps_sim.homes.doors import joined_up, lit_by_day
-from avlmaps_sim.homes.fixtures import build_stairs, fit_out
+from avlmaps_sim.homes.fixtures import adorn, build_stairs, dress_windows, fit_out, light_up
 from avlmaps_sim.homes.furnish import Furnisher
 from avlmaps_sim.homes.layout import Programme, floor_of, home_programme, office_programme, upstairs
-from avlmaps_sim.homes.on_walls import adorn, dress_windows, light_up
 from avlmaps_sim.homes.placing import Footprint, ground_of
 from avlmaps_sim.homes.plan import WELL, Room, Storey, walls_between
 from avlmaps_sim.homes.walls import build_shell, looks_of
@@ -26,9 +25,9 @@ RULES: dict[str, Callable[[Furnisher], None]] = {
     "children's room": rooms.childrens_room, "office": rooms.study, "kitchen": service.kitchen,
     "bathroom": service.bathroom, "toilet": service.bathroom, "laundry room": service.laundry_room,
     "storage": service.storage, "hallway": service.hallway, "entrance hall": service.hallway,
-    "corridor": service.hallway, "gym": service.gym, "open-plan office": offices.open_plan_office,
-    "meeting room": offices.meeting_room, "reception": offices.reception, "copy room": offices.copy_room,
-    "kitchenette": offices.kitchenette,
+    "corridor": service.hallway, "gym": service.gym, "open-plan office": service.open_plan_office,
+    "meeting room": service.meeting_room, "reception": service.reception, "copy room": service.copy_room,
+    "kitchenette": service.kitchenette,
 }  # fmt: skip
 
 

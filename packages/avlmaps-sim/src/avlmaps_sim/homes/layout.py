@@ -7,8 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
-from avlmaps_sim.homes.plan import WELL, WELL_LENGTH_M, Room
-from avlmaps_sim.homes.polygons import area_m2, half, middle, rectangle, widths_m
+from avlmaps_sim.homes.plan import WELL, WELL_LENGTH_M, Room, area_m2, half, middle, rectangle, widths_m
 
 Polygon = Float[np.ndarray, "k 2"]
 Programme = list[tuple[str, float]]  # kinds of room and the area each should have, m²; neighbours stand together

@@ -6,8 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy import ndimage
 
-from avlmaps_sim.homes.plan import OUTSIDE, Hole, Storey
-from avlmaps_sim.homes.polygons import corners_of, inside, overlapping, shrunk
+from avlmaps_sim.homes.plan import OUTSIDE, Hole, Storey, corners_of, inside, overlapping, shrunk
 
 _WAY_M = 0.38  # a robot of 0.25 m and the coarseness of the grids that look for its way
 _CELL_M = 0.1

@@ -6,9 +6,8 @@ from avlmaps_sim.furniture import Piece
 from avlmaps_sim.furniture.decor import CARPET_SHAPES, carpet
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.homes.clutter import set_at
-from avlmaps_sim.homes.furnish import Furnisher, PlacedPiece, footprint, hangs, wall_hung
-from avlmaps_sim.homes.polygons import middle
-from avlmaps_sim.homes.seats import seat_round
+from avlmaps_sim.homes.furnish import Furnisher, PlacedPiece, footprint, hangs, seat_round, wall_hung
+from avlmaps_sim.homes.plan import middle
 
 
 def several(f: Furnisher, wanted: dict[str, float], front_m: float = 0.4) -> list[PlacedPiece]:

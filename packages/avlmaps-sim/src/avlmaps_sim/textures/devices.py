@@ -4,11 +4,9 @@ import cv2
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps_sim.textures.noise import cloud, grid
 from avlmaps_sim.textures.outdoors import landscape
-from avlmaps_sim.textures.palette import earthy, harmony
 from avlmaps_sim.textures.pictures import text
-from avlmaps_sim.textures.texture import FILL, Texture, coloured
+from avlmaps_sim.textures.texture import FILL, Texture, cloud, coloured, earthy, grid, harmony
 
 Picture = Float32[np.ndarray, "h w 3"]
 

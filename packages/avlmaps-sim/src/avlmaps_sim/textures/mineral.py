@@ -3,10 +3,20 @@
 import numpy as np
 from jaxtyping import Float32, Int
 
-from avlmaps_sim.textures.motifs import levels, repeat_pattern
-from avlmaps_sim.textures.noise import cloud, grid, softened, speckles, worn
-from avlmaps_sim.textures.palette import earthy, harmony
-from avlmaps_sim.textures.texture import Texture, coloured, grey
+from avlmaps_sim.textures.texture import (
+    Texture,
+    cloud,
+    coloured,
+    earthy,
+    grey,
+    grid,
+    harmony,
+    levels,
+    repeat_pattern,
+    softened,
+    speckles,
+    worn,
+)
 
 
 def stone(rng: np.random.Generator) -> Texture:

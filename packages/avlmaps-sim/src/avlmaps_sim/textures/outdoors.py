@@ -4,8 +4,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps_sim.textures.noise import cloud, grid
-from avlmaps_sim.textures.texture import FILL, Texture, coloured
+from avlmaps_sim.textures.texture import FILL, Texture, cloud, coloured, grid
 
 Picture = Float32[np.ndarray, "s s 3"]
 

@@ -6,11 +6,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps_sim.textures.motifs import levels
-from avlmaps_sim.textures.noise import cloud, grid, warped
 from avlmaps_sim.textures.outdoors import landscape
-from avlmaps_sim.textures.palette import earthy, harmony
-from avlmaps_sim.textures.texture import Texture, coloured
+from avlmaps_sim.textures.texture import Texture, cloud, coloured, earthy, grid, harmony, levels, warped
 
 Picture = Float32[np.ndarray, "h w 3"]
 Colour = tuple[float, float, float]

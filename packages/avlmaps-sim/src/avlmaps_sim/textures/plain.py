@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from avlmaps_sim.textures.noise import cloud, grid, speckles, worn
-from avlmaps_sim.textures.texture import Texture, grey
+from avlmaps_sim.textures.texture import Texture, cloud, grey, grid, speckles, worn
 
 
 def painted(rng: np.random.Generator) -> Texture:

@@ -3,8 +3,7 @@
 import numpy as np
 from jaxtyping import Float32, Int
 
-from avlmaps_sim.textures.noise import cloud, grid, warped
-from avlmaps_sim.textures.texture import Texture, grey
+from avlmaps_sim.textures.texture import Texture, cloud, grey, grid, warped
 
 
 def _grain(rng: np.random.Generator, size: int) -> Float32[np.ndarray, "s s"]:

@@ -3,10 +3,19 @@
 import numpy as np
 from jaxtyping import Float, Float32, Int
 
-from avlmaps_sim.textures.motifs import levels, repeat_pattern
-from avlmaps_sim.textures.noise import cloud, grid, softened, speckles, worn
-from avlmaps_sim.textures.palette import harmony
-from avlmaps_sim.textures.texture import Texture, coloured, grey
+from avlmaps_sim.textures.texture import (
+    Texture,
+    cloud,
+    coloured,
+    grey,
+    grid,
+    harmony,
+    levels,
+    repeat_pattern,
+    softened,
+    speckles,
+    worn,
+)
 
 
 def _weave(rng: np.random.Generator, size: int) -> Float32[np.ndarray, "s s"]:

@@ -11,9 +11,9 @@ from avlmaps.cli.verb import ModelVerb
 
 if TYPE_CHECKING:
     from avlmaps_sim.bench.harness.settings import SceneSettings
-    from avlmaps_sim.bench.indexing import IndexingSettings
+    from avlmaps_sim.bench.indexing.runs import IndexingSettings
     from avlmaps_sim.bench.live.suite import LiveBench
-    from avlmaps_sim.bench.navigation import NavigationSettings
+    from avlmaps_sim.bench.navigation.missions import NavigationSettings
     from avlmaps_sim.bench.sources.suite import SourcesBench
 
 Suite = Literal[
@@ -176,7 +176,7 @@ class Bench(ModelVerb):
 
     def indexing_settings(self) -> "IndexingSettings":
         """Return the settings of the suites indexing and objects."""
-        from avlmaps_sim.bench.indexing import DEFAULT_SCENES, PAPER_SIZES, IndexingSettings
+        from avlmaps_sim.bench.indexing.runs import DEFAULT_SCENES, PAPER_SIZES, IndexingSettings
 
         chosen = self.indexing
         return IndexingSettings(
@@ -221,12 +221,12 @@ class Bench(ModelVerb):
 
     def navigation_settings(self) -> "NavigationSettings":
         """Return the settings of the suite navigation."""
-        from avlmaps_sim.bench import navigation
+        from avlmaps_sim.bench.navigation.missions import DEFAULT_SCENES, NavigationSettings, Series
 
         chosen, scenes = self.navigation, self.indexing
-        return navigation.NavigationSettings(
-            scenes=self.scenes or navigation.DEFAULT_SCENES,
-            series=tuple(map(navigation.Series, chosen.series)) or tuple(navigation.Series),
+        return NavigationSettings(
+            scenes=self.scenes or DEFAULT_SCENES,
+            series=tuple(map(Series, chosen.series)) or tuple(Series),
             rules=scenes.rules,
             sequences=chosen.sequences,
             language=chosen.language,

@@ -16,7 +16,7 @@ from avlmaps.query.modalities.sound import sound_factor
 from avlmaps.query.settings import SoundSettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import AudioTrack, Sound, resample
-from avlmaps_sim.hearing import Synthesised
+from avlmaps_sim.hearing.sound_library import Synthesised
 from avlmaps_sim.scene import Area
 
 _STOREY_M = 0.5  # an area reaches this far below its floor and above its ceiling

@@ -24,12 +24,11 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.modalities.image import read_picture
 from avlmaps.query.settings import Rules, build_settings, query_settings
 from avlmaps.recordings.types import Recording
-from avlmaps_sim.bench.harness.clips import unheard_folder
 from avlmaps_sim.bench.harness.evidence import Event, Evidence, Photo
 from avlmaps_sim.bench.harness.own_recording import OwnRecording, is_recording
-from avlmaps_sim.bench.harness.settings import Recorded, SceneSettings, TaskError
+from avlmaps_sim.bench.harness.settings import Recorded, SceneSettings, TaskError, unheard_folder
 from avlmaps_sim.free_space import STRUCTURE
-from avlmaps_sim.hearing.kinds import kind_of
+from avlmaps_sim.hearing.sound_library import kind_of
 from avlmaps_sim.mesh import Triple
 from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.scene import NOTHING, Scene, SceneObject

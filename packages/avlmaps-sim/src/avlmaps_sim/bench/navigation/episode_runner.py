@@ -16,10 +16,9 @@ from avlmaps.navigate.driver import Driver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.motion_log import LoggedMove
 from avlmaps.navigate.skills import Robot, RobotSettings
-from avlmaps_sim.bench.navigation.episodes import Episode, Leg
-from avlmaps_sim.bench.navigation.floor import Floor
+from avlmaps_sim.bench.navigation.episodes import Episode, Leg, path_length_m
+from avlmaps_sim.bench.navigation.evidence import Floor
 from avlmaps_sim.bench.navigation.map_variants import Configuration, KnownScene, Perceived
-from avlmaps_sim.bench.navigation.metrics import path_length_m
 from avlmaps_sim.bench.navigation.missions import Goal, Mission
 
 _EXACT_M = 1e-6

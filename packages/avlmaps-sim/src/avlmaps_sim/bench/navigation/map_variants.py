@@ -23,8 +23,7 @@ from avlmaps_sim.bench.harness.factors import (
     true_regions,
     true_things,
 )
-from avlmaps_sim.bench.navigation.missions import Series
-from avlmaps_sim.bench.navigation.phrases import spoken
+from avlmaps_sim.bench.navigation.missions import Series, spoken
 from avlmaps_sim.truth import Truth
 
 Sense = Literal["ours", "weak", "true", "none"]

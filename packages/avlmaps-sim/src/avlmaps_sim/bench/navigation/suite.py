@@ -19,11 +19,10 @@ from avlmaps_sim.bench.harness.figures import (
     write_answer,
 )
 from avlmaps_sim.bench.navigation.commands import COMMANDS, SPATIAL
-from avlmaps_sim.bench.navigation.episodes import Episode
+from avlmaps_sim.bench.navigation.episodes import Episode, Score, Share, is_reachable, of_kind, scored, share_of
 from avlmaps_sim.bench.navigation.map_variants import CEILING, OURS, configurations
 from avlmaps_sim.bench.navigation.missions import GoalKind, NavigationSettings, Series
 from avlmaps_sim.bench.navigation.runs import Outcome, run
-from avlmaps_sim.bench.navigation.scores import Score, Share, is_reachable, of_kind, scored, share_of
 
 _PAPER = "paper (Matterport3D, other goals)"
 _SOUNDS = (Series.SOUNDS_1, Series.SOUNDS_2, Series.SOUNDS_3)

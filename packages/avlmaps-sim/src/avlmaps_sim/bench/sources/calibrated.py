@@ -21,8 +21,9 @@ from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import ChannelSound, with_microphones, write_channels
 from avlmaps.recordings.microphones import Microphones, microphones_named
 from avlmaps_sim.bench.harness.figures import Table, in_percent, median_interval, wilson
-from avlmaps_sim.hearing import AcousticSettings, Sounding, Source
+from avlmaps_sim.hearing.acoustic import AcousticSettings
 from avlmaps_sim.hearing.array import heard_by_array
+from avlmaps_sim.hearing.schedule import Sounding, Source
 from avlmaps_sim.mesh import Material
 from avlmaps_sim.scene import Area, Scene, SceneBuilder
 from avlmaps_sim.shapes import box, sheet
