@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps_sim.furniture import families, make
-from avlmaps_sim.furniture.computers import key_field
+from avlmaps_sim.furniture.electronics import key_field
 from avlmaps_sim.furniture.fittings import face, front, front_style, open_bowl, outline, shell, spindle, tap
 from avlmaps_sim.mesh import Material, joined
 from helpers.furniture_pieces import every_piece, pieces_of

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
-from avlmaps_sim.furniture.computers import face_up
+from avlmaps_sim.furniture.electronics import face_up
 from avlmaps_sim.furniture.fittings import chrome, dial, enamel, face, feet, outline, spindle, steel
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick
 from avlmaps_sim.materials import material

@@ -3,8 +3,7 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.computers import face_up, key_field
-from avlmaps_sim.furniture.electronics import screen
+from avlmaps_sim.furniture.electronics import face_up, key_field, screen
 from avlmaps_sim.furniture.fittings import body, chrome, face, feet, outline, spindle
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, pictured, strut
 from avlmaps_sim.materials import material

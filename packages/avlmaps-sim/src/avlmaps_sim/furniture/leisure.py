@@ -3,9 +3,9 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
+from avlmaps_sim.furniture.fitness import hoop
 from avlmaps_sim.furniture.plants import frond
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut, turned_ring
-from avlmaps_sim.furniture.sports import hoop
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import (

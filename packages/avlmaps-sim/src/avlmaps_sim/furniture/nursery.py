@@ -4,8 +4,8 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.containers import tub
+from avlmaps_sim.furniture.fitness import wheel
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, strut
-from avlmaps_sim.furniture.sports import wheel
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import (

@@ -3,8 +3,8 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
+from avlmaps_sim.furniture.decor import flowers
 from avlmaps_sim.furniture.recipe_helpers import blade, chance, count, draw, made_of, pick
-from avlmaps_sim.furniture.vases import flowers
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes
 from avlmaps_sim.shapes import box, circle, cylinder, ellipsoid, lathe, loft, rounded_rectangle, shell, slab, tube

@@ -7,9 +7,8 @@ import numpy as np
 from avlmaps_sim.furniture.carcass import board_look
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.chair_parts import bent_rail
-from avlmaps_sim.furniture.legs import four_legs, leg, leg_style, named_leg, stretchers
+from avlmaps_sim.furniture.legs import four_legs, hairpins, leg, leg_style, named_leg, stretchers, trestles
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
-from avlmaps_sim.furniture.table_parts import hairpins, trestles
 from avlmaps_sim.furniture.upholstery import covering, cushion, throw
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Mesh

@@ -6,18 +6,19 @@ from avlmaps_sim.furniture.carcass import (
     Room,
     board_look,
     carcass,
+    cloth_looks,
     doors,
     drawers,
+    folded,
     front_style,
+    hanging,
     inside,
     shelf_boards,
     split,
 )
 from avlmaps_sim.furniture.catalogue import Parts, Support, family, finished
-from avlmaps_sim.furniture.contents import cloth_looks, folded, hanging
-from avlmaps_sim.furniture.legs import cabinet_base, four_legs, leg_style
+from avlmaps_sim.furniture.legs import cabinet_base, four_legs, leg_style, metal_frame
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, rim
-from avlmaps_sim.furniture.table_parts import metal_frame
 from avlmaps_sim.furniture.upholstery import pillow
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined

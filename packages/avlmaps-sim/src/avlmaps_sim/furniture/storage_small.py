@@ -2,9 +2,22 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.carcass import Room, board_look, carcass, doors, drawers, front_style, grip, inside, split
+from avlmaps_sim.furniture.carcass import (
+    Room,
+    board_look,
+    book_looks,
+    carcass,
+    cloth_looks,
+    doors,
+    drawers,
+    front_style,
+    grip,
+    inside,
+    ornament,
+    shelf_things,
+    split,
+)
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
-from avlmaps_sim.furniture.contents import book_looks, cloth_looks, ornament, shelf_things
 from avlmaps_sim.furniture.legs import four_legs, leg_style, star_base
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
 from avlmaps_sim.materials import material

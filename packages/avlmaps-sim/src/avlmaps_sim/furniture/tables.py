@@ -2,23 +2,37 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.carcass import FrontStyle, Room, board_look, carcass, doors, drawers, front_style, inside
+from avlmaps_sim.furniture.carcass import (
+    FrontStyle,
+    Room,
+    board_look,
+    book_looks,
+    carcass,
+    doors,
+    drawers,
+    front_style,
+    inside,
+    shelf_things,
+)
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
-from avlmaps_sim.furniture.contents import book_looks, shelf_things
-from avlmaps_sim.furniture.legs import apron, four_legs, leg_style, named_leg, stretchers
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
-from avlmaps_sim.furniture.table_parts import (
+from avlmaps_sim.furniture.legs import (
     Outline,
+    apron,
+    four_legs,
     hairpins,
+    leg_style,
     metal_frame,
+    named_leg,
     pedestal,
     splayed_legs,
+    stretchers,
     table_look,
     table_top,
     tablecloth,
     top_support,
     trestles,
 )
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh
 from avlmaps_sim.shapes import box, slab

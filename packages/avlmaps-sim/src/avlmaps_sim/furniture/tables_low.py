@@ -4,19 +4,23 @@ import numpy as np
 
 from avlmaps_sim.furniture.carcass import Room, board_look, drawers, front_style, split
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
-from avlmaps_sim.furniture.legs import apron, cabinet_base, four_legs, leg_style, sled
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
-from avlmaps_sim.furniture.table_parts import (
+from avlmaps_sim.furniture.legs import (
     Outline,
+    apron,
+    cabinet_base,
+    four_legs,
     hairpins,
+    leg_style,
     metal_frame,
     pedestal,
+    sled,
     splayed_legs,
     table_look,
     table_top,
     top_support,
     trestles,
 )
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material
 from avlmaps_sim.shapes import box, cylinder, lathe, rounded_box, shell, slab, tube
