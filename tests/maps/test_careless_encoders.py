@@ -1,7 +1,6 @@
-"""Encoders of one's own that mask features, write into what they are given, or say the same of everything."""
+"""Encoders of one's own that write into what they are given, or say the same of everything."""
 
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,27 +25,6 @@ class Words(Pixels):
     def encode_words(self, words: list[str]) -> np.ndarray:
         """Return a feature for each."""
         return np.tile(np.float32([0.5, 0.5, 0.5, 0.5]), (len(words), 1))
-
-
-class Masking(Words):
-    """Masks the one number of a cell where its picture is dark."""
-
-    def encode(self, frame: Frame) -> Any:
-        """Return a masked array."""
-        cells = super().encode(frame)
-        gone = np.zeros(cells.shape, bool)
-        gone[:2, :, 1] = True
-        return np.ma.masked_array(cells, gone)
-
-
-class Zeroing(Words):
-    """Has zeros there instead."""
-
-    def encode(self, frame: Frame) -> np.ndarray:
-        """Return features."""
-        cells = super().encode(frame)
-        cells[:2] = 0.0
-        return cells
 
 
 class Writing(Words):
@@ -106,21 +84,6 @@ def require_same_voxels(one: Any, other: Any) -> None:
         np.testing.assert_array_equal(getattr(one.voxels, name), getattr(other.voxels, name), err_msg=name)
 
 
-def test_a_masked_feature_says_nothing() -> None:
-    wanted = made(Zeroing())
-    assert 0.0 < (np.asarray(wanted.voxels.weight) == 0.0).mean() < 1.0
-    require_same_voxels(made(Masking()), wanted)
-    require_same_voxels(made(features=Masking().encode), made(features=Zeroing().encode))
-
-
-def test_a_masked_view_says_nothing() -> None:
-    class MaskedViews(ConstantViews):
-        def encode(self, frames: list[Frame]) -> Any:
-            return np.ma.masked_array(super().encode(frames), mask=[[True, False, False]] * len(frames))
-
-    assert not np.asarray(made(views=MaskedViews()).keyframes.view).any()
-
-
 def test_what_an_encoder_writes_into_changes_nothing(tmp_path: Path) -> None:
     careless = {"pixels": Writing(), "local": WritingCorners(), "place": Places()}
     careful = {"pixels": Words(), "local": Corners(), "place": Places()}
@@ -176,27 +139,6 @@ def test_the_end_of_a_mapper_map_doubts_features_and_a_silent_microphone() -> No
     silent, features = mapper.doubts
     assert silent.startswith("The sound is silent throughout: every sample is 0. Check the microphone")
     assert features.startswith("The features of pixels by fake/pixels are the same")
-
-
-def test_a_masked_place_says_nothing_and_a_masked_keypoint_is_left_out() -> None:
-    class MaskedPlaces(Places):
-        def encode(self, rgb: Any, local: Any, state: Any) -> Any:
-            return np.ma.masked_array(super().encode(rgb, local, state), mask=True)
-
-    class MaskedCorners(Corners):
-        def encode(self, rgb: np.ndarray) -> Any:
-            found = super().encode(rgb)
-            mask = np.zeros(found.descriptors.shape, bool)
-            mask[::2, 0] = True
-            return replace(found, descriptors=np.ma.masked_array(found.descriptors, mask))
-
-    careful = made(Words(), local=Corners(), place=Places())
-    assert np.asarray(careful.keyframes.place).any()
-    masked = made(Words(), local=MaskedCorners(), place=MaskedPlaces())
-    assert not np.asarray(masked.keyframes.place).any()
-    offsets = np.asarray(careful.keyframes.offsets)
-    kept = np.concatenate([np.arange(a, b)[1::2] for a, b in pairwise(offsets.tolist())])
-    np.testing.assert_array_equal(masked.keyframes.xy, np.asarray(careful.keyframes.xy)[kept])
 
 
 def test_a_camera_that_stood_has_one_view() -> None:

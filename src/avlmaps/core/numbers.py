@@ -1,4 +1,4 @@
-"""What programs give: numbers of Python or NumPy, 0-d arrays, tensors without axes; words; and features with a mask."""
+"""What programs give: numbers of Python or NumPy, 0-d arrays, tensors without axes; and words."""
 
 import inspect
 from collections.abc import Callable, Iterable, Sequence
@@ -24,7 +24,7 @@ _WANTED: dict[Any, str] = _OF | {
 
 
 def as_number(given: Any) -> float | None:
-    """Return a real number as one of Python; None for anything else, also for a boolean, text or a masked element.
+    """Return a real number as one of Python; None for anything else, also for a boolean or text.
 
     Args:
         given: a scalar of Python or NumPy, a 0-d array, or a tensor without axes.
@@ -112,15 +112,3 @@ def hold_numbers(settings: Any, error: type[Exception]) -> None:
         if held is None:
             raise error(f"{name} must be {_WANTED[kind]}, not {_came(given)}.")
         object.__setattr__(settings, field.name, held)
-
-
-def unmasked(features: Any) -> Any:
-    """Return features, (..., d), with zero for each that is masked, in part or whole: there is nothing to say there.
-
-    What has no mask is returned as it is.
-    """
-    if not np.ma.isMaskedArray(features):
-        return features
-    held = np.array(features.data)
-    held[np.ma.getmaskarray(features).any(axis=-1)] = 0
-    return held

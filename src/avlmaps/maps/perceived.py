@@ -8,7 +8,6 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import AvlmapsError, BackendError
-from avlmaps.core.numbers import unmasked
 from avlmaps.perception.cache import encode_batch
 from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.types import Frame
@@ -45,7 +44,7 @@ def as_grid(features: Any, dim: int | None, who: str, frame: Frame) -> np.ndarra
     """Return features as an array of the right form."""
     wanted = f"float32 of (rows, columns, {'d' if dim is None else dim})"
     try:
-        array = np.asarray(unmasked(features))
+        array = np.asarray(features)
     except (ValueError, TypeError, RuntimeError) as fault:  # rows of several lengths, or a tensor of a GPU
         came = type(features).__name__
         raise BackendError(f"{who} no array but {came} for {frame.name} ({fault}); features are {wanted}.") from None
@@ -87,7 +86,7 @@ def require_unit(features: np.ndarray, who: str, frame: Frame) -> None:
 
 def as_row(found: Any, dim: int, who: str, frame: Frame) -> Float32[np.ndarray, " d"]:
     """Return the one feature of a picture."""
-    array = np.asarray(unmasked(found))
+    array = np.asarray(found)
     row = array.reshape(-1) if array.ndim in (1, 2) else array
     if array.dtype.kind != "f" or row.shape != (dim,) or not np.isfinite(row).all():
         raise BackendError(f"{who} gave {array.dtype} of {array.shape} for {frame.name}; it is {dim} finite numbers.")

@@ -223,7 +223,9 @@ class Encoders:
                 f"The encoders that were given have no {kind} backend; a map that was made without it is queried "
                 f"with one in Python: encoders=avlmaps.Encoders({kind}=...)."
             )
-        raise BackendError(no_backend(self.name, kind))
+        raise BackendError(
+            f"The profile {self.name!r} has no {kind} backend; choose another profile (avlmaps profiles)."
+        )
 
     @property
     def pixels(self) -> PixelEncoder:
@@ -267,11 +269,6 @@ class Encoders:
     def cards(self) -> dict[Kind, ModelCard]:
         """Return the card of every model. Loads them."""
         return {kind: self.card(kind) for kind in MODULES if kind in self}
-
-
-def no_backend(profile: str, kind: Kind) -> str:
-    """Return the sentence of a module that a profile leaves out."""
-    return f"The profile {profile!r} has no {kind} backend; choose another profile (avlmaps profiles)."
 
 
 def _sources(given: Mapping[Kind, object]) -> dict[Kind, Source]:

@@ -16,6 +16,10 @@ from avlmaps.core.files import user_path
 from avlmaps.core.registry import Backend, brought, entry_points, forget_loaded, load
 from avlmaps.core.wording import option
 
+# By system: the variable that says where, and where it is without one; what has no row is as Linux.
+_OWN = {"win32": ("APPDATA", "AppData/Roaming"), "darwin": ("", "Library/Application Support")}
+_CACHE = {"win32": ("LOCALAPPDATA", "AppData/Local"), "darwin": ("", "Library/Caches")}
+
 
 def user_folder() -> Path:
     """Return the folder of this person's own profile; it need not exist yet.
@@ -24,15 +28,7 @@ def user_folder() -> Path:
     ``$XDG_DATA_HOME`` (``~/.local/share``) elsewhere, and ``avlmaps`` in it.
     """
     own = os.environ.get("AVLMAPS_HOME")
-    if own:
-        return user_path(own)
-    if sys.platform == "win32":
-        base = Path(os.environ.get("APPDATA") or Path.home() / "AppData" / "Roaming")
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Application Support"
-    else:
-        base = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
-    return base / "avlmaps"
+    return user_path(own) if own else _of_system(*_OWN.get(sys.platform, ("XDG_DATA_HOME", ".local/share")))
 
 
 def cache_folder() -> Path:
@@ -42,15 +38,11 @@ def cache_folder() -> Path:
     and ``$XDG_CACHE_HOME`` (``~/.cache``) elsewhere, and ``avlmaps`` in it.
     """
     own = os.environ.get("AVLMAPS_HOME")
-    if own:
-        return user_path(own) / "cache"
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "avlmaps"
+    return user_path(own) / "cache" if own else _of_system(*_CACHE.get(sys.platform, ("XDG_CACHE_HOME", ".cache")))
+
+
+def _of_system(variable: str, usual: str) -> Path:
+    return Path(os.environ.get(variable) or Path.home() / usual) / "avlmaps"
 
 
 Precision = Literal["auto", "float32", "float16", "bfloat16"]
@@ -299,29 +291,19 @@ def is_here(model: str) -> bool:
 
 def how_to_get(model: str) -> str:
     """Return the command that brings a model, and how much that is where it is known."""
-    known = _published(model)
+    known = published_models().get(model, Published())
     command = known.get or f"hf download {model}"
-    return f"{command} ({_size(known.size_mb)})" if known.size_mb else command
-
-
-def _published(model: str) -> Published:
-    return published_models().get(model, Published())
-
-
-def _size(size_mb: float) -> str:
-    return f"{size_mb / 1000:.1f} GB" if size_mb >= 1000 else f"{size_mb:.0f} MB"
+    size = f"{known.size_mb / 1000:.1f} GB" if known.size_mb >= 1000 else f"{known.size_mb:.0f} MB"
+    return f"{command} ({size})" if known.size_mb else command
 
 
 def _places(model: str) -> Iterator[Path]:
-    known, folder = _published(model), model_settings().folder
+    known = published_models().get(model, Published())
     if known.fetched or (user_path(model) / "manifest.json").is_file():
         yield from (place / "manifest.json" for place in folders_of(model))
         return
-    names = known.files or (model,)
-    for name in names:
-        if folder is not None:
-            yield from (folder / name, folder / name.replace("/", "--"), folder / Path(name).name)
-        yield user_path(name)
+    for name in known.files or (model,):
+        yield from places_of(name)
         yield from (_torch_cache() / place / Path(name).name for place in ("checkpoints", "netvlad"))
         if known.package and (package := find_spec(known.package)) is not None and package.origin:
             yield Path(package.origin).parent / name
@@ -336,7 +318,7 @@ def _places(model: str) -> Iterator[Path]:
 
 
 def _hub_cache() -> Path:
-    """Return where the hub's files are cached, by the environment variables that its own library obeys."""
+    # By the environment variables that its own library obeys.
     if own := os.environ.get("HF_HUB_CACHE") or os.environ.get("HUGGINGFACE_HUB_CACHE"):
         return user_path(own)
     base = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.machine import release_memory, usable_cores
+from avlmaps.recordings.types import Frame
 
 
 def open_network(graph: bytes | str, most_threads: int = 1) -> Any:
@@ -37,15 +38,15 @@ class Remembered:
     """Vectors by the content of what they are of, the latest ``_MOST``; for several threads."""
 
     def __init__(self) -> None:
-        self._found: OrderedDict[bytes, np.ndarray] = OrderedDict()
+        self._found: OrderedDict[str, np.ndarray] = OrderedDict()
         self._lock = threading.Lock()
 
-    def get(self, key: bytes) -> np.ndarray | None:
+    def get(self, key: str) -> np.ndarray | None:
         """Return a vector, None where it is not known."""
         with self._lock:
             return self._found.get(key)
 
-    def put(self, key: bytes, vector: np.ndarray) -> None:
+    def put(self, key: str, vector: np.ndarray) -> None:
         """Remember a vector; the oldest is forgotten where there are too many."""
         with self._lock:
             self._found[key] = vector
@@ -53,12 +54,19 @@ class Remembered:
                 self._found.popitem(last=False)
 
 
-def key_of(*content: Any) -> bytes:
-    """Return a key of arrays, by their shapes and bytes, and of other values, by what they are written as."""
-    digest = hashlib.blake2b(digest_size=16)
+def key_of(*content: Any) -> str:
+    """Return the hex SHA-256 of arrays, by their types, shapes and bytes, and of other values as they are written."""
+    digest = hashlib.sha256()
     for each in content:
         is_array = isinstance(each, np.ndarray)
         digest.update(repr((each.shape, each.dtype.str) if is_array else each).encode() + b"\0")
         if is_array:
             digest.update(np.ascontiguousarray(each).data)
-    return digest.digest()
+    return digest.hexdigest()
+
+
+def seen_in(frame: Frame) -> list[Any]:
+    """Return all of a frame that an encoder may look at: everything but its number, name and time."""
+    rig, ground = frame.rig, frame.ground
+    stands = (None,) if ground is None else (ground.up_in_world, ground.camera_m, ground.floor_m)
+    return [frame.rgb, frame.depth_m, frame.world_from_camera, rig.rgb, rig.depth, rig.rgb_from_depth, *stands]

@@ -4,11 +4,8 @@ An encoder of pixels or views needs ``encode_words``, one of sounds ``score_word
 to be made with it. A card, a vocabulary and ``understood`` are made.
 """
 
-import ast
-import dataclasses
 import hashlib
 import inspect
-import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
@@ -151,10 +148,9 @@ def _words_of(kind: Kind, encoder: Any) -> Any:
 
 
 def _code(kind: type) -> bytes:
-    """Return a class's source without comments and layout; nothing where there is none to read."""
     try:
-        return ast.unparse(ast.parse(textwrap.dedent(inspect.getsource(kind)))).encode()
-    except (OSError, TypeError, SyntaxError):
+        return inspect.getsource(kind).encode()
+    except (OSError, TypeError):  # there is none to read
         return b""
 
 
@@ -182,8 +178,7 @@ def _opened(value: Any) -> Any:
         return value
     if callable(getattr(value, "state_dict", None)):
         return dict(value.state_dict())
-    if callable(getattr(value, "numpy", None)) and callable(getattr(value, "cpu", None)):
+    if callable(getattr(value, "cpu", None)):  # a tensor
         return value.cpu().numpy()
-    if dataclasses.is_dataclass(value):
-        return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-    return getattr(value, "__dict__", type(value).__qualname__)
+    names = getattr(value, "__slots__", ())
+    return getattr(value, "__dict__", {name: getattr(value, name) for name in names} or type(value).__qualname__)

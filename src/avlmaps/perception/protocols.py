@@ -262,27 +262,12 @@ class LocalFeatures:
         descriptors: one row a keypoint, unit length.
         score: the detector's confidence in each keypoint, in [0, 1]; empty where it is not known.
         size: (width, height) of the picture, pixels; (0, 0) where it is not known. Learned matchers need it.
-
-    A keypoint of which something is masked is left out.
     """
 
     xy: Float32[np.ndarray, "n 2"]
     descriptors: Float32[np.ndarray, "n d"]
     score: Float32[np.ndarray, " n_or_none"] = field(default_factory=lambda: np.zeros(0, np.float32))
     size: tuple[int, int] = (0, 0)
-
-    def __post_init__(self) -> None:
-        """Leave out keypoints of which something is masked."""
-        arrays = {name: getattr(self, name) for name in ("xy", "descriptors", "score")}
-        if not any(hasattr(array, "mask") for array in arrays.values()):  # numpy.ma takes long to load
-            return
-        gone = np.zeros(len(self.xy), bool)
-        for array in arrays.values():
-            if len(array) == len(gone):
-                gone |= np.ma.getmaskarray(array).reshape(len(gone), -1).any(axis=1)
-        for name, array in arrays.items():
-            held = np.ma.getdata(array)
-            object.__setattr__(self, name, held[~gone] if len(held) == len(gone) else held)
 
 
 @runtime_checkable

@@ -16,7 +16,6 @@ from jaxtyping import Bool, Float, Float32, Int, UInt8
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
-from avlmaps.core.numbers import unmasked
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.wording import option, place_text
 from avlmaps.maps.keyframes.album import local_features
@@ -197,7 +196,7 @@ def locate(
     camera, source = _camera_of(rgb, camera, stored.rig.rgb, focal_35mm)
     seen, scale = _as_large_as_in_the_map(rgb, camera, stored.rig.rgb)
     local = stored.encoders.local.encode(seen.copy())  # an encoder may write into what it is given
-    place = unmasked(stored.encoders.place.encode(seen.copy(), local, stored.place_state))
+    place = stored.encoders.place.encode(seen.copy(), local, stored.place_state)
     if scale != 1.0:
         local = replace(local, xy=(local.xy / scale).astype(np.float32), size=(camera.width, camera.height))
     found = locate_features(stored, local, place, camera, rng, settings, source)

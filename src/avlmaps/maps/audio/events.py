@@ -11,7 +11,6 @@ import numpy as np
 from avlmaps.core.arrays import Float32
 from avlmaps.core.columns import offsets_of
 from avlmaps.core.errors import BackendError
-from avlmaps.core.numbers import unmasked
 from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.audio.background import denoise, is_swell, noise_profile
@@ -153,7 +152,7 @@ def _quiet_around(track: AudioTrack, found: Sequence[Segment], index: int, quiet
 
 def _encoded(encoder: SoundEncoder, sound: Sound) -> Float32[np.ndarray, "windows d"]:
     given = Sound(sound.samples.copy(), sound.rate_hz)  # an encoder may write into what it is given
-    feature = np.asarray(unmasked(encoder.encode(given)), np.float32)
+    feature = np.asarray(encoder.encode(given), np.float32)
     if feature.ndim != 2 or len(feature) < 1 or feature.shape[1] != encoder.card.dim or not np.isfinite(feature).all():
         raise BackendError(
             f"The sound model {encoder.card.id} returned features of {feature.shape} for {sound.duration_s:.2f} s; its "

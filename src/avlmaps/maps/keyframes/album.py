@@ -9,7 +9,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from avlmaps.core.arrays import Float, Float32, Int, UInt8
 from avlmaps.core.columns import concat
-from avlmaps.core.numbers import unmasked
 from avlmaps.core.poses import apply, inverse
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
@@ -33,7 +32,7 @@ def describe_keyframe(
         local = encoders.local.encode(frame.rgb.copy()) if Kind.LOCAL in encoders else _NOTHING
         view = np.zeros(0, np.float32)
         if Kind.VIEWS in encoders:
-            (found,) = unmasked(encoders.views.encode([frame.copy()]))
+            (found,) = encoders.views.encode([frame.copy()])
             card = encoders.card(Kind.VIEWS)
             view = as_row(found, card.dim, f"The view encoder {card.id}", frame)
     thumbnail = _thumbnail(frame.rgb, settings.thumbnail_width_px)
@@ -194,7 +193,7 @@ class KeyframeAlbum:
                 if self._learns is None:
                     self._learns = bool(encoder.fit([local], np.random.default_rng(0)))
                 if not self._learns:
-                    place = np.asarray(unmasked(encoder.encode(frame.rgb.copy(), local, {})), np.float32)
+                    place = np.asarray(encoder.encode(frame.rgb.copy(), local, {}), np.float32)
                     seen = replace(seen, place=place[None])
         self._parts.append(seen)
         self._stacked = None
@@ -241,7 +240,7 @@ class KeyframeAlbum:
                 self._state, self._learnt_from, self._places = encoder.fit(some, rng), count, []
             for row in range(len(self._places), count):
                 found = encoder.encode(_picture(plain.jpeg(row), size), local_features(plain, row, size), self._state)
-                self._places.append(np.asarray(unmasked(found), np.float32))
+                self._places.append(np.asarray(found, np.float32))
 
 
 def perceive_keyframes(

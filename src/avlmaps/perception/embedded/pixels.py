@@ -25,7 +25,7 @@ from avlmaps.perception.embedded.scene_network import (
 )
 from avlmaps.perception.embedded.words import Meanings
 from avlmaps.perception.models import PUBLISHED, local_model
-from avlmaps.perception.networks import Remembered, key_of
+from avlmaps.perception.networks import Remembered, key_of, seen_in
 from avlmaps.perception.protocols import ModelCard, RoomContents, WordEncoder, read_room_contents
 from avlmaps.recordings.types import Frame
 
@@ -69,11 +69,8 @@ class NamedEncoder:
         known = _ROOMS.get(self._key(frame))
         return self.see(frame).room if known is None else known
 
-    def _key(self, frame: Frame) -> bytes:
-        rig, ground = frame.rig, frame.ground
-        levels = () if ground is None else (ground.up_in_world, ground.camera_m, ground.floor_m)
-        seen_by = (rig.rgb, rig.depth, rig.rgb_from_depth, frame.world_from_camera)
-        return key_of(self._network.checksum, frame.rgb, frame.depth_m, *seen_by, *levels)
+    def _key(self, frame: Frame) -> str:
+        return key_of(self._network.checksum, *seen_in(frame))
 
     @cached_property
     def meanings(self) -> Meanings:

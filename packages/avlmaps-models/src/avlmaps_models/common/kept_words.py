@@ -9,8 +9,9 @@ from jaxtyping import Float32
 
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
-from avlmaps.perception.cache import FEATURES, FeatureStore, key_of
+from avlmaps.perception.cache import FEATURES, FeatureStore
 from avlmaps.perception.models import cache_folder, precision_in_force
+from avlmaps.perception.networks import key_of
 from avlmaps.perception.protocols import ModelCard
 
 _LIMIT_BYTES = 2e8
