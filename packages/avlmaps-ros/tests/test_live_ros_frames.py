@@ -23,9 +23,8 @@ from avlmaps.recordings.channels import ChannelSound
 from avlmaps.recordings.formats.ros_messages import RosTopics
 from avlmaps.recordings.formats.ros_sound import Pcm
 from avlmaps.recordings.microphones import Microphones
-from avlmaps_ros.live.directions import HELD, RosDirections
 from avlmaps_ros.live.frames import PARTNER_WITHIN_S, POSE_WITHIN_S, RosFrames
-from avlmaps_ros.live.sound import RosSound
+from avlmaps_ros.live.sound import HELD, RosDirections, RosSound
 from avlmaps_ros.live.source import follow_ros2, open_ros2, ros_topics
 from helpers import ros_messages as ros
 

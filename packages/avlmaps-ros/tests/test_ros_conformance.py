@@ -10,7 +10,7 @@ pytest.importorskip("roslibpy")
 from conformance import *  # noqa: F403 - the laws
 from ros_bridge import FakeRobot
 
-from avlmaps_ros import MoveBaseDriver, Nav2Driver, RosDriver, RosSettings
+from avlmaps_ros import RosDriver, RosSettings, open_ros_driver
 
 pytestmark = pytest.mark.timeout(90)
 
@@ -24,7 +24,7 @@ class StubField:
         robot.drives = True
 
     def open(self, settings: RosSettings) -> RosDriver:
-        return {1: MoveBaseDriver, 2: Nav2Driver}[self.robot.ros](self.robot.url, settings=settings)
+        return open_ros_driver({1: "move_base", 2: "nav2"}[self.robot.ros], self.robot.url, settings=settings)
 
     def soon(self, holds: Callable[[], bool]) -> bool:
         return self.robot.soon(holds)

@@ -20,8 +20,6 @@ from avlmaps.navigate.driver import Driver
 from avlmaps_ros import (
     Frames,
     GroundTransform,
-    MoveBaseDriver,
-    Nav2Driver,
     RosSettings,
     open_ros_driver,
 )
@@ -280,8 +278,8 @@ class Clock:
 
 def driven_by(robot: FakeRobot, clock: Clock, **settings: float):
     """Open a driver of a robot by a test's clock."""
-    kind = {1: MoveBaseDriver, 2: Nav2Driver}[robot.ros]
-    return kind(robot.url, settings=quick(**settings), clock=clock)
+    kind = {1: "move_base", 2: "nav2"}[robot.ros]
+    return open_ros_driver(kind, robot.url, settings=quick(**settings), clock=clock)
 
 
 def test_a_lost_pose_cancels_after_the_age_that_is_set_and_not_before(robot):

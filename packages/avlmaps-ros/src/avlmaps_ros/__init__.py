@@ -8,26 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from avlmaps_ros.base import RosDriver
-    from avlmaps_ros.frames import Frames, GroundTransform
-    from avlmaps_ros.opening import MoveBaseDriver, Nav2Driver, open_ros_driver
-    from avlmaps_ros.settings import RosSettings
+    from avlmaps_ros.opening import open_ros_driver
+    from avlmaps_ros.settings import Frames, GroundTransform, RosSettings
     from avlmaps_ros.transports import RosKind
 
 _PLACES = {
-    "Frames": "frames", "GroundTransform": "frames", "MoveBaseDriver": "opening", "Nav2Driver": "opening",
-    "RosDriver": "base", "RosKind": "transports", "RosSettings": "settings", "open_ros_driver": "opening",
+    "Frames": "settings", "GroundTransform": "settings", "RosDriver": "base", "RosKind": "transports",
+    "RosSettings": "settings", "open_ros_driver": "opening",
 }  # fmt: skip
 
-__all__ = [
-    "Frames",
-    "GroundTransform",
-    "MoveBaseDriver",
-    "Nav2Driver",
-    "RosDriver",
-    "RosKind",
-    "RosSettings",
-    "open_ros_driver",
-]
+__all__ = ["Frames", "GroundTransform", "RosDriver", "RosKind", "RosSettings", "open_ros_driver"]
 
 
 def __getattr__(name: str) -> Any:

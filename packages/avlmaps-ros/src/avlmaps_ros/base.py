@@ -21,9 +21,22 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.interrupts import Halt
 from avlmaps_ros.contact import Contact
-from avlmaps_ros.goals import ActionGoal, End, MovementPlan, SentGoal, Stage, Tasks, Track
+from avlmaps_ros.goals import (
+    LEAST_M,
+    LONGEST_M,
+    ActionGoal,
+    End,
+    MovementPlan,
+    SentGoal,
+    Stage,
+    Standing,
+    Tasks,
+    Track,
+    ahead_of,
+    place_to_stand,
+    plan_turn,
+)
 from avlmaps_ros.guard import GoalGuard
-from avlmaps_ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, plan_turn
 from avlmaps_ros.session import AGAIN_S, Opener, Session, call_off, ended_within
 from avlmaps_ros.tree import Sighting
 
@@ -58,12 +71,6 @@ class RosDriver:
         level_from_world: Float[np.ndarray, "3 3"] | None = None,
         clock: Callable[[], float] = monotonic,
     ) -> None:
-        """Connect, and wait until the robot reports its pose.
-
-        Raises:
-            NavigationError: nobody answers there, or the robot does not report its pose.
-            BackendError: what the transport needs is not installed.
-        """
         self.frames, self.settings, self._tasks = tasks.frames, tasks.settings, tasks
         self._standing = standing
         self._level_from_world = np.eye(3) if level_from_world is None else np.asarray(level_from_world, np.float64)
@@ -317,7 +324,6 @@ class RosDriver:
         return goal
 
     def _settle(self, goal: SentGoal) -> None:
-        """Take note that nothing is left of a goal."""
         goal.over(End.CANCELLED)
         self._contact.session.beat(goal)
         if self._owed is goal:
@@ -326,7 +332,6 @@ class RosDriver:
             self.guard.rest()
 
     def _is_absent(self, server: str) -> bool:
-        """Return whether a server is known not to be there, after asking where nobody has."""
         session, servers = self._contact.session, self._contact.ear.servers
         begun_s = self._clock()
         served = servers.serves(server)
@@ -372,7 +377,6 @@ class RosDriver:
         return "", False
 
     def _lost_sight(self, goal: SentGoal, silent_s: float) -> str:
-        """Return why a goal cannot be watched any more, or must not continue; "" where it can."""
         contact, settings = self._contact, self.settings
         if contact.session.lost is not None:
             return contact.loss()
@@ -402,7 +406,6 @@ class RosDriver:
     # Calling off.
 
     def _give_up(self, goal: SentGoal, why: str, absent: bool) -> None:
-        """Call a goal off, for as long as it could last, and say how it went."""
         was_lost = self._contact.session.lost is not None
         agreed = self._called_off(goal, goal.answer_s + 2.0 * AGAIN_S if absent else goal.task.limit_s)
         servers = self._contact.ear.servers
@@ -484,7 +487,6 @@ class RosDriver:
 
 
 def _jump(before: Sighting | None, now: Sighting | None) -> str:
-    """Return that a pose jumped from one sighting to the next; "" where a robot could have driven that distance."""
     if before is None or now is None:
         return ""
     moved_m, took_s = now.pose.distance_m(before.pose), now.heard_s - before.taken_s

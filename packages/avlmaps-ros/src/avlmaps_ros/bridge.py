@@ -34,12 +34,6 @@ class BridgeSession(ABC):
     lists_every_s: ClassVar[float | None]
 
     def __init__(self, url: str, token: str | None, settings: RosSettings, ear: Ear, timeout_s: float) -> None:
-        """Connect.
-
-        Raises:
-            BackendError: roslibpy is not installed.
-            NavigationError: there is no bridge.
-        """
         self.heard = threading.Condition()
         self.settings, self.ear = settings, ear
         self._ours: dict[str, SentGoal] = {}
@@ -69,48 +63,23 @@ class BridgeSession(ABC):
 
     @property
     def lost(self) -> str | None:
-        """Why the connection is over; None while it stands."""
         return self.link.lost
 
     @property
     def complaint(self) -> str:
-        """The latest complaint of the bridge."""
         complaints = self.link.complaints
         binary = " (is it launched with bson_only_mode?)" if not complaints else ""
         unread = f"{self.link.unread} messages came that cannot be read{binary}" if self.link.unread else ""
         return complaints[-1] if complaints else unread
 
     def ask(self, server: str) -> bool:
-        """Return False: this robot's servers list their goals by themselves."""
         del server
         return False
 
-    @abstractmethod
-    def send(self, goal: SentGoal) -> None:
-        """Send a goal."""
-
-    @abstractmethod
-    def remind(self, goal: SentGoal) -> None:
-        """Send a goal again where it may have been lost."""
-
-    @abstractmethod
-    def cancel(self, goal: SentGoal) -> None:
-        """Ask for the end of one goal."""
-
-    @abstractmethod
-    def cancel_all(self) -> None:
-        """Ask for the end of every goal."""
-
-    @abstractmethod
-    def is_idle(self, since_s: float) -> bool | None:
-        """Return whether the servers are at nothing."""
-
     def beat(self, goal: SentGoal) -> None:
-        """Publish a heartbeat."""
         self.link.publish(self._beats, {"data": heartbeat(goal)})
 
     def close(self) -> None:
-        """End the connection."""
         self.link.close()
 
     # Our goals, as servers list them.
@@ -123,7 +92,6 @@ class BridgeSession(ABC):
         goal.call_off(self.ear.clock())
 
     def _each(self, take: Callable[[SentGoal], None]) -> None:
-        """Do something with each goal of ours that has not ended; forget the others."""
         for name, goal in list(self._ours.items()):
             if goal.end is None:
                 take(goal)

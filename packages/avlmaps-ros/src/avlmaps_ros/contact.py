@@ -7,9 +7,8 @@ from time import monotonic, sleep
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose, wrap_angle
-from avlmaps_ros.frames import Frames
 from avlmaps_ros.session import Ear, Opener, Session
-from avlmaps_ros.settings import RosSettings
+from avlmaps_ros.settings import Frames, RosSettings
 from avlmaps_ros.tree import Sighting
 
 STILL_M, STILL_RAD, STILL_S = 0.015, 0.02, 0.5

@@ -32,7 +32,6 @@ class Ros2Source:
     """A robot that publishes in ROS 2."""
 
     def __init__(self, topics: Mapping[str, str]) -> None:
-        """Join the network; see `live.sources.join_source`."""
         from avlmaps_ros.live.source import open_ros2, ros_topics
 
         self._topics = ros_topics(topics)

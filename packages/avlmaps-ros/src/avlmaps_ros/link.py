@@ -169,7 +169,6 @@ class Link:
         return self._topics[topic]
 
     def _arrived(self, message: Incoming) -> None:
-        """In the network's thread: sort one message."""
         if message.op == "publish":
             if message.topic in self._topics:
                 self._bridge.emit(message.topic, message.msg)

@@ -7,6 +7,7 @@ tf2_msgs. rosbridge writes NaN as null, which no number here takes.
 from base64 import b64decode
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from math import cos, sin
 from typing import Annotated, Any
 
@@ -14,9 +15,27 @@ import msgspec
 import numpy as np
 from jaxtyping import Float
 
+from avlmaps.core.errors import BackendError
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import from_quaternion
 from avlmaps.core.printable import UNSAFE, printable
+
+
+def interface(kind: str) -> Any:
+    """Return the class of a message, service or action: ``tf2_msgs/msg/TFMessage``.
+
+    Raises:
+        BackendError: its package is not installed.
+    """
+    package, part, name = kind.split("/")
+    try:
+        return getattr(import_module(f"{package}.{part}"), name)
+    except (ImportError, AttributeError) as fault:
+        raise BackendError(
+            f"ROS 2 has no {kind} here ({fault}); install its package, `apt install ros-$ROS_DISTRO-"
+            f"{package.replace('_', '-')}`, and source ROS 2's setup.bash."
+        ) from None
+
 
 # Nothing that is waited for is larger; a transform tree of a humanoid is about 20 kB.
 MOST_BYTES = 1_000_000
@@ -63,18 +82,24 @@ class _Time(msgspec.Struct):
         return self.sec + self.secs + 1e-9 * (self.nanosec + self.nsecs)
 
 
-class _Stamped(msgspec.Struct):
+class Stamped(msgspec.Struct):
+    """A std_msgs/Header."""
+
     frame_id: _Name
     stamp: _Time = msgspec.field(default_factory=_Time)
 
 
-class _Vector(msgspec.Struct):
+class Vector(msgspec.Struct):
+    """A geometry_msgs/Vector3 or Point."""
+
     x: float
     y: float
     z: float
 
 
-class _Quaternion(msgspec.Struct):
+class Quaternion(msgspec.Struct):
+    """A geometry_msgs/Quaternion."""
+
     x: float
     y: float
     z: float
@@ -82,12 +107,12 @@ class _Quaternion(msgspec.Struct):
 
 
 class _Transform(msgspec.Struct):
-    translation: _Vector
-    rotation: _Quaternion
+    translation: Vector
+    rotation: Quaternion
 
 
 class _TransformStamped(msgspec.Struct):
-    header: _Stamped
+    header: Stamped
     child_frame_id: _Name
     transform: _Transform
 

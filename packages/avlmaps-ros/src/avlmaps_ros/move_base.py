@@ -30,7 +30,6 @@ class MoveBaseTasks(Tasks):
     called: ClassVar[str] = "move_base"
 
     def pose(self, pose: GroundPose) -> ActionGoal:
-        """Return the task of standing at a pose."""
         target = stamped_pose(self.frames.to_robot(pose), self.frames.map_frame, ros=1)
         server = f"{self.settings.namespace}/move_base"
         return ActionGoal(
@@ -59,7 +58,6 @@ class MoveBaseSession(BridgeSession):
         link.subscribe(self._topic("feedback"), "move_base_msgs/MoveBaseActionFeedback", self._update)
 
     def send(self, goal: SentGoal) -> None:
-        """Publish a goal."""
         self._adopt(goal)
         self._sent_s = monotonic()
         stamp = {"secs": 0, "nsecs": 0}
@@ -79,19 +77,17 @@ class MoveBaseSession(BridgeSession):
             self.send(goal)
 
     def cancel(self, goal: SentGoal) -> None:
-        """Publish the goal's id; the server remembers it, also where the goal comes after its cancel."""
+        # The server remembers the id, also where the goal comes after its cancel.
         self._call_off(goal)
         self._publish_cancel(goal.id)
 
     def cancel_all(self) -> None:
-        """Publish an empty id, which means every goal."""
         self._publish_cancel(_ANYONE)
 
     def _publish_cancel(self, name: str) -> None:
         self.link.publish(self._topic("cancel"), {"stamp": {"secs": 0, "nsecs": 0}, "id": name})
 
     def is_idle(self, since_s: float) -> bool | None:
-        """Return whether the list that came last is empty."""
         listed = self.ear.servers.list_of(self._named("move_base"))
         return None if listed is None or listed[0] <= since_s else not listed[1]
 

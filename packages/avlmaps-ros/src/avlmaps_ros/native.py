@@ -27,11 +27,9 @@ from unique_identifier_msgs.msg import UUID as GoalUuid  # noqa: N811 - a class
 
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.recordings.formats.ros_messages import stamp_of
-from avlmaps_ros import nav2_tasks
 from avlmaps_ros.goals import End, SentGoal
-from avlmaps_ros.interfaces import interface
-from avlmaps_ros.messages import Transform, rigid, sanitize_line
-from avlmaps_ros.nav2_tasks import MOVING, RESULT_WITHIN_S, UNDER_WAY
+from avlmaps_ros.messages import Transform, interface, rigid, sanitize_line
+from avlmaps_ros.nav2 import ENDED, MOVING, REFUSED, RESULT_WITHIN_S, UNDER_WAY, UNKNOWN, end_listed, end_of
 from avlmaps_ros.own_map import OwnGrid, checked_grid
 from avlmaps_ros.session import Ear, heartbeat
 from avlmaps_ros.settings import RosSettings
@@ -125,28 +123,24 @@ class NativeSession:
     # The session, from any thread.
 
     def ask(self, server: str) -> bool:
-        """Cancel a goal that does not exist: the answer shows whether there is a server."""
+        # Cancels a goal that does not exist: the answer shows whether there is a server.
         self._do(self._ask, server)
         return True
 
     def send(self, goal: SentGoal) -> None:
-        """Send a goal as soon as its server is discovered."""
         self._do(self._send, goal)
 
     def remind(self, goal: SentGoal) -> None:
         """Do nothing: services are reliable."""
 
     def cancel(self, goal: SentGoal) -> None:
-        """Cancel a goal by its id."""
         self._do(self._cancel, goal)
 
     def cancel_all(self) -> None:
-        """Cancel every goal of each action that moves the robot."""
         for server in self._servers():
             self._do(self._call_cancel, server, _NOBODY, None)
 
     def is_idle(self, since_s: float) -> bool | None:
-        """Return whether each server that is there has agreed to stop, and lists no goal."""
         answers = [agreed for at_s, agreed in list(self._agreed_s.values()) if at_s >= since_s]
         if not answers:
             return None
@@ -154,12 +148,10 @@ class NativeSession:
         return all(answers) and not any(under_way.get(server) for server in self._servers())
 
     def beat(self, goal: SentGoal) -> None:
-        """Publish a heartbeat."""
         with suppress(Exception):  # the network was left meanwhile
             self._beats.publish(String(data=heartbeat(goal)))
 
     def close(self) -> None:
-        """Leave the network."""
         if self._context.ok():
             self._executor.shutdown(timeout_sec=2.0)
             with suppress(Exception):
@@ -207,7 +199,6 @@ class NativeSession:
     def _when(
         self, ready: Callable[[], bool], go: Callable[[], Any], absent: Callable[[], None], patient_s: float
     ) -> None:
-        """Do something as soon as a server is discovered, or say that it is absent."""
         until_s = monotonic() + patient_s
 
         def done() -> bool:
@@ -250,7 +241,7 @@ class NativeSession:
             if status in UNDER_WAY:
                 goal.heard_s = self._ear.clock()  # a list comes at a change only: no sign of life that recurs
             else:
-                self._later(partial(self._over, goal, *nav2_tasks.end_listed(status)))
+                self._later(partial(self._over, goal, *end_listed(status)))
         self._notify()
 
     def _writers_of(self, server: str) -> frozenset[bytes]:
@@ -332,7 +323,6 @@ class NativeSession:
                 self._ask_result(goal)
 
     def _ask_result(self, goal: SentGoal) -> None:
-        """Request a goal's result again: a server that was started again says that it does not know the goal."""
         kind, service = interface(goal.task.kind), f"{goal.task.action}/_action/get_result"
         client = self._clients.get(service)
         if client is None:
@@ -358,8 +348,8 @@ class NativeSession:
             self._met.add(server)
             self._ear.servers.answered(server, serves=True)
             if goal_id == _NOBODY:
-                self._agreed_s[server] = now_s, answer.return_code != nav2_tasks.REFUSED
-            if answer.return_code in (nav2_tasks.UNKNOWN, nav2_tasks.ENDED):
+                self._agreed_s[server] = now_s, answer.return_code != REFUSED
+            if answer.return_code in (UNKNOWN, ENDED):
                 self._unknown(goal, "Nav2 is not at the goal any more")
             self._notify()
 
@@ -394,7 +384,7 @@ def _uuid(goal: SentGoal) -> GoalUuid:
 
 def _end_of(response: Any) -> tuple[End, str]:
     code, text = getattr(response.result, "error_code", 0), getattr(response.result, "error_msg", "")
-    return nav2_tasks.end_of(response.status, code, sanitize_line(text))
+    return end_of(response.status, code, sanitize_line(text))
 
 
 def read_grid(topic: str, wait_s: float) -> OwnGrid | None:

@@ -3,70 +3,21 @@
 import os
 from collections.abc import Callable
 from time import monotonic
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import NavigationError
 from avlmaps_ros.base import RosDriver
-from avlmaps_ros.frames import Frames
+from avlmaps_ros.goals import Standing
 from avlmaps_ros.guard import GoalGuard, Orders
 from avlmaps_ros.own_map import on_own_map
-from avlmaps_ros.plans import Standing
-from avlmaps_ros.settings import RosSettings
+from avlmaps_ros.settings import Frames, RosSettings
 from avlmaps_ros.transports import RosKind, own_grid, session_opener, tasks_of
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
-
-
-class _OpenedDriver(RosDriver):
-    kind: ClassVar[RosKind]
-
-    def __init__(
-        self,
-        url: str,
-        frames: Frames | None = None,
-        settings: RosSettings | None = None,
-        *,
-        standing: Standing | None = None,
-        level_from_world: Float[np.ndarray, "3 3"] | None = None,
-        token: str | None = None,
-        clock: Callable[[], float] = monotonic,
-    ) -> None:
-        """Connect, and wait until the robot reports its pose.
-
-        Args:
-            url: of rosbridge, ``ws://host:9090``, or ``native``.
-            frames: the robot's frames; ``map`` and ``base_link``, lying as the map's level frame, by default.
-            settings: names, patience, tolerances.
-            standing: moves a goal to where a body can stand; goals are sent as they are without it.
-            level_from_world: the map's rotation into its level frame; the identity by default.
-            token: for a proxy before the bridge.
-            clock: seconds; replaced in tests.
-
-        Raises:
-            NavigationError: nobody answers there, or the robot does not report its pose.
-            BackendError: what the transport needs is not installed.
-        """
-        settings = settings or RosSettings()
-        super().__init__(
-            session_opener(self.kind, url, settings, token), tasks_of(self.kind, frames or Frames(), settings),
-            standing=standing, level_from_world=level_from_world, clock=clock,
-        )  # fmt: skip
-
-
-class Nav2Driver(_OpenedDriver):
-    """Drives a robot that runs Nav2, over rosbridge or natively."""
-
-    kind: ClassVar[RosKind] = "nav2"
-
-
-class MoveBaseDriver(_OpenedDriver):
-    """Drives a robot that runs move_base, over rosbridge."""
-
-    kind: ClassVar[RosKind] = "move_base"
 
 
 def open_ros_driver(
@@ -79,6 +30,7 @@ def open_ros_driver(
     level_from_world: Float[np.ndarray, "3 3"] | None = None,
     token: str | None = None,
     guarded: bool = False,
+    clock: Callable[[], float] = monotonic,
 ) -> RosDriver:
     """Connect to a robot.
 
@@ -93,26 +45,27 @@ def open_ros_driver(
         token: sent as ``Authorization: Bearer`` to a proxy before the bridge; by default the environment variable
             AVLMAPS_ROS_TOKEN, where it is set.
         guarded: start a second process that cancels the driver's goal when this one dies or stands still.
+        clock: seconds; replaced in tests.
 
     Raises:
         NavigationError: nobody answers there, or the robot does not know where it is.
         BackendError: roslibpy, or ROS 2's rclpy, is not installed.
     """
-    settings = settings or RosSettings()
+    frames, settings = frames or Frames(), settings or RosSettings()
     token = token or os.environ.get("AVLMAPS_ROS_TOKEN") or None
     if level_from_world is None and obstacles is not None:
         level_from_world = obstacles.level_from_world
     standing = None if obstacles is None else standable_goal(obstacles, settings.radius_m)
     if obstacles is not None and settings.map_topic:
         grid = own_grid(kind, url, settings, token)
-        own = on_own_map(obstacles, grid, frames or Frames())
+        own = on_own_map(obstacles, grid, frames)
         standing = standable_goal(own, 0.0 if grid.is_costmap else settings.radius_m, "the robot's own map")
-    driver = {"nav2": Nav2Driver, "move_base": MoveBaseDriver}[kind]
     silence_s = settings.stall_s + settings.heartbeat_s
     orders = Orders(kind, url, token, settings, silence_s, settings.goal_timeout_s)
     guard = GoalGuard(orders) if guarded else None  # it starts while the driver connects
     try:
-        opened = driver(url, frames, settings, standing=standing, level_from_world=level_from_world, token=token)
+        opener, tasks = session_opener(kind, url, settings, token), tasks_of(kind, frames, settings)
+        opened = RosDriver(opener, tasks, standing=standing, level_from_world=level_from_world, clock=clock)
     except BaseException:
         if guard is not None:
             guard.close()

@@ -12,9 +12,8 @@ from jaxtyping import Int8
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import CellState, Obstacles
-from avlmaps_ros.frames import Frames
-from avlmaps_ros.messages import sanitize_line
-from avlmaps_ros.settings import RosSettings
+from avlmaps_ros.messages import Quaternion, Stamped, Vector, sanitize_line
+from avlmaps_ros.settings import Frames, RosSettings
 
 MOST_BYTES = 64_000_000
 """Of a grid as a message of rosbridge, which writes it in digits."""
@@ -41,19 +40,9 @@ class OwnGrid:
     is_costmap: bool = False
 
 
-class _Position(msgspec.Struct):
-    x: float
-    y: float
-
-
-class _Turn(msgspec.Struct):
-    z: float
-    w: float
-
-
 class _Pose(msgspec.Struct):
-    position: _Position
-    orientation: _Turn
+    position: Vector
+    orientation: Quaternion
 
 
 class _Info(msgspec.Struct):
@@ -63,12 +52,8 @@ class _Info(msgspec.Struct):
     origin: _Pose
 
 
-class _Header(msgspec.Struct):
-    frame_id: str
-
-
 class _Grid(msgspec.Struct):
-    header: _Header
+    header: Stamped
     info: _Info
     data: list[Annotated[int, msgspec.Meta(ge=-128, le=127)]]
 
@@ -179,7 +164,6 @@ def _turned(xy: np.ndarray, corner: GroundPose) -> np.ndarray:
 
 
 def _values_at(grid: OwnGrid, xy: np.ndarray) -> np.ndarray:
-    """Return the grid's values at places of its frame; -1 off the grid."""
     c, s = cos(grid.corner.heading_rad), sin(grid.corner.heading_rad)
     within = (xy - (grid.corner.x_m, grid.corner.y_m)) @ np.array([[c, -s], [s, c]])
     cell = np.floor(within / grid.cell_m + 1e-9).astype(np.int64)

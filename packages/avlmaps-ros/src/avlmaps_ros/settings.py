@@ -1,13 +1,185 @@
 """How a ROS robot is driven: names, patience and tolerances. Its speed is the robot's own affair."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from math import pi
+from dataclasses import dataclass, field
+from math import atan2, cos, degrees, isfinite, pi, radians, sin
 from pathlib import Path
 from typing import Any, Self
 
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
 from avlmaps.core.errors import NavigationError
-from avlmaps_ros.frames import RosRobotFile
+from avlmaps.core.files import user_path, write_bytes_atomically
+from avlmaps.core.motion import GroundPose, wrap_angle
+
+_MOST_BYTES = 10_000
+_FAR_M = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class GroundTransform:
+    """A rigid movement over the ground, named ``b_from_a``: it maps places of frame a to frame b.
+
+    Attributes:
+        x_m: where a's origin lies in b.
+        y_m: the same.
+        yaw_rad: how far a's x axis is turned from b's, counter-clockwise, in (−π, π].
+    """
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.yaw_rad) and abs(self.x_m) < _FAR_M and abs(self.y_m) < _FAR_M):
+            raise ValueError(f"({self.x_m}, {self.y_m}) m, {self.yaw_rad} rad is not a transform between two floors")
+        object.__setattr__(self, "yaw_rad", wrap_angle(self.yaw_rad))
+
+    def __matmul__(self, other: "GroundTransform") -> "GroundTransform":
+        """Return ``c_from_a`` of this ``c_from_b`` and another ``b_from_a``."""
+        x_m, y_m = self._moved(other.x_m, other.y_m)
+        return GroundTransform(x_m, y_m, self.yaw_rad + other.yaw_rad)
+
+    def inverse(self) -> "GroundTransform":
+        """Return ``a_from_b``."""
+        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
+        return GroundTransform(-c * self.x_m - s * self.y_m, s * self.x_m - c * self.y_m, -self.yaw_rad)
+
+    def pose(self, pose: GroundPose) -> GroundPose:
+        """Take a pose from frame a to frame b."""
+        x_m, y_m = self._moved(pose.x_m, pose.y_m)
+        return GroundPose(x_m, y_m, pose.heading_rad + self.yaw_rad)
+
+    def points(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+        """Take places from frame a to frame b."""
+        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
+        return np.asarray(xy, np.float64) @ np.array([[c, s], [-s, c]]) + (self.x_m, self.y_m)
+
+    def _moved(self, x_m: float, y_m: float) -> tuple[float, float]:
+        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
+        return self.x_m + c * x_m - s * y_m, self.y_m + s * x_m + c * y_m
+
+    @classmethod
+    def between(cls, in_a: GroundPose, in_b: GroundPose) -> "GroundTransform":
+        """Return ``b_from_a`` from one pose that is known in both frames: a robot that stands at a marked place."""
+        turned = cls(0.0, 0.0, in_b.heading_rad - in_a.heading_rad)
+        x_m, y_m = turned._moved(in_a.x_m, in_a.y_m)
+        return cls(in_b.x_m - x_m, in_b.y_m - y_m, turned.yaw_rad)
+
+    @classmethod
+    def fit(cls, in_a: Float[np.ndarray, "n 2"], in_b: Float[np.ndarray, "n 2"]) -> tuple["GroundTransform", float]:
+        """Return the ``b_from_a`` that brings places known in both frames together best, by least squares.
+
+        Args:
+            in_a: the places in frame a, metres; two or more different ones.
+            in_b: the same places in frame b.
+
+        Returns:
+            The transform, and how far off a place is left, metres (root mean square).
+
+        Raises:
+            NavigationError: there are too few places, or they define no direction.
+        """
+        a, b = np.asarray(in_a, np.float64), np.asarray(in_b, np.float64)
+        if a.shape != b.shape or a.ndim != 2 or a.shape[1:] != (2,):
+            raise ValueError(f"places of shape {a.shape} and {b.shape}; both must be (n, 2)")
+        if len(a) < 2 or not (np.isfinite(a).all() and np.isfinite(b).all()) or np.ptp(a, axis=0).max() < 0.1:
+            raise NavigationError(
+                f"{len(a)} places do not define how two frames lie to each other; give two or more, metres apart."
+            )
+        from_a, from_b = a - a.mean(axis=0), b - b.mean(axis=0)
+        sine = float((from_a[:, 0] * from_b[:, 1] - from_a[:, 1] * from_b[:, 0]).sum())
+        cosine = float((from_a * from_b).sum())
+        turned = cls(0.0, 0.0, atan2(sine, cosine))
+        x_m, y_m = b.mean(axis=0) - turned.points(a.mean(axis=0))
+        fit = cls(float(x_m), float(y_m), turned.yaw_rad)
+        return fit, float(np.sqrt(((fit.points(a) - b) ** 2).sum(axis=1).mean()))
+
+
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """The robot's frames, and how they lie to the map."""
+
+    map_frame: str = "map"
+    """The fixed frame in which the robot localises itself and takes goals."""
+    base_frame: str = "base_link"
+    """The frame of its body; its x axis is ahead."""
+    map_from_avlmap: GroundTransform = field(default_factory=GroundTransform)
+    """How our map's level frame lies in the robot's fixed frame; the identity where the recording was made in it."""
+
+    def __post_init__(self) -> None:
+        for name in ("map_frame", "base_frame"):
+            bare = getattr(self, name).strip().lstrip("/")
+            if not bare or len(bare) > 255:
+                raise NavigationError(f"{getattr(self, name)!r} is not a frame; {name} is often {name[:4]!r}.")
+            object.__setattr__(self, name, bare)
+        if self.map_frame == self.base_frame:
+            raise NavigationError(f"The robot's fixed frame and that of its body are both {self.map_frame!r}.")
+
+    def to_robot(self, pose: GroundPose) -> GroundPose:
+        """Take a pose from the level frame to the robot's fixed frame."""
+        return self.map_from_avlmap.pose(pose)
+
+    def to_level(self, pose: GroundPose) -> GroundPose:
+        """Take a pose from the robot's fixed frame to the level frame."""
+        return self.map_from_avlmap.inverse().pose(pose)
+
+    @classmethod
+    def read(cls, path: Path | str) -> "Frames":
+        """Read the frames from a JSON file, which may hold `RosSettings` as well.
+
+        Raises:
+            NavigationError: the file cannot be read or does not hold what it must.
+        """
+        file = RosRobotFile.read(path)
+        shift = file.map_from_avlmap
+        try:
+            lie = GroundTransform(shift.x_m, shift.y_m, radians(shift.yaw_deg))
+        except ValueError as fault:
+            raise _unreadable(path, fault) from None
+        return cls(file.map_frame, file.base_frame, lie)
+
+    def write(self, path: Path | str) -> None:
+        """Write them to a JSON file that ``read`` takes."""
+        shift = self.map_from_avlmap
+        file = RosRobotFile(self.map_frame, self.base_frame, _Shift(shift.x_m, shift.y_m, degrees(shift.yaw_rad)))
+        write_bytes_atomically(user_path(path), msgspec.json.format(msgspec.json.encode(file), indent=2) + b"\n")
+
+
+class _Shift(msgspec.Struct, forbid_unknown_fields=True):
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_deg: float = 0.0
+
+
+class RosRobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """The content of a robot's file; `Frames.read` and `RosSettings.read` check it further."""
+
+    map_frame: str = "map"
+    base_frame: str = "base_link"
+    map_from_avlmap: _Shift = msgspec.field(default_factory=_Shift)
+    settings: dict[str, Any] = msgspec.field(default_factory=dict)
+
+    @classmethod
+    def read(cls, path: Path | str) -> "RosRobotFile":
+        """Read a robot's file.
+
+        Raises:
+            NavigationError: it cannot be read, or is no such file.
+        """
+        try:
+            with user_path(path).open("rb") as stream:
+                content = stream.read(_MOST_BYTES)
+            return msgspec.json.decode(content, type=cls)
+        except (OSError, ValueError, RecursionError) as fault:
+            raise _unreadable(path, fault) from None
+
+
+def _unreadable(path: Path | str, fault: Exception) -> NavigationError:
+    return NavigationError(f"The robot's file {path} cannot be read ({fault}); write it as docs/robots.md shows.")
+
 
 # The least and the most that each number may be; beyond lies a slip of the unit (milliseconds, centimetres, degrees).
 _RANGES: Mapping[str, tuple[float, float]] = {

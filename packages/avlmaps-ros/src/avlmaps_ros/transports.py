@@ -5,14 +5,12 @@ from typing import Literal
 
 from avlmaps.core.errors import BackendError, NavigationError
 from avlmaps.core.wording import option
-from avlmaps_ros.frames import Frames
 from avlmaps_ros.goals import Tasks
 from avlmaps_ros.move_base import MoveBaseSession, MoveBaseTasks
-from avlmaps_ros.nav2 import Nav2Session
-from avlmaps_ros.nav2_tasks import Nav2Tasks
+from avlmaps_ros.nav2 import Nav2Session, Nav2Tasks
 from avlmaps_ros.own_map import OwnGrid, read_over_bridge
 from avlmaps_ros.session import Opener
-from avlmaps_ros.settings import RosSettings
+from avlmaps_ros.settings import Frames, RosSettings
 
 RosKind = Literal["nav2", "move_base"]
 NATIVE = "native"

@@ -80,12 +80,7 @@ class LiveTree:
     def __init__(
         self, clock: Callable[[], float] = monotonic, sent_before: Callable[[float], float | None] = _never
     ) -> None:
-        """Begin with no frames.
-
-        Args:
-            clock: seconds.
-            sent_before: returns, for a time of arrival, a time after which the robot had sent it; None if unknown.
-        """
+        """Take a clock, and what says for a time of arrival after which time the robot had sent it; None if unknown."""
         self._clock, self._sent_before = clock, sent_before
         self._edges: dict[str, _Edge] = {}
         self._stamps: dict[str, _Stamps] = {}
@@ -184,7 +179,6 @@ class LiveTree:
         return f"/tf leads from {body!r} up to {name!r} and not to {fixed!r}; it has {_listed(known)}"
 
     def _chain(self, fixed: str, body: str) -> list[_Edge] | None:
-        """Return the transforms from the body up to the fixed frame."""
         chain: list[_Edge] = []
         name = body
         while name != fixed:

@@ -33,11 +33,7 @@ class Watch:
     """Which goals are ours, and which of them nobody watches any more. Times are seconds of any one clock."""
 
     def __init__(self, silence_s: float) -> None:
-        """Begin with no goal.
-
-        Args:
-            silence_s: how long a goal may go without a heartbeat.
-        """
+        """Take how long a goal may go without a heartbeat."""
         self.silence_s = silence_s
         self._beats: dict[str, list[float]] = {}  # name of a goal: first and last heartbeat
         self._goals: dict[str, dict[str, float]] = {}  # server: goal: when it was first seen

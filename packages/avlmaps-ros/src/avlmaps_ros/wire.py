@@ -136,7 +136,6 @@ class Bridge(roslibpy.Ros):
     def __init__(
         self, url: str, headers: Mapping[str, str], listener: Listener, timeout_s: float, most_bytes: int
     ) -> None:
-        """Begin to connect."""
         self._mine = _Factory(url, headers, listener, timeout_s, most_bytes)
         super().__init__(url)
 

@@ -79,14 +79,7 @@ class RosFrames:
     """
 
     def __init__(self, rgb_topic: str, depth_topic: str, pose_topic: str, tell: Callable[[str], None]) -> None:
-        """Begin without messages.
-
-        Args:
-            rgb_topic: name, for sentences.
-            depth_topic: likewise.
-            pose_topic: likewise; empty where only transforms move the robot.
-            tell: called with a sentence for each thing that is assumed or left out, once.
-        """
+        """Take the topics' names, for sentences; that of poses is empty where only transforms move the robot."""
         self.unpaired = self.unplaced = self.unread = 0
         self._topics = {"rgb": rgb_topic, "depth": depth_topic, "pose": pose_topic}
         self._once = Once(tell)

@@ -22,7 +22,7 @@ from rclpy.serialization import deserialize_message
 
 from avlmaps.recordings.formats.ros_messages import RosTopics, info_beside, pair_images
 from avlmaps.recordings.formats.ros_sound import DIRECTION_TYPES
-from avlmaps_ros.interfaces import interface
+from avlmaps_ros.messages import interface
 
 # pyright: reportMissingImports=false
 _RAW, _COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
@@ -254,7 +254,6 @@ class _Receiver:
         self._subscribe("depth", depth, self._known[depth], depth=30)
 
     def _pose_topic(self) -> str:
-        """Return the topic of poses: the named one, or odometry where nobody publishes transforms."""
         named = self._topics.pose
         if named:
             return named if self._known.get(named) in _POSES else ""

@@ -13,9 +13,8 @@ from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import tell_doubts
 from avlmaps.recordings.formats.ros_messages import RosTopics, stamp_of
 from avlmaps.recordings.formats.ros_sound import Pcm
-from avlmaps_ros.live.directions import RosDirections
 from avlmaps_ros.live.frames import RosFrame, RosFrames
-from avlmaps_ros.live.sound import RosSound
+from avlmaps_ros.live.sound import RosDirections, RosSound
 
 _LOOK_S = 0.05
 _SAID = ("rgb", "depth", "pose", "audio", "directions")  # at the beginning, what is read
