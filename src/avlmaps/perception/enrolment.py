@@ -3,7 +3,6 @@
 One folder each, ``sounds/<slug>/`` with ``sound.json`` and ``features.npy``; nothing is ever unpickled.
 """
 
-import json
 import re
 import shutil
 import unicodedata
@@ -12,6 +11,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from jaxtyping import Float32
 
@@ -41,6 +41,14 @@ class TaughtSound:
 
     name: str
     features: Float32[np.ndarray, "windows d"]
+    clips: tuple[str, ...]
+    model: str
+    checksum: str
+
+
+class _Notes(msgspec.Struct):
+    schema: int
+    name: str
     clips: tuple[str, ...]
     model: str
     checksum: str
@@ -152,14 +160,8 @@ def _keep(taught: TaughtSound, root: Path) -> None:
     (place / "sound.json").unlink(missing_ok=True)
     with replace_atomically(place / "features.npy") as stream:
         np.save(stream, taught.features, allow_pickle=False)
-    notes = {
-        "schema": SCHEMA,
-        "name": taught.name,
-        "clips": list(taught.clips),
-        "model": taught.model,
-        "checksum": taught.checksum,
-    }
-    write_bytes_atomically(place / "sound.json", json.dumps(notes, indent=1, ensure_ascii=False).encode())
+    notes = msgspec.json.encode(_Notes(SCHEMA, taught.name, taught.clips, taught.model, taught.checksum))
+    write_bytes_atomically(place / "sound.json", msgspec.json.format(notes, indent=1))
 
 
 def _refuse_link(place: Path) -> None:
@@ -169,16 +171,16 @@ def _refuse_link(place: Path) -> None:
 
 def _read(notes_file: Path) -> TaughtSound:
     try:
-        notes = json.loads(notes_file.read_text(encoding="utf-8"))
-        if notes["schema"] != SCHEMA:
+        notes = msgspec.json.decode(notes_file.read_bytes(), type=_Notes)
+        if notes.schema != SCHEMA:
             raise BackendError(
-                f"{notes_file} has schema {notes['schema']}, this version reads {SCHEMA}; teach the sound again."
+                f"{notes_file} has schema {notes.schema}, this version reads {SCHEMA}; teach the sound again."
             )
         features = np.load(notes_file.with_name("features.npy"), allow_pickle=False)
         if features.ndim != 2 or features.dtype != np.float32 or not np.isfinite(features).all():
             raise ValueError(f"features are {features.dtype} of {features.shape}")
-        return TaughtSound(str(notes["name"]), features, tuple(notes["clips"]), notes["model"], notes["checksum"])
-    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+        return TaughtSound(notes.name, features, notes.clips, notes.model, notes.checksum)
+    except (OSError, ValueError, EOFError) as error:
         raise BackendError(
             f"The taught sound in {notes_file.parent} is damaged ({error}); delete it and teach it again."
         ) from error

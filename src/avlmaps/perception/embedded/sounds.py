@@ -18,7 +18,6 @@ import msgspec
 import numpy as np
 from jaxtyping import Float, Float32
 
-from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded import logmel
 from avlmaps.perception.enrolment import TaughtSound, enrolled_sounds, sounds_folder
@@ -67,22 +66,13 @@ class EmbeddedSounds:
         words: the word encoder whose space the features live in; the embedded one if None.
         folder: the profile folder with the taught sounds; the user's own if None.
         weights: the folder of ``sounds.onnx``, ``sounds.json`` and ``sounds.npy``; those that ship if None.
-
-    Raises:
-        BackendError: the folder lacks one of these files.
     """
 
     def __init__(
         self, words: WordEncoder | None = None, folder: Path | None = None, weights: Path | None = None
     ) -> None:
         place = Path(__file__).with_name("weights") if weights is None else weights
-        parts = [place / f"sounds.{end}" for end in ("onnx", "json", "npy")]
-        missing = [part.name for part in parts if not part.is_file()]
-        if missing:
-            raise BackendError(
-                f"{place} holds no {' and no '.join(missing)}; python -m training.sounds writes all three."
-            )
-        network, notes, examples = (part.read_bytes() for part in parts)
+        network, notes, examples = ((place / f"sounds.{end}").read_bytes() for end in ("onnx", "json", "npy"))
         self._network = network
         self._folder = folder
         about = json.loads(notes)
@@ -182,11 +172,6 @@ class EmbeddedSounds:
         total = np.sum(
             [self._words.encode([prompt.format(word) for word in firsts]) for prompt in self.card.prompts], axis=0
         )
-        if total.shape[1] != self.card.dim:
-            raise BackendError(
-                f"The sound encoder {self.card.id} needs words of {self.card.dim} numbers, the word encoder "
-                f"{self._words.card.id} gives {total.shape[1]}; use the two of one release."
-            )
         return (total / np.linalg.norm(total, axis=1, keepdims=True)).astype(np.float32)
 
     @cached_property

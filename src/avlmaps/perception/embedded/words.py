@@ -20,7 +20,7 @@ from types import MappingProxyType
 import numpy as np
 
 from avlmaps.core.arrays import Float32, Int8
-from avlmaps.core.errors import BackendError, QueryError
+from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Entry, EntryKind, lexicon, noun_of
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 
@@ -68,30 +68,15 @@ def read_aliases(text: str) -> dict[str, str]:
     return aliases
 
 
-def _shipped(name: str) -> bytes:
-    try:
-        return (Path(__file__).parent / name).read_bytes()
-    except FileNotFoundError as error:
-        raise BackendError(
-            f"The embedded text encoder lacks its file {name}; install the package again, or make it with "
-            "'python -m training.words'."
-        ) from error
-
-
 @cache
 def _load() -> "tuple[WordWeights, WordPieces, Mapping[str, str]]":
-    blob, alias_text = _shipped("weights/words.npz"), _shipped("aliases.txt")
+    blob, alias_text = ((Path(__file__).parent / name).read_bytes() for name in ("weights/words.npz", "aliases.txt"))
     with np.load(BytesIO(blob), allow_pickle=False) as arrays:
         weights = WordWeights(
             entries=arrays["entries"].tobytes().decode("utf-8").split("\n"),
-            table=arrays["table"],
             scale=arrays["scale"].astype(np.float32),
-            roles=arrays["roles"],
-            inner=arrays["inner"],
-            inner_bias=arrays["inner_bias"],
-            outer=arrays["outer"],
-            outer_bias=arrays["outer_bias"],
             checksum=hashlib.sha256(blob + alias_text).hexdigest(),
+            **{name: arrays[name] for name in ("table", "roles", "inner", "inner_bias", "outer", "outer_bias")},
         )
     return weights, WordPieces(weights.entries), MappingProxyType(read_aliases(alias_text.decode("utf-8")))
 
