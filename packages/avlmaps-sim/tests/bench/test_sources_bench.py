@@ -26,7 +26,7 @@ from avlmaps_sim.bench.sources.suite import (
     MeasuredRoom,
     arrays_of_four,
     direct_to_reverberant_db,
-    table,
+    measured_room,
     table_of_homes,
     table_of_mended,
     table_of_regions,
@@ -157,7 +157,7 @@ def test_an_array_of_receivers_is_found_though_signs_are_turned() -> None:
 
 def test_a_room_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(AvlmapsError, match="S1R01"):
-        table(tmp_path, 0)
+        measured_room(tmp_path, 0)
 
 
 @pytest.mark.nightly
