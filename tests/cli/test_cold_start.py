@@ -54,6 +54,7 @@ def asked(word: str, encoder: object) -> Question | None:
     return thing_alone(Asked(sentence=word), avlmap)  # pyright: ignore[reportArgumentType]
 
 
+@pytest.mark.nightly  # it builds a map of its own
 def test_one_word_loads_no_heavy_package(room_map: Path) -> None:
     done = subprocess.run([sys.executable, "-c", ASK, room_map, "chair"], capture_output=True, text=True, timeout=200)
     assert done.returncode == 0, done.stderr

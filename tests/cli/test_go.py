@@ -194,17 +194,6 @@ def test_an_option_without_effect_is_said(answer, option: str, value: str, why: 
     assert said["notes"] == [f"{option} has no effect: {why}."]
 
 
-@pytest.mark.parametrize(
-    ("sentence", "option", "file"),
-    [
-        ("go to where this photo was taken", "--image", "x.png"),
-        ("go to the sound of this recording", "--sound-clip", "x.wav"),
-    ],
-)
-def test_a_file_that_the_sentence_speaks_of_has_an_effect(answer, sentence: str, option: str, file: str) -> None:
-    assert answer("go", "nowhere.avlmap", sentence, "--dry-run", option, file)["notes"] == []
-
-
 def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(
     answer, built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

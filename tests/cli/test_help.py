@@ -23,13 +23,7 @@ def test_help_is_as_it_was(verb: str, run, monkeypatch: pytest.MonkeyPatch) -> N
     if os.environ.get("AVLMAPS_UPDATE_SNAPSHOTS"):
         kept.write_text(said, encoding="utf-8")
     assert said == kept.read_text(encoding="utf-8")
-
-
-def test_each_verb_tells_what_it_does_and_every_option(run) -> None:
-    for verb in VERBS:
-        out = run(verb, "--help")[1]
-        assert "--json" in out
-        assert "(required)" in out or verb in ("demo", "profiles")
+    assert not verb or ("--json" in out and ("(required)" in out or verb in ("demo", "profiles")))
 
 
 def test_each_example_has_a_line_of_its_own_and_no_quotes_of_the_source_show() -> None:

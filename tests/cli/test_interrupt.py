@@ -16,12 +16,3 @@ def test_while_the_command_line_is_loading() -> None:
         "builtins.__import__ = load\nfrom avlmaps.cli import main\nmain(['--help'])"
     )
     assert run(interrupt) == (130, "avlmaps: stopped\n")
-
-
-def test_out_of_memory_is_a_sentence() -> None:
-    starved = (
-        "from avlmaps.cli import main\nfrom avlmaps.cli.info import Info\n"
-        "def run(self): raise MemoryError\nInfo.run = run\nmain(['info', 'x'])"
-    )
-    status, said = run(starved)
-    assert status == 1 and said.startswith("avlmaps: there is not enough memory") and said.count("\n") == 1

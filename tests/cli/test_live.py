@@ -45,18 +45,6 @@ def test_a_drive_updates_the_map_of_the_days_before(answer, dated: Path, built: 
     assert whole["frames"] == 2 * answer("info", built)["frames"] - 1
 
 
-@pytest.mark.nightly
-def test_a_drive_that_cannot_be_joined_leaves_the_map_as_it_was(run, dated: Path, built: Path, tmp_path: Path) -> None:
-    home = shutil.copytree(built, tmp_path / "home.avlmap")
-    before = (home / "map.json").read_bytes()
-    words = ("--into", home, "--voxel-size-m", "0.2", *WHOLE)
-    code, _, err = run("live", dated, "--out", tmp_path / "today.avlmap", *words)
-    assert code == 1
-    assert "has voxels of 0.1 m" in err
-    assert (home / "map.json").read_bytes() == before
-    assert (tmp_path / "today.avlmap" / "map.json").is_file()
-
-
 @pytest.mark.parametrize("words", [("--into", "today.avlmap"), ("--day", "2026-11-24")])
 def test_what_into_needs_is_said(run, walk: Path, tmp_path: Path, words: tuple[str, ...], monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)

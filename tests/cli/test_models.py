@@ -21,8 +21,6 @@ from avlmaps.perception.models import (
 )
 from helpers.light_files import write_light
 
-ON_MODELS = ("build", "query", "locate", "go", "bench", "profiles")
-
 
 @pytest.fixture(autouse=True)
 def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
@@ -47,12 +45,6 @@ def state_of(kind: Kind, name: str, folder: Path | None = None) -> tuple[str, st
     with using_models(ModelSettings(folder=folder)):
         told = availability(find(kind, name))
     return told.state, told.note
-
-
-@pytest.mark.parametrize("verb", ON_MODELS)
-def test_every_verb_that_runs_models_takes_the_same_words(verb: str, run) -> None:
-    said = run(verb, "--help")[1]
-    assert all(option in said for option in ("--models", "--device", "--precision"))
 
 
 def test_the_words_hold_while_the_verb_runs_and_for_processes_that_it_starts(

@@ -72,16 +72,6 @@ def test_parts_are_fused_and_drawn(built: Path, answer, tmp_path: Path) -> None:
     assert picture is not None and picture.std() > 10
 
 
-@pytest.mark.nightly
-def test_each_plot_says_what_it_wrote(built: Path, run, answer, tmp_path: Path) -> None:
-    for number, words in enumerate((("query", built, "--object", "red"), ("info", built))):
-        plot = tmp_path / f"{number}.png"
-        assert run(*words, "--plot", plot)[1].splitlines()[-1] == f"wrote {plot}"
-        assert plot.is_file()
-        assert answer(*words, "--plot", plot)["plot"] == str(plot)
-        assert "plot" not in answer(*words)
-
-
 def test_info_names_each_sound_by_what_fits_it_best(built: Path, answer, run) -> None:
     (sound,) = answer("info", built)["sounds"]
     scores = sound["confidences"]
@@ -176,6 +166,7 @@ WRONG_WORDS = (
 )
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(("words", "sentence"), WRONG_WORDS, ids=lambda value: str(value)[:40])
 def test_words_that_do_not_fit_exit_2_with_a_sentence(words, sentence, built: Path, walk: Path, run) -> None:
     status, out, err = run(*[{"MAP": built, "REC": walk}.get(word, word) for word in words])
@@ -208,6 +199,7 @@ KNOWN_ERRORS = (
 )
 
 
+@pytest.mark.few(9)
 @pytest.mark.parametrize(("words", "code", "sentence"), KNOWN_ERRORS, ids=lambda value: str(value)[:40])
 def test_a_known_error_is_one_sentence(words, code, sentence, built: Path, walk: Path, run, tmp_path: Path) -> None:
     places = {"MAP": built, "REC": walk, "OUT": tmp_path / "out", "MAP/map.json": built / "map.json"}

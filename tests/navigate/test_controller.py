@@ -57,15 +57,6 @@ def test_a_turn_ends_within_half_a_step_of_the_heading(pose, turn):
     assert abs(wrap_angle(end.heading_rad - pose.heading_rad - turn)) <= TURN_RAD / 2 + 1e-9
 
 
-@given(pose=POSES, count=st.integers(0, 80))
-def test_turning_left_and_as_often_right_changes_nothing(pose, count):
-    end = pose
-    for action in [*turns_for(count * TURN_RAD), *turns_for(-count * TURN_RAD)]:
-        end = acted(end, action)
-    assert abs(wrap_angle(end.heading_rad - pose.heading_rad)) < 1e-9
-    assert (end.x_m, end.y_m) == (pose.x_m, pose.y_m)
-
-
 @given(heading=st.floats(-pi, pi))
 def test_actions_keep_to_a_way_with_corners(heading):
     points = np.array([(0, 0), (2, 0), (2, 1.5), (0.5, 1.5), (0.5, 3.0)], float)

@@ -14,7 +14,6 @@ from avlmaps.language.translator import LearnedTranslator, Translation
 from avlmaps.maps.store.edits import Edit, EditedSpot, World
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.instruct import Outcome, instruct
-from avlmaps.navigate.trace_plot import draw_path, plot_path
 from helpers.kinematic import KinematicDriver
 from query.query_fakes import asked, furnished_map, sounds_of
 
@@ -173,18 +172,6 @@ def test_a_budget_holds_for_the_robot_too() -> None:
     outcome, _ = told("spin", Scripted("for i in range(1000):\n    robot.turn(10)"), budget=Budget(skill_calls=5))
     assert outcome.error_type == "ProgramError"
     assert len(outcome.moves) <= 5
-
-
-def test_the_way_is_drawn_with_start_goals_and_stops(tmp_path) -> None:
-    outcome, _ = told("go to the table, then go to the nearest chair")
-    asked = furnished_map()
-    figure = draw_path(asked.space, GroundPose(3.0, 2.0), outcome.moves, contacts=np.array([[1.0, 1.0]]), title="there")
-    labels = figure.axes[0].get_legend_handles_labels()[1]
-    assert labels[0] == "start"
-    assert any(label.startswith("2: 'chair'") for label in labels)
-    lines = [line.get_xydata() for line in figure.axes[0].get_lines()]
-    assert any(len(line) and np.allclose(np.asarray(line)[-1], outcome.subgoals[0].stop[:2]) for line in lines)
-    assert plot_path(tmp_path / "way.png", asked.space, GroundPose(3.0, 2.0), outcome.moves).stat().st_size > 5000
 
 
 def test_a_program_that_moves_nothing_says_so() -> None:

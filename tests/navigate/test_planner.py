@@ -105,15 +105,6 @@ def test_a_turned_or_mirrored_floor_has_turned_and_mirrored_ways(seed, turns, mi
         assert one._measured(first + 0.5, None).cost == pytest.approx(two._measured(second + 0.5, None).cost, rel=1e-5)
 
 
-@given(
-    start=st.tuples(st.floats(0.1, 4.9), st.floats(0.1, 4.9)), goal=st.tuples(st.floats(0.1, 4.9), st.floats(0.1, 4.9))
-)
-def test_over_an_empty_floor_the_way_is_straight(start, goal):
-    planner = Planner(costmap_of(of_states(np.full((100, 100), CellState.FREE)), 0.2))
-    way = planner.way(np.array(start), np.array(goal))
-    assert way.length_m == pytest.approx(np.hypot(*np.subtract(start, goal)), abs=1e-6)
-
-
 def test_a_way_keeps_to_the_middle_of_a_door():
     states = np.full((80, 60), CellState.FREE, np.uint8)
     states[40, :20] = states[40, 40:] = CellState.OCCUPIED  # a door one metre wide round y = 1.5

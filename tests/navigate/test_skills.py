@@ -47,16 +47,6 @@ def test_every_skill_is_as_the_vocabulary_says(name: str) -> None:
     assert getdoc(own) == getdoc(declared)
 
 
-def test_a_robot_has_the_whole_vocabulary() -> None:
-    assert isinstance(robot_among(GroundPose(0.0, 0.0)), RobotSkills)
-
-
-def test_facing_west_a_thing_dead_ahead_needs_no_turn() -> None:
-    robot = robot_among(GroundPose(5.0, 5.0, pi), chair=box(2.0, 5.0))
-    robot.face("chair")
-    assert driver_of(robot).told == ["turn 0.000000"]
-
-
 @pytest.mark.parametrize(("start_deg", "ahead"), [(0, (1, 0)), (90, (0, 1)), (180, (-1, 0)), (-90, (0, -1))])
 def test_forward_goes_where_the_robot_looks(start_deg: float, ahead: tuple[int, int]) -> None:
     robot = robot_among(GroundPose(3.0, 4.0, radians(start_deg)))
@@ -83,13 +73,6 @@ def test_backward_it_does_not_drive_on_where_it_could_not_turn_round() -> None:
     assert not robot.moves[-1].reached
     assert robot.moves[-1].goal == pytest.approx((-1.5, 0.0, 0.0))
     assert robot.moves[-1].distance_m == pytest.approx(1.5)
-
-
-def test_numbers_of_numpy_are_numbers() -> None:
-    robot = robot_among(GroundPose(0.0, 0.0))
-    for number in (np.int64(2), np.float32(2.0), np.float64(2.0), 2):
-        robot.move_forward(number)  # pyright: ignore[reportArgumentType]
-        assert robot.moves[-1].distance_m == pytest.approx(0.0)
 
 
 def test_a_positive_turn_goes_to_the_right() -> None:

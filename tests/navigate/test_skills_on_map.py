@@ -20,10 +20,9 @@ from avlmaps.navigate.file_access import Readable, named_files, offered_by
 from avlmaps.navigate.footprint import Outline, middle_between
 from avlmaps.navigate.instances import Destination, nearest
 from avlmaps.navigate.skills import Robot, RobotSettings
-from avlmaps.query.settings import QuerySettings
 from avlmaps.query.voxel_space import Space
 from helpers.kinematic import KinematicDriver
-from query.query_fakes import FakeViews, asked, furnished_map, keyframes_at, sounds_of
+from query.query_fakes import FakeViews, furnished_map, keyframes_at, sounds_of
 
 BIG_CHAIR, SMALL_CHAIR = (0.6, 0.6), (5.1, 3.1)
 
@@ -203,21 +202,6 @@ def test_a_thing_that_there_are_too_few_of_is_not_found() -> None:
         furnished_robot().get_nth_pos("chair", 1, "prettiest")
 
 
-def test_distances_of_things_are_between_their_nearest_points() -> None:
-    robot = furnished_robot()
-    assert robot.get_distance("chair", "chair") == 0.0
-    apart = robot.get_distance("chair", "table")
-    assert 0.0 <= apart == pytest.approx(robot.get_distance("table", "chair"))
-    assert robot.get_distance(robot.current_pos(), "table") > 0.0
-
-
-def test_a_stricter_map_stops_what_another_lets_pass() -> None:
-    strict = furnished_robot()
-    strict = Robot(asked(strict.asked, settings=QuerySettings(found_at=1.0)), strict.driver)
-    with pytest.raises(GoalNotFoundError, match="best guess"):
-        strict.move_to_object("chair")
-
-
 def test_the_best_guess_is_gone_to_only_when_that_is_asked_for() -> None:
     sounds = sounds_of([track(5.0, 3.1)], [0.3])
     robot = furnished_robot(settings=RobotSettings(guess=True), sounds=sounds)
@@ -320,15 +304,6 @@ def test_an_outline_holds_its_voxels_and_runs_counter_clockwise(cells: list[tupl
     assert np.all(outline.corners <= middles.max(axis=0) + 0.15)
     x, y = outline.corners.T
     assert x @ np.roll(y, -1) - y @ np.roll(x, -1) >= 0.0
-
-
-def test_an_outline_keeps_the_corner_of_an_l() -> None:
-    grid = np.stack(np.meshgrid(np.arange(40), np.arange(40), indexing="ij"), axis=-1).reshape(-1, 2)
-    middles = (grid[(grid < 10).any(axis=1)] + 0.5) * 0.05
-    outline = Outline.round(middles, 0.05)
-    assert not outline.contains(np.array([1.2, 1.2]))
-    assert outline.contains(np.array([0.2, 1.8]))
-    assert outline.distance_m(np.array([1.2, 1.2])) == pytest.approx(0.7, abs=0.02)
 
 
 def test_between_two_cupboards_that_face_is_the_middle_of_the_aisle() -> None:

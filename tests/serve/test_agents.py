@@ -4,7 +4,6 @@ import asyncio
 import base64
 import itertools
 import json
-import math
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -192,31 +191,18 @@ QUESTIONS: list[tuple[str, str, dict[str, Any], Callable[[Any], bool]]] = [
         sum(a["floors"][0]["rooms"].values())) == (2, 110, 3, 12, 4)),
     ("Which rooms are upstairs?", "list_rooms", {"floor": 1},
      lambda a: {room["name"] for room in a["rooms"]} == UPSTAIRS),
-    ("Which room has most things?", "list_rooms", {},
-     lambda a: max(a["rooms"], key=lambda room: room["things"])["room"] == "living room"),
     ("How many things are in the kitchen?", "list_things", {"room": "kitchen", "top": 1},
      lambda a: a["total"] == sum(of_kind("kitchen").values())),
     ("Where is the refrigerator?", "list_things", {"name": "refrigerator", "top": 1},
      lambda a: column_of(a["things"][0]["position"]) == 2),
-    ("In which room is the stove?", "list_things", {"name": "stove", "top": 1},
-     lambda a: a["things"][0]["room"] == "kitchen"),
     ("How many chairs are in the meeting room?", "list_things", {"room": "meeting room", "name": "chair", "top": 1},
      lambda a: a["total"] == 10),
-    ("How many desks are in all offices?", "list_things", {"room": "office", "name": "desk", "top": 1},
-     lambda a: a["total"] == of_kind("office")["desk"]),
-    ("Is there a bed?", "list_things", {"name": "bed", "top": 1}, lambda a: a["total"] == 0),
     ("Is there a labtop?", "list_things", {"name": "labtop", "top": 1},
      lambda a: a["total"] == 0 and "laptop" in a["note"]),
     ("What is next to the refrigerator?", "list_things", {"room": "kitchen", "near": "refrigerator", "top": 1},
      lambda a: a["things"][0]["name"] in ("stove", "dining table") and a["things"][0]["distance_m"] < 1.2),
-    ("What is nearest to the lowest corner?", "list_things", {"near": "0,0,0", "top": 1},
-     lambda a: a["things"][0]["name"] == "desk"),
-    ("How many sofas, and how wide?", "list_things", {"name": "sofa", "top": 1},
-     lambda a: a["total"] == 4 and 0.5 <= max(a["things"][0]["size"][:2]) <= 0.9),
     ("Which rooms have a tv?", "list_things", {"name": "tv", "top": 3},
      lambda a: {one["room"] for one in a["things"]} == {"meeting room", "living room"}),
-    ("Where is a whiteboard?", "ask", {"sentence": "the whiteboard", "top": 1},
-     lambda a: a["found"] and column_of(a["goals"][0]["position"]) == 1),
     ("Is there a sink in the kitchen?", "ask", {"object": "sink", "area": "kitchen", "top": 1},
      lambda a: a["found"] and column_of(a["goals"][0]["position"]) == 2),
     ("How many toilets?", "ask", {"sentence": "how many toilets are there", "top": 1}, lambda a: a["count"] == 2),
@@ -226,8 +212,6 @@ QUESTIONS: list[tuple[str, str, dict[str, Any], Callable[[Any], bool]]] = [
      lambda a: a["total"] == 1 and abs(a["sounds"][0]["onset_s"] - 2.0) < 0.3),
     ("Where are plants 6 to 10?", "list_things", {"name": "plant", "top": 5, "page": 2},
      lambda a: a["total"] == 12 and len(a["things"]) == 5 and a["pages"] == 3),
-    ("What is in the bathroom?", "list_things", {"room": "bathroom"},
-     lambda a: Counter(one["name"] for one in a["things"]) == of_kind("bathroom")),
 ]  # fmt: skip
 
 
@@ -246,18 +230,6 @@ def test_an_agent_with_8000_tokens_answers_questions_about_an_office(office: Age
     assert not wrong and spent <= BUDGET
     assert "did you mean room?" in office.refused("list_things", rooms="living room")
     assert "no room 'sauna'" in office.refused("list_things", room="sauna")
-
-
-@pytest.mark.nightly
-def test_every_thing_is_on_exactly_one_page_and_near_ones_come_by_distance(office: Agent) -> None:
-    pages = office.call("list_things", top=7)["pages"]
-    listed = [office.call("list_things", top=7, page=page)["things"] for page in range(1, pages + 1)]
-    places = {tuple(one["position"]) for page in listed for one in page}
-    assert len(places) == 110 and f"no page {pages + 1}" in office.refused("list_things", top=7, page=pages + 1)
-    near = office.call("list_things", near=[6.0, 2.0, 0.5])["things"]
-    away = [one["distance_m"] for one in near]
-    assert away == sorted(away)
-    assert away == pytest.approx([math.dist(one["position"], [6.0, 2.0, 0.5]) for one in near], abs=0.02)
 
 
 _TEXTS = st.text("abc 19", max_size=400)

@@ -17,9 +17,6 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.changes import Days
 from avlmaps.query.sound_sources import SoundSource
 from avlmaps.serve.service import Service
-from avlmaps.serve.settings import ServeSettings
-
-TOKEN = "a token of twenty letters"
 
 
 @pytest.fixture
@@ -102,10 +99,3 @@ def test_sources_are_those_of_the_verb(client: TestClient, monkeypatch: pytest.M
     assert client.get("/maps/room/sources", params=words).json()["sources"] == [source.to_json()]
     assert asked == [(["dog bark", "cat"], {"prior": False, "least": 0.5})]
     assert client.get("/maps/room/sources?prior=all").status_code == 400
-
-
-def test_both_need_the_token(room: Path, serving: Callable[..., TestClient]) -> None:
-    client = serving(Service.open({"room": room}), ServeSettings(token=TOKEN))
-    for address in ("sources", "changes"):
-        assert client.get(f"/maps/room/{address}").status_code == 401
-        assert client.get(f"/maps/room/{address}", headers={"authorization": f"Bearer {TOKEN}"}).status_code == 422

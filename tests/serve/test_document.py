@@ -106,30 +106,6 @@ def test_a_value_of_another_kind_or_range_is_refused(
     told_right(document, operation, answered)
 
 
-parts = st.dictionaries(
-    st.sampled_from(["sentence", "object", "sound", "area", "top", "primary", "size", "more"]),
-    st.none() | st.sampled_from(["", " ", "red", "a red thing", "7", 3, 1.0, 0, "object", "image", "small", [], True]),
-    max_size=4,
-)
-
-
-@light
-@given(body=parts, name=st.sampled_from(["ask", "picture"]))
-def test_a_body_is_answered_where_it_fits_and_else_refused(
-    client: TestClient, document: dict[str, Any], body: dict[str, Any], name: str
-) -> None:
-    operation = document["paths"][f"/maps/{{map}}/{name}"]["post"]
-    schema = operation["requestBody"]["content"]["application/json"]["schema"]
-    fits = Draft202012Validator(schema | {"components": document["components"]}).is_valid(body)
-    answered = client.post(f"/maps/room/{name}", json=body)
-    told_right(document, operation, answered)
-    # What is blank was left out, and a number may be a text: more is taken than the document says.
-    words = [body.get(part) for part in ("sentence", "object", "sound", "area")]
-    lacks_words = not any(isinstance(one, str) and one.strip() for one in words)
-    at_odds = isinstance(words[0], str) and any(words[1:])
-    assert answered.status_code != 400 or not fits or lacks_words or at_odds, (body, answered.text[:300])
-
-
 def test_intrinsics_without_a_photo_are_refused(client: TestClient) -> None:
     for values in ({}, {"sentence": "the red thing"}):
         refused = client.post("/maps/room/picture", files={"intrinsics": (None, "525,525,320,240")}, data=values)

@@ -446,12 +446,6 @@ def test_a_stop_ends_a_wait_and_what_comes_after_it(client: TestClient, drive: D
     assert drive.machine.motions == 0
 
 
-def test_a_stop_without_any_order_is_accepted_and_logged(client: TestClient, drive: Driven) -> None:
-    assert client.post("/drive/stop").json() == {"stopped": True, "note": "it stands", "order": None}
-    assert drive.machine.stops == 1
-    assert drive.events == ["stop"]
-
-
 def test_a_question_back_names_its_choices_and_gives_no_token(client: TestClient) -> None:
     answer = client.post("/drive/plan", json={"words": "turn"})
     assert answer.status_code == 422

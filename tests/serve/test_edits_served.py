@@ -10,9 +10,6 @@ from starlette.testclient import TestClient
 from avlmaps.maps.store.edits import EDITS, read_edits
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.service import Service
-from avlmaps.serve.settings import ServeSettings
-
-TOKEN = "a token of twenty letters"
 
 
 @pytest.fixture
@@ -75,15 +72,3 @@ def test_what_cannot_be_made_is_refused_in_a_sentence(
     answer = client.post("/maps/room/edit", json=body)
     assert answer.status_code == status and why in answer.json()["error"]["message"], answer.text
     assert not (room / EDITS).exists()
-
-
-def test_edits_need_the_token_and_a_page_of_this_server(place: Path, serving: Callable[..., TestClient]) -> None:
-    client = serving(Service.open({"home": place}), ServeSettings(token=TOKEN))
-    pin = {"does": "pin", "name": "zorb pad", "at": "0.5,0.5,0.1"}
-    assert client.post("/maps/home/edit", json=pin).status_code == 401
-    allowed = {"authorization": f"Bearer {TOKEN}"}
-    elsewhere = {**allowed, "origin": "https://elsewhere.example"}
-    assert client.post("/maps/home/edit", json=pin, headers=elsewhere).status_code == 403
-    assert client.get("/maps/home/edit?does=pin&name=x&at=0,0", headers=allowed).status_code == 405
-    assert not (place / EDITS).exists()
-    assert client.post("/maps/home/edit", json=pin, headers=allowed).status_code == 200

@@ -5,7 +5,6 @@ import threading
 
 import pytest
 
-from avlmaps.core.wording import Spelling, asked_as, option, options_as
 from avlmaps.serve.lanes import Cancellation, CancelledWorkError, Lane, RequestError, watch_here
 
 
@@ -83,16 +82,3 @@ def test_work_that_waits_is_dropped_when_its_client_leaves(gate: threading.Event
     asyncio.run(run())
     lane.close()
     assert not ran
-
-
-def test_work_spells_options_as_who_asks_for_it() -> None:
-    lane = Lane("t", 1, 0, 10.0)
-
-    async def run() -> list[str]:
-        with asked_as(Spelling.FIELD):
-            asked = await lane.run(lambda _: option("camera-height-m"))
-        return [asked, await lane.run(lambda _: option("camera-height-m"))]
-
-    with options_as(Spelling.FLAG):
-        assert asyncio.run(run()) == ["camera_height_m", "--camera-height-m"]
-    lane.close()

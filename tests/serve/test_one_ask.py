@@ -76,7 +76,7 @@ def by_shell(home: Path, query: dict[str, str], capsys: Any, monkeypatch: pytest
     return json.loads(capsys.readouterr().out)
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "query", [{"sentence": words} for words in SENTENCES] + PARTS, ids=lambda one: "+".join(one.values())
 )

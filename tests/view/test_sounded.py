@@ -53,13 +53,6 @@ def test_the_regions_hold_the_source_and_the_likelier_is_smaller(sounded: Path) 
         assert spans[0] <= spans[1]
 
 
-def test_a_map_that_does_not_know_has_none_and_no_note(room: AVLMap) -> None:
-    from avlmaps.view.labels import MapOnPage
-
-    told = MapOnPage(room).describe_contents()
-    assert told["sources"] == [] and not any("microphone" in note for note in told["notes"])
-
-
 @pytest.fixture
 def served_sounds(sounded: Path) -> Iterator[Served]:
     yield from serving(sounded)

@@ -11,7 +11,7 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import AnsweredError, Column, UsageError, emit, error_answer, kind_of, table
 from avlmaps.cli.verb import COUNT, Asking, MapVerb, idle
-from avlmaps.core.errors import LanguageError, kind_named
+from avlmaps.core.errors import LanguageError, ProgramError, kind_named
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
 
@@ -161,16 +161,19 @@ def _idle(verb: "Go", program: str) -> list[str]:
 
 def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None") -> dict[str, Any]:
     """Return the answer for a command that is read and not obeyed, with what a drive would report of its map."""
-    told, run, choices = (), None, ()
+    notes, choices, error, error_type = translation.notes, (), None, None
     if avlmap is not None:
-        from avlmaps.navigate.rehearsal import told_by_map
+        from avlmaps.core.motion import GroundPose
+        from avlmaps.navigate.rehearsal import consulted
 
-        told, run, choices = told_by_map(translation.program, avlmap, verb.sentence, robot_settings(verb))
-    error, error_type = (None, None) if run is None else (run.error, run.error_type)
+        told = consulted(verb.sentence, translation, avlmap, GroundPose(0.0, 0.0), robot_settings(verb))
+        notes, choices = told.notes, told.choices
+        if told.error is not None and told.error_type != ProgramError.__name__:
+            notes, error, error_type = (*notes, told.error), told.error, told.error_type
     return {
         "plan": translation.plan,
         "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": error is None,
-        "error": error, "error_type": error_type, "notes": list(dict.fromkeys((*translation.notes, *told))),
+        "error": error, "error_type": error_type, "notes": list(dict.fromkeys(notes)),
         "choices": list(choices), "path_m": 0.0, "elapsed_s": 0.0, "frame": "recording",
         "missing": None if error is None or error_type is None else error_answer(kind_named(error_type), error),
     }  # fmt: skip
@@ -215,10 +218,10 @@ def _obeyed(
     settings, heats = robot_settings(verb), dict[tuple[object, ...], "Heatmap"]()
     try:
         if verb.language != "chat":  # a chat model's program may decide while it drives
-            missing = unfound(verb.sentence, translation, avlmap, robot.pose, heats, settings)
+            missing = unfound(verb.sentence, translation, avlmap, robot.pose, settings, heats)
             while missing is not None and missing.choices and (number := _choice(verb, missing)):
                 settings = replace(settings, choose=(*settings.choose, number))
-                missing = unfound(verb.sentence, translation, avlmap, robot.pose, heats, settings)
+                missing = unfound(verb.sentence, translation, avlmap, robot.pose, settings, heats)
             if missing is not None:
                 say(translation.plan)
                 return missing

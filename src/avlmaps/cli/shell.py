@@ -57,8 +57,6 @@ _PICTURE = re.compile(r"\.(jpe?g|png|webp|bmp|tiff?|ppm|pgm)['\"]?$", re.IGNOREC
 _FRAME = "recording"
 _CONFIRM = "Drive this plan? [y/N]"
 _LEAST_COMPLETED = 0.3  # things with this confidence are completed
-LONGEST_LINE = 10_000
-"""Characters of a line; a sentence may have far fewer."""
 YES, _NO = frozenset({"y", "yes"}), frozenset({"n", "no", ""})
 
 
@@ -288,10 +286,8 @@ class Lines:
         self._kept: str | None = None
 
     def next(self) -> str | None:
-        """Return the next line; None at the end. ``UsageError``: it is too long."""
+        """Return the next line; None at the end."""
         line, self._kept = self._kept or self._read(""), None
-        if line is not None and len(line) >= LONGEST_LINE:
-            raise UsageError(f"A line has {LONGEST_LINE:,} characters or more; give a shorter one.")
         return line and line.strip()
 
     def confirms(self, question: str) -> bool:
@@ -308,11 +304,7 @@ def piped_lines(stream: TextIO) -> Lines:
     def read(question: str) -> str | None:
         if question:
             say(question)
-        line = stream.readline(LONGEST_LINE)
-        if len(line) == LONGEST_LINE and not line.endswith("\n"):
-            while (rest := stream.readline(LONGEST_LINE)) and not rest.endswith("\n"):
-                pass
-        return line or None
+        return stream.readline() or None
 
     return Lines(read)
 

@@ -29,21 +29,15 @@ Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong comman
 With --json an error is {"error": {"kind": ..., "message": ...}} on standard output."""
 
 ENTRY_POINT_GROUP = "avlmaps.verbs"
-_OWN = (
-    "calibrate", "build", "live", "merge", "info", "query", "things", "rooms", "sources", "changes", "edit", "shell",
-    "view", "export", "locate", "go", "serve", "teach-sound", "profiles",
-)  # fmt: skip
-# Of those that share a file.
-_FILES = {
-    "calibrate": "build", "merge": "edit", "changes": "edit", "rooms": "things", "sources": "things", "locate": "query",
-    "profiles": "models", "teach-sound": "models",
+# The verbs with their files here, "" of other packages, as help lists them: in the order in which a person comes to use
+# them; further verbs of other packages follow.
+_KNOWN = {
+    "demo": "", "record": "", "add-sounds": "", "calibrate": "build", "build": "build", "live": "live", "merge": "edit",
+    "import-map": "", "info": "info", "query": "query", "things": "things", "rooms": "things", "sources": "things",
+    "changes": "edit", "edit": "edit", "shell": "shell", "view": "view", "export": "export", "locate": "query",
+    "go": "go", "serve": "serve", "teach-sound": "models", "profiles": "models", "bench": "",
 }  # fmt: skip
-# As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.
-_ORDER = (
-    "demo", "record", "add-sounds", "calibrate", "build", "live", "merge", "import-map", "info", "query", "things",
-    "rooms", "sources", "changes", "edit", "shell", "view", "export", "locate", "go", "serve", "teach-sound",
-    "profiles", "bench",
-)  # fmt: skip
+_OWN = tuple(name for name, file in _KNOWN.items() if file)
 
 
 if TYPE_CHECKING:
@@ -52,7 +46,7 @@ if TYPE_CHECKING:
 
 def _own(name: str) -> type[Verb]:
     """Load one of our verbs; the others stay where they are, since one command needs no other's modules."""
-    return getattr(import_module(f"avlmaps.cli.{_FILES.get(name, name)}"), name.title().replace("-", ""))
+    return getattr(import_module(f"avlmaps.cli.{_KNOWN[name]}"), name.title().replace("-", ""))
 
 
 @cache
@@ -66,7 +60,7 @@ def installed() -> tuple[dict[str, type[Verb]], dict[str, str]]:
             missing[entry.name] = str(fault)
     for name in (name for one in OTHERS for name in one.verbs if name not in found and name not in missing):
         missing[name] = f"The verb {name} is not installed; get it with: {how_to_get('verbs', name)}"
-    ordered = {name: found[name] for name in (*_ORDER, *sorted(found)) if name in found}
+    ordered = {name: found[name] for name in (*_KNOWN, *sorted(found)) if name in found}
     return ordered, missing
 
 

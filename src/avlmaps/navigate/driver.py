@@ -299,24 +299,19 @@ class MapDriver:
         self._take(Action.STOP, trip)
         if stop is None:
             return self._arrival(trip, False, note)
-        off_m = float(np.hypot(*(self._xy - stop.xy)))
-        away_m = float(np.hypot(*(self._xy - goal)))
+        off_m, away_m = (float(np.hypot(*(self._xy - xy))) for xy in (stop.xy, goal))
+        stands = f"it stands {away_m:.2f} m"
         if off_m > TOLERANCE_M or trip.fault:
             why = trip.fault or note or "it got no nearer"
             return self._arrival(trip, False, f"{why}, {away_m:.2f} m from the place")
         if not stop.seen:
-            return self._arrival(
-                trip, False, f"no path leads to where the place can be seen; it stands {away_m:.2f} m away from it"
-            )
+            note = f"no path leads to where the place can be seen; {stands} away from it"
+            return self._arrival(trip, False, note)
         if not stop.beside_m:
             return self._arrival(trip, True)
         if not stop.open:
-            return self._arrival(
-                trip, True, f"the robot cannot stand in the place itself; it stands {away_m:.2f} m beside it"
-            )
-        return self._arrival(
-            trip, away_m <= _OPEN_M, f"no path leads to the place itself; it stands {away_m:.2f} m beside it"
-        )
+            return self._arrival(trip, True, f"the robot cannot stand in the place itself; {stands} beside it")
+        return self._arrival(trip, away_m <= _OPEN_M, f"no path leads to the place itself; {stands} beside it")
 
     def _no_way(self, goal: Float[np.ndarray, "2"]) -> str:
         if not self.planner.costmap.holds(goal):

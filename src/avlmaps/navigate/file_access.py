@@ -35,21 +35,19 @@ class Readable:
         if not name.strip() or "\0" in name:
             raise QueryError(f"The {what} has no name; give the name of a file.")
         offered = name in self.named
-        for root in self.roots or (Path(),):
-            path = root / name
-            inside = any(_is_within(path, other) for other in self.roots)
-            if (inside or offered) and (size := _size_of(path)) is not None:
-                if size > MOST_BYTES:
-                    raise QueryError(
-                        f"The {what} {path} has {size:,} bytes, more than {MOST_BYTES:,}; give a smaller one."
-                    )
+        paths = [root / name for root in self.roots] or [Path(name)]
+        inside = [path for path in paths if any(_is_within(path, root) for root in self.roots)]
+        for path in paths if offered else inside:
+            if (size := _size_of(path)) is not None and size > MOST_BYTES:
+                raise QueryError(f"The {what} {path} has {size:,} bytes, more than {MOST_BYTES:,}; give a smaller one.")
+            if size is not None:
                 return path
-        if offered or any(_is_within(root / name, other) for root in self.roots for other in self.roots):
+        if offered or inside:
             raise QueryError(f"The {what} {_short(name)} is not there; check the name.")
-        folders = ", ".join(str(root) for root in self.roots)
+        folders = ", ".join(str(root) for root in self.roots) or "every folder"
         raise QueryError(
-            f"The {what} {_short(name)} may not be read by a program: it lies outside of "
-            f"{folders or 'every folder'} and the command does not name it; name it in the command, word for word."
+            f"The {what} {_short(name)} may not be read by a program: it lies outside of {folders} and the command "
+            "does not name it; name it in the command, word for word."
         )
 
 

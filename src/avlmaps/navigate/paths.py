@@ -2,7 +2,6 @@
 
 import threading
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
 import numpy as np
@@ -92,15 +91,6 @@ class PathFinder:
         self._lock = threading.RLock()
         self._planners: dict[int, tuple[Obstacles, Planner]] = {}
 
-    @cached_property
-    def home(self) -> int:
-        """The storey on which the walk of the map began."""
-        return storey_of_walk(self.avlmap)
-
-    def obstacles(self, storey: int) -> Obstacles:
-        """Return what stands on a storey."""
-        return self._planned(storey)[0]
-
     def planner(self, storey: int) -> Planner:
         """Return the planner of a storey."""
         return self._planned(storey)[1]
@@ -120,7 +110,7 @@ class PathFinder:
                 where the walk of the map began.
         """
         if len(place) == 2:
-            return Spot(np.asarray(place, np.float64), self.home)
+            return Spot(np.asarray(place, np.float64), storey_of_walk(self.avlmap))
         level, storeys = self.avlmap.space.level(place), self.avlmap.storeys
         return Spot(level[:2], 0 if storeys is None else int(storeys.of(level[2:])[0]))
 
@@ -173,7 +163,11 @@ class PathFinder:
         found, storeys = self.between(one, other), self.avlmap.storeys
         if found is None:
             note = "" if storeys is None else storeys.refusal(one.storey, other.storey, self.shape.climbs)
-            off = [name for name, at in (("start", one), ("goal", other)) if not self._holds(at)]
+            off = [
+                name
+                for name, at in (("start", one), ("goal", other))
+                if not self.planner(at.storey).costmap.holds(at.xy)
+            ]
             note = note or self._forbidden(other)
             if off:
                 note = f"the {' and the '.join(off)} {'lies' if len(off) == 1 else 'lie'} outside of the map"
@@ -194,15 +188,12 @@ class PathFinder:
 
     def stop_answer(self, route: Route) -> StopAnswer:
         """Return where a body stops at the end of a route."""
-        at = np.append(route.stop.xy, self.obstacles(route.storeys[-1]).floor_m)
+        at = np.append(route.stop.xy, self._planned(route.storeys[-1])[0].floor_m)
         return {"position": self._world(at), "beside_m": route.stop.beside_m, "seen": bool(route.stop.seen)}
 
     def _forbidden(self, spot: Spot) -> str:
-        obstacles = self.obstacles(spot.storey)
+        obstacles, _ = self._planned(spot.storey)
         return obstacles.forbids(self.avlmap.space.world(np.append(spot.xy, obstacles.floor_m)))
-
-    def _holds(self, spot: Spot) -> bool:
-        return bool(self.planner(spot.storey).costmap.holds(spot.xy))
 
     def _world(self, level: Float[np.ndarray, "3"]) -> list[float]:
         return [float(value) for value in self.avlmap.space.world(level)]

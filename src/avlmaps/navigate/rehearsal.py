@@ -1,13 +1,14 @@
 """A program run on the map alone, before any robot moves: where it would go, and whether it can be done at all."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError, SeveralFitError
+from avlmaps.core.errors import GoalNotFoundError, QueryError, SeveralFitError
 from avlmaps.core.motion import Action, GroundPose, Moved
-from avlmaps.language.program import Budget, Trace, parse_program, run_program
+from avlmaps.language.program import Budget, parse_program, run_program
 from avlmaps.language.translator import LearnedTranslator, Translation
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, BodyShape
@@ -55,17 +56,26 @@ class _StandingDriver:
         return Arrival(True, self.pose, (), np.zeros((1, 2)))
 
 
-def told_by_map(
-    program: str, avlmap: AVLMap, command: str = "", settings: RobotSettings | None = None
-) -> tuple[tuple[str, ...], Trace | None, tuple[str, ...]]:
-    """Return what a drive would report of the map, the run where the map ends it early, and the choices that it asks.
+def consulted(
+    words: str,
+    translation: Translation,
+    avlmap: AVLMap,
+    start: GroundPose,
+    settings: RobotSettings | None = None,
+    heats: Heats | None = None,
+) -> Outcome:
+    """Return what the map says of a program whose every movement is done at once: notes, why it ends early, choices.
 
-    Reported are the map's doubts, how words are taken, what is only a guess, and last of all why it ends early.
+    ``heats`` takes what the map answers, for the drive.
     """
-    robot, trace = _asked_of(program, avlmap, command, GroundPose(0.0, 0.0), settings)
-    missing = None if trace.error is None or trace.error_type == ProgramError.__name__ else trace
-    why = () if missing is None or missing.error is None else (missing.error,)
-    return (*avlmap.doubts_of_drives, *robot.seeker.notes, *why), missing, robot.seeker.choices
+    driver = _StandingDriver(start)
+    robot = Robot(avlmap, driver, settings, offered_by(words), pause=lambda _: None, heats=heats)
+    trace = run_program(parse_program(translation.program), robot)
+    notes = (*avlmap.doubts_of_drives, *translation.notes, *robot.seeker.notes)
+    return Outcome(
+        words, (translation.program,), notes, (), tuple(robot.moves), trace.error, trace.error_type, 0.0,
+        robot.seeker.choices,
+    )  # fmt: skip
 
 
 def unfound(
@@ -73,35 +83,19 @@ def unfound(
     translation: Translation,
     avlmap: AVLMap,
     start: GroundPose,
-    heats: Heats,
     settings: RobotSettings | None = None,
+    heats: Heats | None = None,
 ) -> Outcome | None:
     """Return the outcome of a program that the map lets not run to its end; None for any other.
 
     It would drive and then ask for what the map lacks, or several things fit equally and none was chosen. The program's
-    steps must depend on nothing that a drive would find out. ``heats`` takes what the map answers, for the drive.
+    steps must depend on nothing that a drive would find out.
     """
-    robot, trace = _asked_of(translation.program, avlmap, words, start, settings, heats)
-    asks = trace.error_type == SeveralFitError.__name__
-    if trace.error is None or not (asks or (trace.error_type in _ABSENT and robot.moves)):
+    told = consulted(words, translation, avlmap, start, settings, heats)
+    asks = told.error_type == SeveralFitError.__name__
+    if told.error is None or not (asks or (told.error_type in _ABSENT and told.moves)):
         return None
-    notes = (*avlmap.doubts_of_drives, *translation.notes, *robot.seeker.notes)
-    error = f"{trace.error.rstrip('.')}. The robot was not moved."
-    choices = robot.seeker.choices
-    return Outcome(words, (translation.program,), notes, (), (), error, trace.error_type, 0.0, choices)
-
-
-def _asked_of(
-    program: str,
-    avlmap: AVLMap,
-    command: str,
-    start: GroundPose,
-    settings: RobotSettings | None,
-    heats: Heats | None = None,
-) -> tuple[Robot, Trace]:
-    files = offered_by(command)
-    robot = Robot(avlmap, _StandingDriver(start), settings, files, pause=lambda _: None, heats=heats)
-    return robot, run_program(parse_program(program), robot)
+    return replace(told, moves=(), error=f"{told.error.rstrip('.')}. The robot was not moved.")
 
 
 def rehearse(

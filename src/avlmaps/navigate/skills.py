@@ -207,34 +207,31 @@ class Robot:
 
     def move_to_left(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the left side of a thing, as seen from the robot, that distance from its edge."""
-        thing = self.seeker.referent(target, self._here)
-        self._go_beside("move_to_left", thing, to_the_left(self._towards(thing)), distance_m)
+        self._go_beside("move_to_left", target, lambda ahead: to_the_left(ahead), distance_m)
 
     def move_to_right(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the right side of a thing, as seen from the robot, that distance from its edge."""
-        thing = self.seeker.referent(target, self._here)
-        self._go_beside("move_to_right", thing, -to_the_left(self._towards(thing)), distance_m)
+        self._go_beside("move_to_right", target, lambda ahead: -to_the_left(ahead), distance_m)
 
     def move_behind(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive behind a thing, as seen from the robot, that distance from its edge."""
-        thing = self.seeker.referent(target, self._here)
-        self._go_beside("move_behind", thing, self._towards(thing), distance_m)
+        self._go_beside("move_behind", target, lambda ahead: ahead, distance_m)
 
     def move_north(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the north (+y) of a thing, that distance from its edge."""
-        self._go_beside("move_north", self.seeker.referent(target, self._here), _NORTH, distance_m)
+        self._go_beside("move_north", target, lambda _: _NORTH, distance_m)
 
     def move_south(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the south (−y) of a thing, that distance from its edge."""
-        self._go_beside("move_south", self.seeker.referent(target, self._here), -_NORTH, distance_m)
+        self._go_beside("move_south", target, lambda _: -_NORTH, distance_m)
 
     def move_east(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the east (+x) of a thing, that distance from its edge."""
-        self._go_beside("move_east", self.seeker.referent(target, self._here), _EAST, distance_m)
+        self._go_beside("move_east", target, lambda _: _EAST, distance_m)
 
     def move_west(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the west (−x) of a thing, that distance from its edge."""
-        self._go_beside("move_west", self.seeker.referent(target, self._here), -_EAST, distance_m)
+        self._go_beside("move_west", target, lambda _: -_EAST, distance_m)
 
     def face(self, target: Target) -> None:
         """Turn on the spot until the thing is straight ahead."""
@@ -304,16 +301,22 @@ class Robot:
     def _place(self, level: Float[np.ndarray, "3"]) -> Place:
         return Place(*_triple(self.asked.space.world(level)))
 
-    def _towards(self, thing: Destination) -> Float[np.ndarray, "2"]:
-        bearing = bearing_rad(self._here, thing.outline.centre)
-        bearing = self.driver.pose.heading_rad if bearing is None else bearing
-        return np.array([np.cos(bearing), np.sin(bearing)])
-
-    def _go_beside(self, skill: str, thing: Destination, direction: Float[np.ndarray, "2"], distance_m: float) -> None:
+    def _go_beside(
+        self,
+        skill: str,
+        target: Target,
+        direction: Callable[[Float[np.ndarray, "2"]], Float[np.ndarray, "2"]],
+        distance_m: float,
+    ) -> None:
+        """Drive to a side of a thing: the direction from its middle, by that in which the robot sees it."""
+        thing = self.seeker.referent(target, self._here)
         distance_m = number_of(distance_m, skill, _MOST_M, "metres")
         if distance_m < 0.0:
             raise ProgramError(f"{skill} takes a distance of 0 m or more, not {distance_m:g}; go to the other side.")
-        self._go(skill, thing, self._on_floor(thing.outline.beside(direction, distance_m), thing))
+        bearing = bearing_rad(self._here, thing.outline.centre)
+        bearing = self.driver.pose.heading_rad if bearing is None else bearing
+        side = direction(np.array([np.cos(bearing), np.sin(bearing)]))
+        self._go(skill, thing, self._on_floor(thing.outline.beside(side, distance_m), thing))
 
     def _go(
         self, skill: str, thing: Destination, goal: Float[np.ndarray, "3"], face: Float[np.ndarray, "3"] | None = None

@@ -9,15 +9,13 @@ from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.printable import plot_text
+from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.motion_log import LoggedMove
 from avlmaps.query.plots import INK, TopDown, aside, draw_ground, finish, mark, panels, save
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from avlmaps.maps.obstacles import Obstacles
 
 _WAY = "#d6336c"
 _GOAL = "#1f7a4d"
@@ -31,41 +29,28 @@ def plot_path(
     space: Space,
     start: GroundPose,
     moves: Sequence[LoggedMove],
-    obstacles: "Obstacles | None" = None,
+    obstacles: Obstacles,
     contacts: Float[np.ndarray, "m 2"] | None = None,
     title: str = "",
 ) -> Path:
-    """Write a picture of a robot's path; see ``draw_path``.
-
-    Raises:
-        QueryError: the picture cannot be written there.
-    """
-    return save(draw_path(space, start, moves, obstacles, contacts, title), path)
-
-
-def draw_path(
-    space: Space,
-    start: GroundPose,
-    moves: Sequence[LoggedMove],
-    obstacles: "Obstacles | None" = None,
-    contacts: Float[np.ndarray, "m 2"] | None = None,
-    title: str = "",
-) -> "Figure":
-    """Draw a robot's path, for a notebook.
+    """Write a picture of a robot's path.
 
     Args:
+        path: of the picture.
         space: the map's voxels, with its colours.
         start: where the robot stood at first.
         moves: what it did; those to a place are numbered.
         obstacles: the obstacles that the map knows.
         contacts: (m, 2) places where it touched something that the map did not know, level x and y.
         title: such as the command.
+
+    Raises:
+        QueryError: the picture cannot be written there.
     """
     view = TopDown.of(space)
     figure, (ax,) = panels(view, 1)
     draw_ground(ax, view, space, with_walk=False)
-    if obstacles is not None:
-        _draw_obstacles(ax, obstacles)
+    _draw_obstacles(ax, obstacles)
     for move in moves:
         ax.plot(*move.path.T, color="white", linewidth=3.2, alpha=0.9, zorder=4)
         ax.plot(*move.path.T, color=_WAY, linewidth=1.8, zorder=5)
@@ -76,12 +61,10 @@ def draw_path(
         _draw_subgoal(ax, space, number, move)
     ax.set_title(plot_text(title), fontsize=10, color=INK, loc="left", fontweight="bold", wrap=True)
     finish(figure, [ax], with_heat=False)
-    return figure
+    return save(figure, path)
 
 
-def _draw_obstacles(ax: "Axes", obstacles: "Obstacles") -> None:
-    from avlmaps.maps.obstacles import CellState
-
+def _draw_obstacles(ax: "Axes", obstacles: Obstacles) -> None:
     layer = np.zeros((*obstacles.states.T.shape, 4))
     layer[obstacles.states.T == CellState.OCCUPIED] = _OBSTACLE_RGBA
     low = obstacles.origin_m

@@ -87,13 +87,10 @@ class ListedThingsQuery(ThingsQuery):
     at: Annotated[Short | None, Meta(description=f"of a map of several days: {_DAY}")] = None
 
 
-class ThingsToolQuery(ThingsQuery):
+class ThingsToolQuery(ListedThingsQuery):
     """Which things an agent reads."""
 
-    room: Annotated[Name | None, Meta(description="one, or all of a kind")] = None
-    near: Annotated[Name | None, Meta(description="x,y,z or a thing's name: nearest first")] = None
     top: Top = 10
-    page: Page = 1
 
 
 class RoomsQuery(Request):

@@ -5,7 +5,7 @@ What cannot be answered raises an ``AvlmapsError``; ``lanes.described`` gives it
 
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict, TypeVar
@@ -39,7 +39,6 @@ from avlmaps.query.schema import (
 )
 from avlmaps.query.selection import (
     MapLists,
-    Selected,
     ThingsPage,
     Wanted,
     beyond,
@@ -49,7 +48,6 @@ from avlmaps.query.selection import (
     selected,
     things_with_rooms,
 )
-from avlmaps.query.whereabouts import Whereabouts
 from avlmaps.query.words import unknown_note
 from avlmaps.serve import requests
 from avlmaps.serve.drawn import Pyramid, TilesAnswer, full_picture, map_picture, small_picture
@@ -338,26 +336,33 @@ def describe_building(task: WorkInput, query: NoQuery) -> dict[str, Any]:
             for floor in range(where.floor_count)
         ],
         "things": len(things),
-        "names": _kinds(things),
-        "sounds": _kinds([{"name": _first_name(sound)} for sound in lists.sounds()]),
+        "names": _kinds(thing["name"] for thing in things),
+        "sounds": _kinds(map(_first_name, lists.sounds())),
     }
 
 
 def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, Any]:
     """Return the things of a room, or near a place, or of a name; a page of them."""
     lists = lists_of(task)
-    where, names = lists.avlmap.where, query.name
-    unknown = [name for name in names if not task.map.avlmap.knows(name)]
-    known = [name for name in names if name not in unknown]
+    rooms, names = lists.avlmap.where.names, query.name
+    known = [name for name in names if task.map.avlmap.knows(name)]
+    unknown = [name for name in names if name not in known]
     wanted = Wanted(**{**msgspec.structs.asdict(query), "name": known})
     chosen, near = selected(lists, wanted) if known or not names else ([], None)
+    rows: list[dict[str, Any]] = [
+        {
+            **{key: one.thing[key] for key in ("name", "confidence", "position", "size")},
+            "room": rooms[one.room] if one.room >= 0 else None,
+            "distance_m": one.away_m,
+            "heard": one.thing.get("heard", [])[:_MOST_HEARD] or None,
+        }
+        for one in chosen
+    ]
     about: dict[str, Any] = {"near": near}
-    rows = [_thing_row(one, where) for one in chosen]
-    notes = [unknown_note(unknown[0])] if unknown else beyond(lists, query.room, near)
-    if notes:
+    if notes := [unknown_note(unknown[0])] if unknown else beyond(lists, query.room, near):
         about["note"] = notes[0]
     if not names and len(rows) > query.top:
-        about["names"] = _kinds(rows)
+        about["names"] = _kinds([row["name"] for row in rows])
     return _paged(task, "things", rows, query.top, query.page) | about
 
 
@@ -409,27 +414,15 @@ def tool_sounds(task: WorkInput, query: requests.SoundsToolQuery) -> dict[str, A
     return _paged(task, "sounds", rows, query.top, query.page)
 
 
-def _thing_row(one: Selected, where: Whereabouts) -> dict[str, Any]:
-    return {
-        "name": one.thing["name"],
-        "confidence": one.thing["confidence"],
-        "position": one.thing["position"],
-        "size": one.thing["size"],
-        "room": where.names[one.room] if one.room >= 0 else None,
-        "distance_m": one.away_m,
-        "heard": one.thing.get("heard", [])[:_MOST_HEARD] or None,
-    }
-
-
 def _paged(task: WorkInput, key: str, rows: list[dict[str, Any]], top: int, page: int) -> dict[str, Any]:
     shown, pages = page_of(rows, top, page, key)
     paging = {"page": page, "pages": pages} if pages > 1 else {}
     return {"map": task.map.name, "frame": FRAME, "total": len(rows), **paging, key: shown}
 
 
-def _kinds(rows: Sequence[Any]) -> dict[str, int]:
+def _kinds(names: Iterable[str]) -> dict[str, int]:
     """Return how often each name occurs, the most common first; ``other names`` counts the rest."""
-    ordered = Counter(row["name"] for row in rows).most_common()
+    ordered = Counter(names).most_common()
     rest = sum(count for _, count in ordered[_MOST_KINDS:])
     return dict(ordered[:_MOST_KINDS]) | ({"other names": rest} if rest else {})
 

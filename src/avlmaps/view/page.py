@@ -28,7 +28,6 @@ SCRIPTS = ("matrix.js", "source.js", "shaders.js", "renderer.js", "camera.js", "
            "saving.js", "panel.js")  # fmt: skip
 _MARK = re.compile(r"\{\{(\w+)\}\}")
 _MOST_PICTURES = 60
-_MOST_QUESTIONS = 8
 # Voxels of a map in a file. Of a larger one a file shows one voxel of each small block, so that it stays within some
 # 30 MB and opens in a browser; answers and heat are computed on all voxels.
 MOST_VOXELS = 1_500_000
@@ -63,8 +62,7 @@ def write_page(
         QueryError: a question is not understood, or the file cannot be written.
     """
     shown = [MapOnPage(avlmap, MOST_VOXELS) for avlmap in maps]
-    large = max(len(avlmap.space) for avlmap in maps) > MOST_VOXELS
-    sentences = list(questions) or default_questions(shown[0].labels, few=large)
+    sentences = list(questions) or default_questions(shown[0].labels)
     data: dict[str, Any] = {
         "maps": [one.layout.describe() for one in shown],
         "palettes": palettes(),
@@ -97,29 +95,21 @@ def write_page(
     }
 
 
-def default_questions(labels: "Labels", *, few: bool = False) -> "list[tuple[str, Question]]":
-    """Return queries that fit a map, with their titles: its most certain things, a sound, a room, and two together.
+def default_questions(labels: "Labels") -> "list[tuple[str, Question]]":
+    """Return queries that fit a map, with their titles: its most certain things, a sound, a room, a thing in a room.
 
     The names are the map's own, so the parts are given as they are: a sentence would have to be read again.
-
-    Args:
-        labels: the contents of the map.
-        few: two things, a sound and a room alone: on a large map, where each takes a second.
     """
     things = list(dict.fromkeys(thing.name for thing in labels.things))
     rooms = list(dict.fromkeys(room.name for room in labels.rooms))
     sounds = list(dict.fromkeys(sound.names[0] for sound in labels.sounds if sound.names))
     thing, sound, room = (partial(Part, modality) for modality in (Modality.OBJECT, Modality.SOUND, Modality.AREA))
-    parts = [(f"the {name}", [thing(name)]) for name in things[: 2 if few else 4]]
+    parts = [(f"the {name}", [thing(name)]) for name in things[:3]]
     parts += [(f"the sound of {name}", [sound(name)]) for name in sounds[:1]]
     parts += [(f"the {name}", [room(name)]) for name in rooms[:1]]
-    if few:
-        return [(title, Question.of(of)) for title, of in parts]
     if things and rooms:
         parts.append((f"the {things[0]} in the {rooms[0]}", [thing(things[0]), room(rooms[0])]))
-    if len(things) > 1 and sounds:
-        parts.append((f"the {things[1]} near the sound of {sounds[0]}", [thing(things[1]), sound(sounds[0])]))
-    return [(title, Question.of(of)) for title, of in parts[:_MOST_QUESTIONS]]
+    return [(title, Question.of(of)) for title, of in parts]
 
 
 def _page(title: str, data: dict[str, Any] | None) -> str:

@@ -14,7 +14,7 @@ from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose
 from avlmaps.language.translator import LearnedTranslator, explanation
 from avlmaps.navigate.bodies import BASE, BodyShape
-from avlmaps.navigate.costmap import costmap_of, obstacles_for
+from avlmaps.navigate.costmap import obstacles_for
 from avlmaps.navigate.driver import MapDriver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.instruct import Outcome, given_by, instruct
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 MakeRobot = Callable[["AVLMap"], "Driver"]
 """Puts a robot that really moves (a simulated one) into the world that a map was made of."""
 _MOST_READINGS = 5
-_MARGIN_M = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,7 +90,7 @@ class Guide:
 
         Args:
             command: what a person says.
-            start: where it begins without a robot, level frame; near where the walk began if None.
+            start: where it begins without a robot, level frame; where the walk began if None.
             folder: whose files a program may read.
             photo: file in the folder that "this photo" means.
             clip: file in the folder that "this recording" means.
@@ -142,20 +141,12 @@ class Guide:
         return self._robot
 
     def _start(self) -> GroundPose:
-        obstacles = self.obstacles
-        costmap = costmap_of(obstacles, self._shape.radius_m)
-        places = costmap.middle_of(np.argwhere(costmap.passable & (costmap.room_m >= self._shape.radius_m + _MARGIN_M)))
-        if not len(places):
-            raise NavigationError("Nowhere in the map is there room for the robot; map more of the floor.")
-        level = np.asarray(obstacles.level_from_world)
+        """Return where the walk began; from there the robot gets out to the floor that it may stand on."""
         cameras = np.asarray(self.avlmap.data.keyframes.world_from_camera)
-        begin, heading = places.mean(axis=0), 0.0
-        if len(cameras):
-            begin = (level @ cameras[0, :3, 3])[:2]
-            ahead = level @ cameras[0, :3, 2]
-            heading = float(np.arctan2(ahead[1], ahead[0]))
-        x, y = places[np.argmin(np.linalg.norm(places - begin, axis=1))]
-        return GroundPose(float(x), float(y), heading)
+        if not len(cameras):
+            raise NavigationError("The map has no keyframe that says where its walk began; give a start.")
+        level = np.asarray(self.obstacles.level_from_world) @ cameras[0, :3]
+        return GroundPose(float(level[0, 3]), float(level[1, 3]), float(np.arctan2(level[1, 2], level[0, 2])))
 
     def _on_floor(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
         return np.column_stack([xy, np.full(len(xy), self.obstacles.floor_m)])
