@@ -7,7 +7,6 @@ import os
 import pty
 import re
 import select
-import shutil
 import signal
 import subprocess
 import sys
@@ -20,7 +19,6 @@ from typing import Any
 import cv2
 import pytest
 
-from avlmaps.cli.shell import piped_lines
 from avlmaps.core.extras import install_command
 from helpers.raycast import render
 from helpers.room import Room
@@ -129,30 +127,6 @@ def test_without_a_scene_nothing_is_driven(piped, built: Path) -> None:
     assert status == 1, "y is not a question"
     assert "robot.move_to_object" in out and "planned only" in out
     assert "Drive this plan" not in err
-
-
-def test_a_map_that_is_replaced_is_opened_again(piped, built: Path, tmp_path: Path, monkeypatch) -> None:
-    copy = tmp_path / "copy.avlmap"
-    shutil.copytree(built, copy)
-
-    def lines() -> Iterator[str]:
-        yield "info\n"
-        manifest = copy / "map.json"
-        content = manifest.read_bytes()
-        manifest.unlink()
-        manifest.write_bytes(content)
-        os.utime(manifest, ns=(1, 1))
-        yield "rooms\n"
-
-    class Stream(io.StringIO):
-        def readline(self, size: int = -1, /) -> str:
-            return next(source, "")
-
-    source = lines()
-    monkeypatch.setattr("avlmaps.cli.shell._piped", lambda: piped_lines(Stream()))
-    status, _, err = piped("", copy, "--json")
-    assert status == 0
-    assert "was replaced on disk and is opened again" in err
 
 
 class Terminal:

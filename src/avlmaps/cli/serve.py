@@ -2,6 +2,7 @@
 
 import logging
 import sys
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -13,7 +14,6 @@ from avlmaps.cli.verb import PORT, Asking, ModelVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
-    from avlmaps.serve.drive.app import DriveService
     from avlmaps.serve.service import Service
 
 
@@ -93,15 +93,17 @@ def serve(verb: "Serve") -> None:
         _serve_stdio(Service.open(maps, settings, say))
         return
     from avlmaps.serve.app import create_app
-    from avlmaps.serve.drive.app import PATH
+    from avlmaps.serve.drive.app import PATH, open_driving
 
-    with listening_socket(settings) as opened:
+    with listening_socket(settings) as opened, ExitStack() as stack:
         service = Service.open(maps, settings, say)
-        url = url_of(settings, opened)
-        driving = _driving(verb, service)
+        stack.callback(service.close)
+        driving = None if verb.drive is None else open_driving(verb.drive, service, verb.drive_log)
+        if driving is not None:
+            stack.callback(driving.dispatcher.close)
+        names, url = list(service.shelf.names), url_of(settings, opened)
 
         def started() -> None:
-            names = list(service.shelf.names)
             lines = [f"serving {', '.join(names)} at {url} (operations: {url}/, agents: {url}/mcp)"]
             if not settings.is_loopback and settings.scheme == "http":
                 say("note: the token goes over the network unencrypted; give --tls-cert and --tls-key for https.")
@@ -113,35 +115,18 @@ def serve(verb: "Serve") -> None:
             emit(answer, lines, verb.json)
             sys.stdout.flush()  # a program that started the server reads its address from a pipe
 
-        try:
-            if driving is None:
-                run_http(create_app(service), service, opened, started)
-            else:
-                run_http(create_app(service, {PATH: driving.app}), service, opened, started, driving.end)
-        finally:
-            if driving is not None:
-                driving.dispatcher.close()
-            service.close()
-        if driving is not None and driving.dispatcher.fault:
-            from avlmaps.navigate.interrupts import UNCONFIRMED_STATUS
+        if driving is None:
+            run_http(create_app(service), service, opened, started)
+        else:
+            run_http(create_app(service, {PATH: driving.app}), service, opened, started, driving.end)
+    if driving is not None and driving.dispatcher.fault:
+        from avlmaps.navigate.interrupts import UNCONFIRMED_STATUS
 
-            raise AnsweredError(
-                f"The robot did not confirm that it stands ({driving.dispatcher.fault.rstrip('.')}), and may still be "
-                "driving; use its own stop.",
-                UNCONFIRMED_STATUS,
-            )
-
-
-def _driving(verb: "Serve", service: "Service") -> "DriveService | None":
-    if verb.drive is None:
-        return None
-    from avlmaps.serve.drive.app import open_driving
-
-    try:
-        return open_driving(verb.drive, service, verb.drive_log)
-    except BaseException:
-        service.close()
-        raise
+        raise AnsweredError(
+            f"The robot did not confirm that it stands ({driving.dispatcher.fault.rstrip('.')}), and may still be "
+            "driving; use its own stop.",
+            UNCONFIRMED_STATUS,
+        )
 
 
 def _serve_stdio(service: "Service") -> None:

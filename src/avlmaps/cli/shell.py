@@ -123,21 +123,7 @@ class ShellSession:
         self._names: tuple[str, ...] | None = None
         self._unchosen: tuple[str, str, tuple[int, ...]] | None = None
         self._lock = Lock()
-        self._seen, self._opened = self._stamp, given.opened()
-
-    @property
-    def _stamp(self) -> object | None:
-        from avlmaps.maps.store.folder import MANIFEST, stamp
-
-        return stamp(self.given.map / MANIFEST)
-
-    @property
-    def opened(self) -> "AVLMap":
-        if (now := self._stamp) not in (self._seen, None):
-            self._seen, self._opened = now, self.given.opened()
-            self._names, self._robot = None, None
-            say(f"note: {self.given.map} was replaced on disk and is opened again.")
-        return self._opened
+        self.opened = given.opened()
 
     def answer(self, line: str, confirms: Callable[[str], bool]) -> Reply:
         word, _, rest = line.partition(" ")
@@ -162,7 +148,7 @@ class ShellSession:
         """Return the names of what the map holds, those of things first; none while a question is being answered."""
         if self._names is None and self._lock.acquire(blocking=False):
             try:
-                self._names = _names_in(self._opened)
+                self._names = _names_in(self.opened)
             except AvlmapsError:  # the map can be queried in part; the lexicon's names are still completed
                 self._names = ()
             finally:

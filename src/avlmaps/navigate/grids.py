@@ -1,4 +1,4 @@
-"""The floor grid: a graph of its cells for Dijkstra, loops over lines, and what is near and what is seen.
+"""The floor grid: a graph of its cells for Dijkstra, costs of lines, and what is near and what is seen.
 
 Grids are indexed (i, j) for x and y; places are in cells, so that cell (i, j) covers [i, i + 1) x [j, j + 1).
 """
@@ -8,10 +8,11 @@ from typing import Self
 
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int
-from numba import njit
 from scipy.sparse import csgraph, csr_array
 
 _SAMPLE = 0.2  # of a line of sight, cells
+_CORNER, _BESIDE = 1e-9, 1e-6  # a piece of a line that is no longer is a corner, whose cells lie beside it; cells
+_WINDOW = 24  # points that a shortcut may leap
 # Half of the sixteen neighbours, each with the cells that a step there passes or touches; the others are the reverse.
 _STEPS: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {
     (1, 0): (), (0, 1): (), (1, 1): ((1, 0), (0, 1)), (1, -1): ((1, 0), (0, -1)),
@@ -98,78 +99,55 @@ def farthest_opaque(
     return np.where(blocked, part * length[:, None], -1.0).max(axis=1, initial=-1.0)
 
 
-@njit(cache=True)
-def line_cost(ax, ay, bx, by, passable, cost, most):  # noqa: C901  # pragma: no cover - compiled
-    """Return the cost of a straight line (cost of a cell times the length within it).
+def line_costs(
+    starts: Float[np.ndarray, "n 2"],
+    ends: Float[np.ndarray, "n 2"],
+    passable: Bool[np.ndarray, "nx ny"],
+    cost: Float[np.ndarray, "nx ny"],
+) -> Float64[np.ndarray, " n"]:
+    """Return the cost of straight lines: a cell's cost times the length within it.
 
-    It is inf where the line touches a cell that is not passable, a corner included, and where it exceeds ``most``.
+    It is inf where a line touches a cell that is not passable, a corner included.
     """
-    nx, ny = passable.shape
-    length = np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
-    i, j = int(np.floor(ax)), int(np.floor(ay))
-    for c, d in ((i, j), (int(np.floor(bx)), int(np.floor(by)))):
-        if not (0 <= c < nx and 0 <= d < ny) or not passable[c, d]:
-            return np.inf
-    step_i, step_j = (1 if bx > ax else -1), (1 if by > ay else -1)
-    # The parts of the line at which it crosses into the next cell along an axis, and between two crossings.
-    next_i, delta_i, next_j, delta_j = np.inf, np.inf, np.inf, np.inf
-    if bx != ax:
-        next_i, delta_i = ((i + 1 - ax) if step_i > 0 else (ax - i)) / abs(bx - ax), 1.0 / abs(bx - ax)
-    if by != ay:
-        next_j, delta_j = ((j + 1 - ay) if step_j > 0 else (ay - j)) / abs(by - ay), 1.0 / abs(by - ay)
-    at, total = 0.0, 0.0
-    while True:
-        to = min(next_i, next_j, 1.0)
-        total += (to - at) * length * cost[i, j]
-        if total > most:
-            return np.inf
-        if to >= 1.0 - 1e-12:
-            return total
-        at = to
-        if abs(next_i - next_j) < 1e-9:  # through a corner: the cells beside it are touched
-            for c, d in ((i + step_i, j), (i, j + step_j)):
-                if not (0 <= c < nx and 0 <= d < ny) or not passable[c, d]:
-                    return np.inf
-        if next_i <= to + 1e-9:
-            i += step_i
-            next_i += delta_i
-        if next_j <= to + 1e-9:
-            j += step_j
-            next_j += delta_j
-        if not (0 <= i < nx and 0 <= j < ny) or not passable[i, j]:
-            return np.inf
+    toward = ends - starts
+    length = np.hypot(*toward.T)
+    crossings = [np.zeros((len(ends), 1)), np.ones((len(ends), 1))]  # into other cells, as parts of each line
+    for axis in (0, 1):
+        both = np.concatenate([starts[:, axis], ends[:, axis]])
+        lines = np.arange(np.ceil(both.min()), np.floor(both.max()) + 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crossings.append((lines - starts[:, axis, None]) / toward[:, axis, None])
+    part = np.sort(np.clip(np.nan_to_num(np.concatenate(crossings, axis=1)), 0.0, 1.0), axis=1)
+    piece, middle = np.diff(part, axis=1), 0.5 * (part[:, 1:] + part[:, :-1])
+    place = starts[:, None] + middle[..., None] * toward[:, None]
+    beside = _BESIDE * np.stack([-toward[:, 1], toward[:, 0]], axis=1) / np.maximum(length, 1e-12)[:, None]
+    grid = np.pad(passable, 1)
+    is_open = grid[_cells(place, grid.shape)] | (piece <= _CORNER)
+    is_corner = (piece <= _CORNER) & (middle > 0.0) & (middle < 1.0)
+    for side in (-1.0, 1.0):
+        is_open &= grid[_cells(place + side * beside[:, None], grid.shape)] | ~is_corner
+    total = length * (piece * np.pad(cost, 1)[_cells(place, grid.shape)]).sum(axis=1)
+    return np.where(is_open.all(axis=1), total, np.inf)
 
 
-@njit(cache=True)
-def shortcuts(points, passable, cost, window):  # pragma: no cover - compiled
-    """Return which points of a path to keep, so that straight lines between them cost least.
+def _cells(places: Float[np.ndarray, "n k 2"], shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cells of places on a grid with a margin of one cell, which is all that lies beyond."""
+    i, j = np.clip(np.floor(places) + 1, 0, np.array(shape) - 1).astype(np.int64).transpose(2, 0, 1)
+    return i, j
 
-    Args:
-        points: (n, 2) in cells; neighbours are joined by free straight lines.
-        passable: cells that a line may touch.
-        cost: of a cell's length within a cell.
-        window: limit of the points that a line leaps over.
-    """
-    count = points.shape[0]
-    best = np.full(count, np.inf)
-    before = np.zeros(count, np.int64)
-    best[0] = 0.0
-    for b in range(1, count):
-        for back in range(1, min(window, b) + 1):
-            a = b - back
-            most = best[b] - best[a]
-            if np.hypot(points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]) >= most - 1e-9:
-                continue  # a cell costs at least 1, so this line costs at least its length
-            piece = line_cost(points[a, 0], points[a, 1], points[b, 0], points[b, 1], passable, cost, most)
-            if back == 1 and not np.isfinite(piece) and not np.isfinite(best[b]):
-                piece = 1e6 + np.hypot(points[a, 0] - points[b, 0], points[a, 1] - points[b, 1])
-            if best[a] + piece < best[b]:
-                best[b] = best[a] + piece
-                before[b] = a
-    kept = np.zeros(count, np.bool_)
-    at = count - 1
-    while at > 0:
-        kept[at] = True
-        at = before[at]
-    kept[0] = True
-    return kept
+
+def straightened(
+    points: Float[np.ndarray, "n 2"], passable: Bool[np.ndarray, "nx ny"], cost: Float[np.ndarray, "nx ny"]
+) -> Float[np.ndarray, "m 2"]:
+    """Pull a path straight wherever that costs no more, from its beginning and then from its end; in cells."""
+    for _ in range(2):
+        along = np.append(0.0, np.cumsum(line_costs(points[:-1], points[1:], passable, cost)))
+        kept = [0]
+        while kept[-1] < len(points) - 1:
+            at = kept[-1]
+            ahead = np.arange(at + 1, min(at + 1 + _WINDOW, len(points)))
+            straight = line_costs(np.repeat(points[[at]], len(ahead), axis=0), points[ahead], passable, cost)
+            no_dearer = ahead[straight <= along[ahead] - along[at] + 1e-9]
+            kept.append(int(no_dearer[-1]) if len(no_dearer) else at + 1)
+        points = points[kept[::-1]]
+    return points

@@ -2,17 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int
 
 from avlmaps.navigate.costmap import Costmap
-from avlmaps.navigate.grids import CellGraph, farthest_opaque, line_cost, shortcuts
+from avlmaps.navigate.grids import CellGraph, farthest_opaque, line_costs, straightened
 
 _EVERY = 8  # cells of a straight run of a path from which shortcuts may begin
-_WINDOW = 24  # such points that a shortcut may leap
 
 
 ESCAPE_M = 1.0  # how far a body that stands where the map lets none stand may go straight to get out
@@ -85,7 +83,7 @@ class Planner:
         if out is None:
             return None
         ends = np.array([self.costmap.in_cells(out), self.costmap.in_cells(goal)])
-        between = self._cells.path(self.costmap.cell_of(out), self.costmap.cell_of(goal))[1:-1] + 0.5
+        between = self._cells.path(self.costmap.cell_of(out), self.costmap.cell_of(goal)) + 0.5
         corners = np.concatenate([ends[:1], between, ends[1:]])
         return self._measured(self._straightened(corners), None if out is start else start)
 
@@ -153,15 +151,14 @@ class Planner:
         """Pull a path straight wherever that costs no more, clearance included; in cells."""
         passable, cost = self.costmap.passable, self.costmap.cost
         step = np.round(np.diff(corners, axis=0), 6)
-        turns = np.r_[True, (step[1:] != step[:-1]).any(axis=1), True] if len(step) else np.ones(len(corners), bool)
+        turns = np.r_[True, (step[1:] != step[:-1]).any(axis=1), True]
         turns |= np.arange(len(corners)) % _EVERY == 0
-        thinned = np.ascontiguousarray(corners[turns])
-        return thinned[shortcuts(thinned, passable, cost, _WINDOW)]
+        return straightened(corners[turns], passable, cost)
 
     def _measured(self, points: Float[np.ndarray, "n 2"], before: Float[np.ndarray, "2"] | None) -> PlannedPath:
         costmap = self.costmap
         passable, cells_cost = costmap.passable, costmap.cost
-        cost = sum(line_cost(a[0], a[1], b[0], b[1], passable, cells_cost, np.inf) for a, b in pairwise(points))
+        cost = line_costs(points[:-1], points[1:], passable, cells_cost).sum()
         xy = costmap.origin_m + points * costmap.cell_size_m
         if before is not None:
             xy = np.concatenate([[before], xy])
