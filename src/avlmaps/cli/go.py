@@ -264,8 +264,10 @@ def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
     from avlmaps.language.translator import LearnedTranslator
     from avlmaps.navigate.instruct import given_by
 
-    files = [None if file is None else str(file) for file in (verb.image, verb.sound_clip)]
-    known = Attachments(*files, at=verb.at) if avlmap is None else given_by(avlmap, *files, said=verb.sentence)
+    image, clip = (None if file is None else str(file) for file in (verb.image, verb.sound_clip))
+    known = Attachments(image, clip, at=verb.at)
+    if avlmap is not None:
+        known = given_by(avlmap, image, clip, said=verb.sentence)
     number = next(iter(verb.choose), None)
     if verb.language != "local":
         return LearnedTranslator(known, number)

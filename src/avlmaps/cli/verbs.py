@@ -138,8 +138,10 @@ def _options(verb: type[Any]) -> tuple[str, ...]:
     names = ["--help"]
     for each in dataclasses.fields(verb):
         group = each.default_factory
-        is_group = isinstance(group, type) and dataclasses.is_dataclass(group)
-        names += _options(group) if is_group else [f"--{each.name.replace('_', '-')}"]
+        if isinstance(group, type) and dataclasses.is_dataclass(group):
+            names += _options(group)
+        else:
+            names.append(f"--{each.name.replace('_', '-')}")
     return tuple(names)
 
 

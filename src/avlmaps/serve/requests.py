@@ -90,7 +90,7 @@ class ListedThingsQuery(ThingsQuery):
 class ThingsToolQuery(ListedThingsQuery):
     """Which things an agent reads."""
 
-    top: Top = 10
+    top: Top = 10  # pyright: ignore[reportIncompatibleVariableOverride] - always a page
 
 
 class RoomsQuery(Request):

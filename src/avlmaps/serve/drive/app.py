@@ -10,7 +10,7 @@ import signal
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
-from functools import cached_property, partial
+from functools import cached_property
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -67,8 +67,9 @@ class DriveService:
     async def stop(self, query: NoQuery, who: Who) -> dict[str, Any]:
         """Stop the robot: the brake at once, here; the robot's confirmation in a thread."""
         self.dispatcher.brake_now()
-        stop = partial(copy_context().run, self.dispatcher.stop, who)
-        return await asyncio.get_running_loop().run_in_executor(self.stops, stop)
+        run = copy_context().run
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self.stops, lambda: run(self.dispatcher.stop, who))
 
     async def status(self, query: NoQuery, who: Who) -> dict[str, Any]:
         """Return what the robot is at."""
