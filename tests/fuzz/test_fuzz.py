@@ -44,6 +44,7 @@ def test_a_wrong_recording_is_refused_or_doubted_or_makes_a_right_map(tmp_path: 
     assert {"told", "sentence"} <= {str(line["verdict"]) for line in lines}
 
 
+@pytest.mark.nightly
 def test_a_change_that_cannot_read_what_another_left_does_not_end_the_campaign(
     seeds: dict[str, Path], tmp_path: Path
 ) -> None:

@@ -44,7 +44,7 @@ def test_a_bag_gives_back_the_truth_that_was_written(tmp_path: Path, name: str) 
     assert recording.up_in_world is not None
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", ["ROS 1", "ROS 1, split", "MCAP of ROS 1", "Foxglove, protobuf", "Foxglove, JSON"])
 def test_a_damaged_bag_is_a_sentence_or_fewer_frames(tmp_path: Path, name: str) -> None:
     path = BAGS[name](tmp_path / "walk", example_truth())
@@ -195,7 +195,7 @@ def test_messages_in_another_coding_are_refused_by_its_name(tmp_path: Path) -> N
         open_recording(file.save(tmp_path / "walk"))
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", ["ROS 1", "ROS 2", "ROS 2, MCAP", "MCAP of ROS 1", "Foxglove, protobuf"])
 def test_a_bag_that_is_cut_off_anywhere_is_refused(tmp_path: Path, kind: str) -> None:
     path = BAGS[kind](tmp_path / "bag", example_truth())

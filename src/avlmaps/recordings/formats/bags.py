@@ -305,12 +305,6 @@ class RosbagsContainer:
                     "it was cut off while recording, fix it with `rosbag reindex`, `ros2 bag reindex` or `mcap "
                     "recover`."
                 ) from error
-            names: list[Any] = [connection.topic for connection in reader.connections]
-            if odd := [name for name in names if not isinstance(name, str)]:  # as YAML reads an unquoted number
-                raise RecordingError(
-                    f"{self.files[0]} lists a topic called {odd[0]!r}, which is no text; fix its metadata.yaml with "
-                    "`ros2 bag reindex`."
-                )
             self._local.reader = reader
         return self._local.reader
 

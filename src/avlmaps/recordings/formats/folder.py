@@ -106,8 +106,9 @@ def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> 
 
 
 def _check_clocks(folder: Path, description: Description, found: "_Pictures", known: PoseTable) -> None:
-    rate_hz = description.rgb_rate_hz or description.pose_rate_hz
-    for what, stamps_s in (("frames", found.stamps_s), (f"poses of {layout.POSES}", known.stamps_s)):
+    rgb_hz, pose_hz = description.rgb_rate_hz, description.pose_rate_hz
+    of_poses = f"poses of {layout.POSES}", known.stamps_s, pose_hz or rgb_hz
+    for what, stamps_s, rate_hz in (("frames", found.stamps_s, rgb_hz or pose_hz), of_poses):
         rising = np.zeros(0) if stamps_s is None else np.sort(stamps_s[np.isfinite(stamps_s)])
         if fault := pace_fault(rising, what, 1.0 / rate_hz if rate_hz else None):
             raise RecordingError(f"{folder}: {fault}")

@@ -72,10 +72,9 @@ def open_rosbag(path: Path, topics: Mapping[str, str] | None = None, more: Seque
             raise RecordingError(f"There is no {name!r} among the topics that can be named: {', '.join(known)}.")
     try:
         return _opened(Bag(Path(path), more), RosTopics(**(topics or {})))
-    except AttributeError as error:
+    except (AttributeError, TypeError) as error:  # a message lacks a field, or a topic's name is no text
         raise RecordingError(
-            f"A message of {path} lacks a field ({error}); the bag's definition of it is damaged, or of another "
-            "version."
+            f"{path} cannot be read ({error}); its definitions are damaged, or of another version: reindex it."
         ) from error
 
 
