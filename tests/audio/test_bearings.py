@@ -12,7 +12,7 @@ from avlmaps.maps.sources.candidates import Candidates, Walls, candidates_of
 from avlmaps.maps.sources.correlation import SourceSettings
 from avlmaps.maps.sources.find import find_sources
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.directions import DirectionTrack
+from avlmaps.recordings.microphones import DirectionTrack
 from helpers.heard_in_the_open import curved_drive
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -17,8 +17,7 @@ from avlmaps.maps.types import SourceEvidence
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import ChannelSound, with_microphones, write_channels
-from avlmaps.recordings.directions import DirectionTrack
-from avlmaps.recordings.microphones import microphones_named
+from avlmaps.recordings.microphones import DirectionTrack, microphones_named
 from helpers.heard_in_the_open import curved_drive
 
 WALK = curved_drive(28.0, 2.0)

@@ -17,9 +17,9 @@ from avlmaps.core.wording import Spelling, asked_as, options_as
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.channels import level_faults
 from avlmaps.recordings.conformance import example_truth, see
+from avlmaps.recordings.consistency.agreement import choose_pairs
 from avlmaps.recordings.consistency.check import Grade, Reason, Verdict, check_recording
 from avlmaps.recordings.consistency.readings import Reading, rig_of
-from avlmaps.recordings.consistency.sample import choose_pairs
 from avlmaps.recordings.consistency.suspicions import examine_recording
 from avlmaps.recordings.corrections import Corrections, opencv_from_axes
 from avlmaps.recordings.memory import MemoryRecording, is_of_program

@@ -14,7 +14,7 @@ from avlmaps.core.poses import from_quaternion
 from avlmaps.maps import hearing
 from avlmaps.maps.plan import audio_key
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.directions import DIRECTIONS, DirectionTrack, read_directions, write_directions
+from avlmaps.recordings.microphones import DIRECTIONS, DirectionTrack, read_directions, write_directions
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter

@@ -41,9 +41,8 @@ from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.query.avlmap import AVLMap, with_findings
 from avlmaps.query.settings import QuerySettings
 from avlmaps.query.voxel_map import IN_MEMORY, direction, require_kinds
-from avlmaps.recordings.directions import given_directions
 from avlmaps.recordings.memory import given_frame, next_of
-from avlmaps.recordings.microphones import Microphones, given_microphones
+from avlmaps.recordings.microphones import Microphones, given_directions, given_microphones
 from avlmaps.recordings.plausible import date_fault
 from avlmaps.recordings.types import Frame
 

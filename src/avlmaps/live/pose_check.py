@@ -12,12 +12,13 @@ from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.recordings.channels import LONGEST_GAP_S
 from avlmaps.recordings.consistency.agreement import (
     LEAST_AGREEING,
+    Surfaces,
     can_be_judged,
     compare,
+    draw_pairs,
     geometry_agrees,
     without_occluded,
 )
-from avlmaps.recordings.consistency.sample import Surfaces, draw_pairs
 from avlmaps.recordings.memory import MemoryRecording
 from avlmaps.recordings.plausible import pace_fault
 from avlmaps.recordings.types import Frame

@@ -27,8 +27,7 @@ from avlmaps.maps.types import HeardSounds, SourceEvidence
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import LONGEST_GAP_S, ChannelSound, GrowingTrack, RawTrack, level_faults
-from avlmaps.recordings.directions import DirectionTrack
-from avlmaps.recordings.microphones import Microphones
+from avlmaps.recordings.microphones import DirectionTrack, Microphones
 from avlmaps.recordings.plausible import date_fault
 from avlmaps.recordings.types import Recording
 

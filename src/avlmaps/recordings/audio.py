@@ -11,8 +11,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AudioError
 from avlmaps.core.numbers import as_whole
-from avlmaps.recordings.directions import DirectionTrack
-from avlmaps.recordings.microphones import Microphones
+from avlmaps.recordings.microphones import DirectionTrack, Microphones
 
 LOWEST_RATE_HZ = 1000
 

@@ -21,9 +21,8 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.channels import ChannelSound, write_channels
-from avlmaps.recordings.directions import DIRECTIONS, DirectionTrack, write_directions
 from avlmaps.recordings.memory import FARTHEST_MIDDLE_M, same_rig
-from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
+from avlmaps.recordings.microphones import DIRECTIONS, DirectionTrack, MicrophoneNumbers, Microphones, write_directions
 from avlmaps.recordings.types import BaseHeight, Frame
 
 _JPEG_QUALITY = 95

@@ -17,7 +17,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.candidates import CandidateGrid, Candidates, Legs, Walls
 from avlmaps.maps.sources.correlation import SourceSettings
-from avlmaps.recordings.directions import DirectionTrack
+from avlmaps.recordings.microphones import DirectionTrack
 
 _BINS = 120  # of 3 degrees: residuals of angles, and offsets
 _SPREADS_DEG, _OUTLIERS = (6.0, 12.0, 25.0), (0.05, 0.2, 0.5)

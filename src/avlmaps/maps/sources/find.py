@@ -32,8 +32,7 @@ from avlmaps.maps.sources.correlation import (
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import read_channels
-from avlmaps.recordings.directions import DirectionTrack
-from avlmaps.recordings.microphones import Microphones
+from avlmaps.recordings.microphones import DirectionTrack, Microphones
 
 BEFORE_S, AFTER_S = 1.0, 0.2
 _LONGEST_S = 10.0

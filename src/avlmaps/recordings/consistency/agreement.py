@@ -1,16 +1,278 @@
-"""How well the frames of a sample agree, and how far right recordings may differ from themselves.
+"""A few frames of a recording at low resolution, which of them see the same place, and how well they agree.
 
-The figures are in docs/recordings.md.
+How far right recordings may differ from themselves is in docs/recordings.md.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Float32, Int
 
 from avlmaps.core import poses
-from avlmaps.core.camera import Rig
-from avlmaps.recordings.consistency.sample import Sample, Surfaces
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.poses import rotation_angle_rad
+from avlmaps.recordings.types import Frame, Recording
+
+WIDTH = 128
+POINTS = 320
+PAIRS = 30  # that follow in time, at most
+# How far a camera moves between the frames of a pair: degrees and metres count alike where both are one such step.
+STEP_RAD = np.radians(12.0)
+STEP_M = 0.35
+STEPS = (0.5, 1.2)
+# A frame further away is of another camera that takes turns with this one, or after a jump: a nearer one is compared.
+NO_STEP = 5.0
+# Of the pairs that look one way from apart: this far apart, as long as poses say so.
+APART = 12
+APART_M, APART_RAD = 0.7, np.radians(25.0)
+JUMPS = 4
+# A step this many times the usual one is a jump that is looked at.
+JUMP_RATIO = 4.0
+# A step of the poses this many times the usual one, and beyond this, is odd.
+_ODD_STEP, _ODD_STEP_M, _ODD_STEP_RAD = 4.0, 0.15, np.radians(8.0)
+# Red differs from blue by more than this share of the brightest of the three, or of this brightness (of 255).
+_COLOURED, _DIM = 0.15, 30.0
+# A neighbourhood whose depths differ by more is an edge, of which no point is taken.
+_SMOOTH = 0.06
+# Of a pixel and its neighbours, with a depth.
+_FEWEST_AROUND = 4
+# A pair is compared at most this much later where the poses hardly move: the clock then says that they should.
+_LATEST_SHARE = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Frames at low resolution, and pairs of them.
+
+    Attributes:
+        index: (f,) numbers of the frames in the recording.
+        stamps_s: (f,) when.
+        world_from_camera: (f, 4, 4) poses as they are read.
+        depth_m: (f, h, w) z-depth, 0 where there is none.
+        grey: (f, hc, wc) brightness, 0 to 255.
+        warmth: (f,) share of pixels that are redder than blue less the share that are bluer than red.
+        rig: the cameras at these sizes.
+        pairs: (p, 2) rows of frames that should see the same place, the earlier first.
+        follows: (p,) whether the frames of a pair follow one another; the others look at one place from apart.
+        unread: number of frames of the sample that could not be read.
+    """
+
+    index: Int[np.ndarray, " f"]
+    stamps_s: Float[np.ndarray, " f"]
+    world_from_camera: Float[np.ndarray, "f 4 4"]
+    depth_m: Float32[np.ndarray, "f h w"]
+    grey: Float32[np.ndarray, "f hc wc"]
+    warmth: Float[np.ndarray, " f"]
+    rig: Rig
+    pairs: Int[np.ndarray, "p 2"]
+    follows: Bool[np.ndarray, " p"]
+    unread: int = 0
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def only(self, chosen: Bool[np.ndarray, " p"] | Int[np.ndarray, " k"]) -> "Sample":
+        """Return these pictures with some of the pairs."""
+        return replace(self, pairs=self.pairs[chosen], follows=self.follows[chosen])
+
+
+def draw_sample(recording: Recording) -> Sample:
+    """Choose frames by their poses and read them; frames that cannot be read are left out."""
+    return draw_pairs(recording, *choose_pairs(recording.world_from_camera))
+
+
+def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Bool[np.ndarray, " p"]) -> Sample:
+    """Read the frames of pairs; those with a frame that cannot be read are left out.
+
+    Args:
+        recording: of the frames.
+        pairs: numbers of frames.
+        follows: whether those of a pair follow one another.
+    """
+    index = np.unique(pairs) if len(pairs) else np.arange(min(len(recording), 1))
+    whole = recording.rig
+    rig = Rig(_small(whole.rgb), _small(whole.depth), whole.rgb_from_depth)
+    seen: dict[int, tuple[np.ndarray, np.ndarray, float]] = {}
+    fault: RecordingError | None = None
+    for number in index.tolist():
+        try:
+            frame = recording.frame(number)
+        except RecordingError as error:
+            fault = error
+            continue
+        seen[number] = small_depth(frame, rig), *_colour(frame.rgb, rig.rgb)
+    if not seen:
+        raise fault or RecordingError(f"{recording.path} has no frame; there is nothing to check.")
+    read, (depth, grey, warmth) = np.array(list(seen)), zip(*seen.values(), strict=True)
+    kept = np.isin(pairs, read).all(axis=1)
+    return Sample(
+        index=read,
+        stamps_s=recording.stamps_s[read],
+        world_from_camera=recording.world_from_camera[read],
+        depth_m=np.stack(depth),
+        grey=np.stack(grey),
+        warmth=np.array(warmth),
+        rig=rig,
+        pairs=np.searchsorted(read, pairs[kept]),
+        follows=follows[kept],
+        unread=len(index) - len(read),
+    )
+
+
+def small_depth(frame: Frame, rig: Rig) -> Float32[np.ndarray, "h w"]:
+    """Return the depth of a frame at the size of a sample's cameras."""
+    camera, (rows, columns) = rig.depth, frame.depth_m.shape
+    row = ((np.arange(camera.height) + 0.5) * rows / camera.height).astype(int)
+    column = ((np.arange(camera.width) + 0.5) * columns / camera.width).astype(int)
+    return frame.depth_m[row[:, None], column]
+
+
+def choose_pairs(pose: Float[np.ndarray, "n 4 4"]) -> tuple[Int[np.ndarray, "p 2"], Bool[np.ndarray, " p"]]:
+    """Return pairs of frames that should see the same place, and which of them follow one another in time.
+
+    These are pairs after a step and across jumps; the others look one way from places apart.
+    """
+    n = len(pose)
+    if n < 2:
+        return np.zeros((0, 2), np.int64), np.zeros(0, bool)
+    found: dict[tuple[int, int], None] = {}
+    latest = max(2, round(_LATEST_SHARE * n))
+    for a in _spread(n - 1):
+        if len(found) >= PAIRS:
+            break
+        moved = steps_between(pose[a], pose[a + 1 : a + 1 + 4 * latest])
+        for wanted in STEPS:
+            far = np.flatnonzero(moved >= wanted)
+            if len(far) and moved[far[0]] > NO_STEP:
+                far = far[[int(np.argmin(moved[far]))]]
+            found[a, a + 1 + (int(far[0]) if len(far) else min(latest, len(moved)) - 1)] = None
+    step = steps_between_all(pose)
+    odd = np.flatnonzero(step > JUMP_RATIO * max(float(np.median(step)), 0.02))
+    for at in odd[np.argsort(-step[odd], kind="stable")][:JUMPS].tolist():
+        found[at, at + 1] = None
+    after = sorted(found)
+    apart = [pair for pair in _apart(pose) if pair not in found]
+    return np.array([*after, *apart], np.int64).reshape(-1, 2), np.arange(len(after) + len(apart)) < len(after)
+
+
+def _spread(n: int) -> list[int]:
+    order: dict[int, None] = {}
+    parts = 1
+    while len(order) < min(n, PAIRS):
+        order |= dict.fromkeys(((2 * np.arange(parts) + 1) * n // (2 * parts)).tolist())
+        parts *= 2
+    return list(order)
+
+
+def _apart(pose: Float[np.ndarray, "n 4 4"]) -> list[tuple[int, int]]:
+    """Return pairs whose cameras look nearly one way from places apart: there the scale of positions shows."""
+    rows = np.unique(np.linspace(0, len(pose) - 1, min(len(pose), 150)).round().astype(int))
+    few = pose[rows]
+    away_m = np.linalg.norm(few[:, None, :3, 3] - few[None, :, :3, 3], axis=-1)
+    ahead = few[:, :3, 2] @ few[:, :3, 2].T
+    upright = few[:, :3, 1] @ few[:, :3, 1].T
+    least = np.cos(APART_RAD)
+    with np.errstate(divide="ignore"):
+        off = np.abs(np.log(away_m / APART_M))
+    off[(ahead < least) | (upright < least) | np.tri(len(rows), dtype=bool)] = np.inf
+    off += 0.2 * np.abs(np.subtract.outer(rows, rows)) / len(pose)  # of pairs as far apart, the sooner ones
+    near, found = max(1, len(rows) // (3 * APART)), list[tuple[int, int]]()
+    while len(found) < APART and np.isfinite(off).any():  # each time beyond the rows around those before
+        a, b = (int(i) for i in np.unravel_index(int(np.argmin(off)), off.shape))
+        found.append((int(rows[a]), int(rows[b])))
+        off[max(0, a - near) : a + near + 1, :] = np.inf
+    return found
+
+
+def steps_between(one: Float[np.ndarray, "4 4"], others: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, " n"]:
+    """Return how far cameras are from one, in steps."""
+    away_m = np.linalg.norm(others[:, :3, 3] - one[:3, 3], axis=1)
+    return away_m / STEP_M + rotation_angle_rad(np.broadcast_to(one, others.shape), others) / STEP_RAD
+
+
+def steps_between_all(pose: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, " m"]:
+    """Return how far each camera is from the one before, in steps."""
+    away_m = np.linalg.norm(np.diff(pose[:, :3, 3], axis=0), axis=1)
+    return away_m / STEP_M + rotation_angle_rad(pose[:-1], pose[1:]) / STEP_RAD
+
+
+def odd_steps(recording: Recording) -> Bool[np.ndarray, " m"]:
+    """Return which steps from a frame to the next are much larger than usual."""
+    pose = recording.world_from_camera
+    if len(pose) < 2:
+        return np.zeros(0, bool)
+    moved_m = np.linalg.norm(np.diff(pose[:, :3, 3], axis=0), axis=1)
+    turned_rad = rotation_angle_rad(pose[:-1], pose[1:])
+    far = moved_m > max(_ODD_STEP * float(np.median(moved_m)), _ODD_STEP_M)
+    return far | (turned_rad > max(_ODD_STEP * float(np.median(turned_rad)), _ODD_STEP_RAD))
+
+
+def _small(camera: Pinhole) -> Pinhole:
+    width = min(WIDTH, camera.width)
+    return camera.resized(width, max(1, round(camera.height * width / camera.width)))
+
+
+def _colour(rgb: np.ndarray, camera: Pinhole) -> tuple[Float32[np.ndarray, "hs ws"], float]:
+    import cv2
+
+    small = cv2.resize(rgb, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
+    colours = small.astype(np.float32)
+    hue = (colours[..., 0] - colours[..., 2]) / np.maximum(colours.max(axis=2), _DIM)
+    warmth = float((hue > _COLOURED).mean() - (hue < -_COLOURED).mean())
+    return cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32), warmth
+
+
+@dataclass(frozen=True, slots=True)
+class Surfaces:
+    """What is needed of each depth picture, computed once.
+
+    Attributes:
+        near_m: (f, h, w) least depth of the 3x3 pixels around, 0 where one of them has none.
+        far_m: (f, h, w) greatest depth there.
+        row: (f, m) pixels on smooth surface.
+        column: (f, m) theirs.
+        there: (f, m) whether there is such a pixel.
+        smooth_share: of the pixels with depth around, those on smooth surface; NaN without any.
+    """
+
+    near_m: Float32[np.ndarray, "f h w"]
+    far_m: Float32[np.ndarray, "f h w"]
+    row: Int[np.ndarray, "f m"]
+    column: Int[np.ndarray, "f m"]
+    there: Bool[np.ndarray, "f m"]
+    smooth_share: float
+
+    @staticmethod
+    def of(depth_m: Float32[np.ndarray, "f h w"], points: int = POINTS) -> "Surfaces":
+        """Find smooth pixels, evenly spread, up to a number in each frame."""
+        near, far = _around(depth_m)
+        count = len(depth_m)
+        row, column = np.zeros((count, points), np.int64), np.zeros((count, points), np.int64)
+        there = np.zeros((count, points), bool)
+        smooth = 0
+        for f in range(count):
+            v, u = np.nonzero((near[f] > 0.0) & (depth_m[f] > 0.0) & (far[f] - near[f] < _SMOOTH * near[f]))
+            smooth += len(v)
+            if len(v) == 0:
+                continue
+            chosen = np.unique(np.linspace(0, len(v) - 1, min(points, len(v))).round().astype(int))
+            row[f, : len(chosen)], column[f, : len(chosen)] = v[chosen], u[chosen]
+            there[f, : len(chosen)] = True
+        known = int(((near > 0.0) & (depth_m > 0.0)).sum())
+        return Surfaces(near, far, row, column, there, smooth / known if known else float("nan"))
+
+
+def _around(depth_m: Float32[np.ndarray, "f h w"]) -> tuple[np.ndarray, np.ndarray]:
+    from scipy.ndimage import maximum_filter, minimum_filter, uniform_filter
+
+    size, known = (1, 3, 3), depth_m > 0.0
+    share = uniform_filter(known.astype(np.float32), size, mode="constant")
+    enough = np.rint(9.0 * share) >= _FEWEST_AROUND
+    enough[:, [0, -1]] = enough[:, :, [0, -1]] = False
+    low = minimum_filter(np.where(known, depth_m, np.float32(np.inf)), size)
+    return np.where(enough, low, np.float32(0.0)), np.where(enough, maximum_filter(depth_m, size), np.float32(0.0))
+
 
 # A surface is the same where the depths differ by no more than this: that of a depth camera's error.
 SAME_M, SAME_SHARE = 0.03, 0.02

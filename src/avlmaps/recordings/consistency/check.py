@@ -18,9 +18,18 @@ from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.wording import option
 from avlmaps.recordings.channels import level_faults
 from avlmaps.recordings.consistency import agreement as limits
-from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, Agreement, compare, without_occluded
+from avlmaps.recordings.consistency.agreement import (
+    APART_SAME_M,
+    FEWEST_POINTS,
+    Agreement,
+    Sample,
+    Surfaces,
+    compare,
+    draw_sample,
+    steps_between_all,
+    without_occluded,
+)
 from avlmaps.recordings.consistency.readings import LEAST_OFF, Trial, Trials, cause_of, find_cause, find_closer
-from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.memory import is_of_program
 from avlmaps.recordings.types import Recording
 

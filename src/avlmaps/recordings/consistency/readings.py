@@ -10,8 +10,16 @@ from jaxtyping import Float
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.consistency.agreement import APART_SAME_M, NOTHING, SAME_M, Agreement, compare
-from avlmaps.recordings.consistency.sample import Sample, Surfaces, small_depth
+from avlmaps.recordings.consistency.agreement import (
+    APART_SAME_M,
+    NOTHING,
+    SAME_M,
+    Agreement,
+    Sample,
+    Surfaces,
+    compare,
+    small_depth,
+)
 from avlmaps.recordings.corrections import (
     NAMED,
     NONE,

@@ -6,7 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps.recordings.consistency import agreement as limits
-from avlmaps.recordings.consistency.agreement import FEWEST_POINTS, compare
+from avlmaps.recordings.consistency.agreement import (
+    FEWEST_POINTS,
+    Surfaces,
+    compare,
+    draw_pairs,
+    odd_steps,
+    steps_between_all,
+)
 from avlmaps.recordings.consistency.check import (
     Evidence,
     Reason,
@@ -17,12 +24,6 @@ from avlmaps.recordings.consistency.check import (
     findings_of,
 )
 from avlmaps.recordings.consistency.readings import AS_IT_IS, Reading, is_closer
-from avlmaps.recordings.consistency.sample import (
-    Surfaces,
-    draw_pairs,
-    odd_steps,
-    steps_between_all,
-)
 from avlmaps.recordings.corrections import Corrections
 from avlmaps.recordings.types import Recording
 

@@ -15,13 +15,12 @@ from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import with_microphones
 from avlmaps.recordings.corrections import corrected
-from avlmaps.recordings.directions import DIRECTIONS, read_directions
 from avlmaps.recordings.faults import note, report
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, opener, settle
 from avlmaps.recordings.formats.tables import NAMED_FILE, PoseTable, read_list, read_poses
 from avlmaps.recordings.images import DisplayTurn, VideoFrames, file_turn, first_picture_size
 from avlmaps.recordings.layout import Description
-from avlmaps.recordings.microphones import MicrophoneNumbers
+from avlmaps.recordings.microphones import DIRECTIONS, MicrophoneNumbers, read_directions
 from avlmaps.recordings.plausible import pace_fault
 from avlmaps.recordings.types import Recording
 

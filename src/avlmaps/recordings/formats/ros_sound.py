@@ -18,9 +18,9 @@ from jaxtyping import Float
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.wording import option
 from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, write_samples
-from avlmaps.recordings.directions import DirectionTrack
 from avlmaps.recordings.faults import note
 from avlmaps.recordings.formats.ros_messages import pose_of, stamp_of
+from avlmaps.recordings.microphones import DirectionTrack
 
 STAMPED = "audio_common_msgs/msg/AudioStamped"
 _PCM = ("wave", "wav", "pcm")

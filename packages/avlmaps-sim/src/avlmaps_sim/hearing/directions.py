@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.timeline import Trajectory
-from avlmaps.recordings.directions import DirectionTrack
+from avlmaps.recordings.microphones import DirectionTrack
 from avlmaps_sim.hearing.impulse import Acoustics
 from avlmaps_sim.mesh import Triple
 from avlmaps_sim.scene import Scene
