@@ -150,10 +150,6 @@ class AudioTrack:
     def every_channel(self, begin: int, end: int) -> Float[np.ndarray, "n m"]:
         """Return samples of all channels that hold microphones, as they are stored; fewer where the track ends before.
 
-        Args:
-            begin: the first sample, from the track's beginning.
-            end: the one after the last.
-
         Raises:
             AudioError: the file cannot be read.
         """
@@ -182,11 +178,7 @@ class AudioTrack:
 
 
 def write_flac(path: Path, sound: Sound | Iterable[Sound]) -> None:
-    """Write a sound, or the blocks of a long one, as 16-bit FLAC; see ``write_samples``.
-
-    Args:
-        path: the file; its folder must exist.
-        sound: what to write; blocks must share one rate.
+    """Write a sound, or the blocks of a long one (of one rate), as 16-bit FLAC; see ``write_samples``.
 
     Raises:
         AudioError: there is not one block, or the disk is full.
@@ -269,10 +261,6 @@ def resample(sound: Sound, rate_hz: int) -> Sound:
 
     Gives what ``librosa.resample`` gives by default: no delay, and a length rounded up to a whole sample. It works
     through a long sound in pieces, so that it needs no more memory than the sound and its answer.
-
-    Args:
-        sound: any sound.
-        rate_hz: wanted samples a second.
     """
     if sound.rate_hz == rate_hz:
         return sound

@@ -132,10 +132,6 @@ def level_faults(track: AudioTrack, name: str = "") -> tuple[list[str], list[str
     """Return what is silent about a track, and which of its channels are clipped: their loud sounds are like others.
 
     Looks at pieces spread over the track. One in which sounds and silence take turns was put together so.
-
-    Args:
-        track: to look at.
-        name: of the track in the sentences; its path if empty.
     """
     samples = _looked_at(track)
     silent = _silent(samples, track, name)
@@ -143,12 +139,7 @@ def level_faults(track: AudioTrack, name: str = "") -> tuple[list[str], list[str
 
 
 def useless_channels(track: AudioTrack, name: str = "") -> list[str]:
-    """Return those of the faults with which an array shows no direction: channels that are dead, or another's copy.
-
-    Args:
-        track: to look at.
-        name: of the track in the sentences; its path if empty.
-    """
+    """Return those of the faults with which an array shows no direction: channels that are dead, or another's copy."""
     samples = _looked_at(track)
     if not np.ptp(samples) and (silent := _silent(samples, track, name)):
         return [f"{silent[0]} Check the microphones, and which input was recorded."]

@@ -103,13 +103,7 @@ def _pose(index: int) -> Float[np.ndarray, "4 4"]:
 def see(
     camera: Pinhole, pose: Float[np.ndarray, "4 4"], more: Sequence[Float[np.ndarray, "2 3"]] = ()
 ) -> tuple[Any, Any]:
-    """Cast one ray a pixel; return colour (uint8) and z-depth (float32, metres).
-
-    Args:
-        camera: that sees.
-        pose: its world_from_camera.
-        more: lowest and highest corner of further boxes, such as a person who passes.
-    """
+    """Cast one ray a pixel; return colour (uint8) and z-depth (float32, metres)."""
     rays: Any = camera.rays() @ pose[:3, :3].T
     eye: Any = pose[:3, 3]
     with np.errstate(divide="ignore", invalid="ignore"):

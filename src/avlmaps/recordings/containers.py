@@ -63,15 +63,7 @@ def examine(path: Path) -> tuple[int, int]:
 
 
 def read_piece(path: Path, begin: int, end: int, rate_hz: int, channel: int | None = None) -> Float32[np.ndarray, " n"]:
-    """Return the mono samples ``begin:end``; fewer where the file ends before.
-
-    Args:
-        path: the file.
-        begin: first sample.
-        end: one past the last sample.
-        rate_hz: samples a second.
-        channel: the one that is read; the mean of all if None.
-    """
+    """Return the mono samples ``begin:end``; fewer where the file ends before."""
     if not _is_plain(path):
         pieces = list(_placed(path, begin, end, rate_hz, channel))
         return np.concatenate(pieces) if pieces else np.zeros(0, np.float32)

@@ -231,11 +231,7 @@ class CorrectedRecording(Subset):
     """A recording in place, with corrected unit, cameras, poses and up direction."""
 
     def __init__(self, whole: Recording, given: Corrections) -> None:
-        """Correct.
-
-        Args:
-            whole: the recording as its reader understands it.
-            given: what is known better.
+        """Correct a recording as its reader understands it.
 
         Raises:
             RecordingError: something does not fit the recording.

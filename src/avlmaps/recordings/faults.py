@@ -38,12 +38,6 @@ _listed: ContextVar[list[Fault] | None] = ContextVar("_listed", default=None)
 def report(sentence: str, file: Path | None = None, line: int | None = None, *, fatal: bool = True) -> None:
     """Add a fault to the list of ``listed``; outside of it, stop at a fatal one and pass over any other.
 
-    Args:
-        sentence: see ``Fault``.
-        file: where it is.
-        line: in the file.
-        fatal: whether the recording cannot be opened because of it.
-
     Raises:
         RecordingError: it is fatal, and no list is made.
     """

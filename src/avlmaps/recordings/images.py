@@ -285,11 +285,6 @@ def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.nd
 
     A PNG or TIFF holds 16-bit whole numbers, of which 0 and 65535 say that nothing was measured; an NPY, or a TIFF of
     floats, holds metres, of which NaN, infinity and what is not positive say so.
-
-    Args:
-        path: a 16-bit PNG, a TIFF or an NPY file.
-        camera: the depth camera.
-        units_per_m: units of whole numbers in a metre.
     """
     if path.suffix == ".npy":
         stored = _read_npy(path)
@@ -385,12 +380,7 @@ def depth_in_colour(depth_m: Float32[np.ndarray, "hd wd"], rig: Rig) -> tuple[Pi
 
 
 def nearest_depth(points_camera: Float[np.ndarray, "n 3"], camera: Pinhole) -> Float32[np.ndarray, "h w"]:
-    """Return the z-depth of the nearest point in each pixel, metres; infinite where there is none.
-
-    Args:
-        points_camera: metres, in front of the camera.
-        camera: that sees them.
-    """
+    """Return the z-depth of the nearest point in each pixel, metres; infinite where there is none."""
     pixel = np.floor(camera.project(points_camera)).astype(np.int64)
     inside = ((pixel >= 0) & (pixel < (camera.width, camera.height))).all(axis=1)
     depth_m = np.full(camera.height * camera.width, np.inf, np.float32)

@@ -29,10 +29,6 @@ class MemoryRecording(Recording):
     def __init__(self, frames: Sequence[Frame], up_in_world: Float[np.ndarray, "3"] | None = None) -> None:
         """Take frames.
 
-        Args:
-            frames: at least one; their stamps rise.
-            up_in_world: unit vector, None where it is not known.
-
         Raises:
             RecordingError: there is none, their stamps do not rise, or they have several rigs.
         """
@@ -84,11 +80,6 @@ def same_rig(one: Rig, other: Rig) -> bool:
 
 def next_of(frame: Frame, last_stamp_s: float | None, rig: Rig) -> Frame:
     """Return a frame that follows others, with their rig.
-
-    Args:
-        frame: the new one.
-        last_stamp_s: stamp of the frame before; None where it is the first.
-        rig: of the frames before.
 
     Raises:
         RecordingError: it repeats the last frame, comes out of order, or is of another camera.

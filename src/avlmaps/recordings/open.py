@@ -56,13 +56,7 @@ class Format:
     has_topics: bool = False
 
     def open(self, path: Path, topics: Mapping[str, str] | None = None, more: Sequence[Path] = ()) -> Recording:
-        """Open a recording with this format's opener.
-
-        Args:
-            path: the recording.
-            topics: names by what they are for.
-            more: further files of the same recording.
-        """
+        """Open a recording with this format's opener."""
         module, _, function = self.opener.partition(":")
         found = importlib.import_module(module, _HERE)
         opener = getattr(found, function, None) or found.OPENERS[function]

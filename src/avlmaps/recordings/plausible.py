@@ -123,12 +123,6 @@ def plausible_walk(
     frames up to the next such jump are another stretch. The longest stretch is accepted, and each other one that can
     be reached from an accepted one. A few frames that cannot are left out; a long stretch that lies at most
     ``MAX_SHIFT_M`` away is used, and reported (tracking began again).
-
-    Args:
-        stamps_s: rising.
-        positions_m: where the camera was.
-        names: what the recording calls each frame.
-        strays_are: what is said to be done with frames that are out of place.
     """
     every = np.arange(len(stamps_s))
     if not len(every):

@@ -280,11 +280,7 @@ class Subset(Recording):
     """Chosen frames of another recording, in place; stamps, poses, names and the sound track stay what they are."""
 
     def __init__(self, whole: Recording, indices: Sequence[int] | range | Int[np.ndarray, " n"]) -> None:
-        """Choose.
-
-        Args:
-            whole: the recording.
-            indices: strictly rising frame numbers of it.
+        """Choose frames by strictly rising numbers.
 
         Raises:
             ValueError: they do not rise, or are not all in the recording.

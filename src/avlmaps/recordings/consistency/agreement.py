@@ -83,13 +83,7 @@ def draw_sample(recording: Recording) -> Sample:
 
 
 def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Bool[np.ndarray, " p"]) -> Sample:
-    """Read the frames of pairs; those with a frame that cannot be read are left out.
-
-    Args:
-        recording: of the frames.
-        pairs: numbers of frames.
-        follows: whether those of a pair follow one another.
-    """
+    """Read the frames of pairs; those with a frame that cannot be read are left out."""
     index = np.unique(pairs) if len(pairs) else np.arange(min(len(recording), 1))
     whole = recording.rig
     rig = Rig(_small(whole.rgb), _small(whole.depth), whole.rgb_from_depth)
@@ -401,11 +395,6 @@ def without_occluded(found: Agreement, sample: Sample, surfaces: Surfaces) -> Ag
     Who goes round a corner leaves behind it what was in view: that is no contradiction, however many points it are.
     Wrong poses, depths or cameras always let one of the two frames look through what the other sees; where neither
     does, hidden points say nothing. Frames that are close together are judged by all of their points.
-
-    Args:
-        found: of the sample's pairs.
-        sample: the pictures.
-        surfaces: of its depth.
     """
     place = sample.world_from_camera[:, :3, 3]
     step_m = np.linalg.norm(place[sample.pairs[:, 1]] - place[sample.pairs[:, 0]], axis=-1)

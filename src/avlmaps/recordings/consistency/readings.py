@@ -147,12 +147,7 @@ class Trials:
         self._compared = max(self._compared, int(_OF_AS_IT_IS * seen))
 
     def run(self, reading: Reading, *, colour: bool = True) -> Trial:
-        """Return how well the sample agrees so; a score of 0 where it cannot be read so.
-
-        Args:
-            reading: that is tried.
-            colour: whether likeness of colour is part of the score.
-        """
+        """Return how well the sample agrees so; a score of 0 where it cannot be read so."""
         given = reading.given.over(self.given)
         pose, rig = self._delayed(given.pose_delay_s or 0.0), rig_of(self.sample.rig, reading)
         seen = self._pictures(replace(AS_IT_IS, **{name: getattr(reading, name) for name in _OF_PICTURES}))
@@ -281,12 +276,7 @@ def _is_less_off(trial: Trial, than: Trial) -> bool:
 
 
 def find_cause(trials: Trials, enough: Callable[[Trial], bool]) -> Trial | None:
-    """Return the simplest reading with which the sample agrees, None where no one does.
-
-    Args:
-        trials: of the sample.
-        enough: whether a sample agrees.
-    """
+    """Return the simplest reading with which the sample agrees, None where no one does."""
     single = [trials.run(reading) for reading in _single(trials)]
     # a delay, scale or focal length between the steps that were tried may fit where none of the steps does
     delayed = [trial for trial in single if _is_delayed(trial.reading)]

@@ -152,19 +152,7 @@ def _some(names: Sequence[str]) -> str:
 
 @dataclass(eq=False, repr=False, kw_only=True)
 class ShotsRecording(Recording):
-    """Frames of shots, whose pictures a subclass reads on demand.
-
-    Attributes:
-        path: the file or folder.
-        format: the format's name on the command line.
-        rig: the cameras.
-        shots: the usable frames in the order of time; their stamps count from the recording's start.
-        up_in_world: unit vector, or None where it is not known.
-        audio: the sound track on the frames' clock, or None.
-        notices: one sentence for each thing worth knowing.
-        begins_s: what the clock of the files said at time 0.
-        posed: share of the frames that have a pose.
-    """
+    """Frames of shots, whose pictures a subclass reads on demand; see ``Recording`` for the attributes."""
 
     path: Path
     format: str
@@ -299,15 +287,7 @@ class Pictures(Protocol):
 
 @dataclass(eq=False, repr=False, kw_only=True)
 class StoredRecording(ShotsRecording):
-    """Frames whose pictures are unpacked on demand.
-
-    Attributes:
-        pictures: where they lie; ``colour`` and ``depth`` of the shots are names that it knows.
-        stored_depth_unit_m: metres of one unit of the depth as stored; 1 for floats.
-        files: where they are not ``path`` alone.
-        topics: of a bag.
-        base_height: where the robot's base is under the camera, where that is known.
-    """
+    """Frames whose pictures are unpacked on demand, from files that are not ``path`` alone where they are given."""
 
     pictures: Pictures
     stored_depth_unit_m: float = 1.0
@@ -333,12 +313,7 @@ def left_out(path: Path, sentence: str, file: Path | None = None) -> None:
 
 
 def whole_frames(path: Path, **found: Mapping[K, Any]) -> list[K]:
-    """Return the keys of frames of which everything was found, in the order of the first; others are left out.
-
-    Args:
-        path: the recording, for sentences.
-        found: files, rows or poses by frame; the name says what.
-    """
+    """Return the keys of frames of which everything was found, in the order of the first; others are left out."""
     first, *others = found.values()
     whole = [key for key in first if all(key in other for other in others)]
     names = ", ".join(name.replace("_", " ") for name in found)

@@ -309,12 +309,7 @@ def shared_namespace(one: str, other: str) -> int:
 
 
 def info_beside(image_topic: str, infos: Collection[str]) -> str:
-    """Return the topic of the calibration that is published beside an image topic, or nothing.
-
-    Args:
-        image_topic: of the pictures.
-        infos: topics of calibrations.
-    """
+    """Return the topic of the calibration that is published beside an image topic, or nothing."""
     parts = image_topic.split("/")
     for length in range(len(parts) - 1, 0, -1):
         for name in ("camera_info", "info/camera_info"):  # the latter as RealSense's viewer has it

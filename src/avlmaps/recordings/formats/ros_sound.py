@@ -162,10 +162,6 @@ def silences(
 
     Messages arrive late now and then and the next ones catch up; only what none of the later ones catches up is missing
     sound. Less than ``GAP_S`` is left: clocks differ a little.
-
-    Args:
-        times_s: when each message seems to sound.
-        lengths_s: how long each message is.
     """
     before_s = np.concatenate([[0.0], np.cumsum(lengths_s)[:-1]])
     behind_s = np.minimum.accumulate((times_s - before_s)[::-1])[::-1]
@@ -419,11 +415,6 @@ def directions_of(topic: str, messages: Callable[[], Iterator[tuple[int, Any]]],
 
     Whole numbers are degrees, since whole radians are no angles; so are floats beyond a turn. A pose's yaw is its
     azimuth, or, where it is not turned, the direction to its position.
-
-    Args:
-        topic: for sentences.
-        messages: gives (received ns, message) of each.
-        clock: of the pictures; numbers have no stamp of their own.
     """
     rows = [
         (received_ns * 1e-9, stamp_of(message) if hasattr(message, "pose") else np.nan, *angle_of(message))

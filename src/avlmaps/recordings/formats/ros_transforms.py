@@ -207,11 +207,6 @@ def read_tf(bag: Bag, image_topic: str, named: str = "") -> tuple[TransformTree,
     """Return the tree of a bag's transforms, and the topic that moves it (``/tf``), if any.
 
     Of several robots' topics (``/robot1/tf``) those count whose namespace the image topic is in; all, if none is.
-
-    Args:
-        bag: the bag.
-        image_topic: of the camera whose poses are wanted.
-        named: a topic of moving transforms that someone named.
     """
     topics = bag.topics_of(_TF_TYPES)
     beside = [topic for topic in topics if image_topic.startswith(_namespace(topic))]
@@ -294,16 +289,7 @@ class CameraMotion:
 def find_motion(
     bag: Bag, named: str, camera_frame: str, transforms: TransformTree, tf_topic: str, no_pose_topic: str = ""
 ) -> CameraMotion:
-    """Find what moves the camera: transforms, else odometry or a topic of poses.
-
-    Args:
-        bag: the bag.
-        named: the topic that someone named; empty: transforms first.
-        camera_frame: the depth camera's frame.
-        transforms: the tree of the bag's transforms.
-        tf_topic: where they come from.
-        no_pose_topic: a topic of poses that are not the robot's.
-    """
+    """Find what moves the camera: transforms, else odometry or a topic of poses."""
     if named and Path(named).is_file():
         return CameraMotion(_tree_of_file(Path(named), camera_frame), named, z_is_up=False)
     if named:

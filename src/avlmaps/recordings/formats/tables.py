@@ -319,14 +319,7 @@ def median_camera(file: Path, fx_fy_cx_cy: Float[np.ndarray, "n 4"], width: int,
 
 
 def fitted(camera: Pinhole, size: tuple[int, int], file: Path, what: str) -> Pinhole:
-    """Return the camera at the size (width, height) that the pictures have.
-
-    Args:
-        camera: as the file says.
-        size: (width, height) of the pictures.
-        file: the file of the intrinsics.
-        what: which pictures, for the sentence.
-    """
+    """Return the camera at the size (width, height) that the pictures have."""
     width, height = size
     if abs(width * camera.height - height * camera.width) > max(width, height, camera.width, camera.height):
         raise RecordingError(
