@@ -15,23 +15,12 @@ import msgspec
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language import intents as act
 from avlmaps.language import lexer
-from avlmaps.language.intents import (
-    Clarify,
-    Inquiry,
-    Intent,
-    RefusalReason,
-    Refuse,
-    Target,
-    TargetKind,
-    steps_of,
-    targets_of,
-)
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import describes, is_entry, sounding_words, sounds_like
 from avlmaps.language.word_classes import filled, listed, pattern_of, table, word_list
 
 _ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
-_MARKS = {TargetKind.AREA: "@", TargetKind.SOUND: "$"}
+_MARKS = {act.TargetKind.AREA: "@", act.TargetKind.SOUND: "$"}
 _BEGIN = r"(?<![^ ^@$])[\^@$]?"  # of a word
 _HEARD = frozenset({"hear", "heard", "hearing", "sound", "noise"})
 _WAYS = dict.fromkeys(("clockwise", "cw"), act.TurnSense.CLOCKWISE) | dict.fromkeys(
@@ -50,7 +39,7 @@ class Row(msgspec.Struct, rename={"of": "if"}):
     of: frozenset[str] = frozenset()
     unless: frozenset[str] = frozenset()
     ask: str = ""
-    refuse: RefusalReason | None = None
+    refuse: act.RefusalReason | None = None
     choices: tuple[str, ...] = ()
 
 
@@ -60,9 +49,9 @@ def claimed_words(name: str) -> frozenset[str]:
 
 
 @cache
-def reasons() -> Mapping[RefusalReason, frozenset[str]]:
+def reasons() -> Mapping[act.RefusalReason, frozenset[str]]:
     """Return for each reason of refusal the words of which one is said where it is the true one."""
-    return {RefusalReason(name): frozenset(text.split()) for name, text in table("claims")["reasons"].items()}
+    return {act.RefusalReason(name): frozenset(text.split()) for name, text in table("claims")["reasons"].items()}
 
 
 @cache
@@ -129,7 +118,7 @@ class _Marked:
         return " ".join(token.text for token in self.tokens[first : max(last, inside[-1] if inside else 0)])
 
 
-def _first(kind: str, marked: _Marked, facts: frozenset[str]) -> Refuse | Clarify | None:
+def _first(kind: str, marked: _Marked, facts: frozenset[str]) -> act.Refuse | act.Clarify | None:
     for row in _rows(kind):
         found = _pattern(row.says).search(marked.text) if row.of <= facts and row.unless.isdisjoint(facts) else None
         if found is None:
@@ -138,30 +127,32 @@ def _first(kind: str, marked: _Marked, facts: frozenset[str]) -> Refuse | Clarif
         said = marked.said(start, end)
         asks = row.ask.format(said=said)
         if row.refuse is not None:
-            return Refuse(row.refuse, asks)
+            return act.Refuse(row.refuse, asks)
         choices = tuple(choice.format(said=said) for choice in row.choices)
-        return Clarify(asks or f"A map does not know '{said}'; {_ANSWERS}", choices)
+        return act.Clarify(asks or f"A map does not know '{said}'; {_ANSWERS}", choices)
     return None
 
 
-def forbidden(tokens: Sequence[Token]) -> Refuse | Clarify | None:
+def forbidden(tokens: Sequence[Token]) -> act.Refuse | act.Clarify | None:
     """Return the refusal or question for words that no reading of a command could make good; None without such."""
     return _first("words", _Marked(tokens, None, {}), frozenset())
 
 
-def unmet(tokens: Sequence[Token], intents: Sequence[Intent], used: frozenset[int]) -> Refuse | Clarify | None:
+def unmet(
+    tokens: Sequence[Token], intents: Sequence[act.Intent], used: frozenset[int]
+) -> act.Refuse | act.Clarify | None:
     """Return the refusal or question for what a command claims and a reading does not do; None where it does all."""
-    targets = [each for intent in intents for one in targets_of(intent) for each in (one, *one.near)]
+    targets = [each for intent in intents for one in act.targets_of(intent) for each in (one, *one.near)]
     return _first("command", _Marked(tokens, used, _kinds(targets)), frozenset(_facts(intents, targets)))
 
 
-def unmet_by(tokens: Sequence[Token], inquiry: Inquiry, used: frozenset[int]) -> str | None:
+def unmet_by(tokens: Sequence[Token], inquiry: act.Inquiry, used: frozenset[int]) -> str | None:
     """Return the question back for what a question claims and its reading leaves out; None where it does all."""
     about = inquiry.of[0]
     targets = [each for one in inquiry.of for each in (one, *one.near)]
     marked = _Marked(tokens, used, _kinds(targets))
     facts = {str(inquiry.ask), *_facts_of_targets(targets)} | ({"several"} if len(inquiry.of) > 1 else set())
-    if about.kind in (TargetKind.SOUND, TargetKind.CLIP):
+    if about.kind in (act.TargetKind.SOUND, act.TargetKind.CLIP):
         facts |= {"sound"} | ({"heard sound"} if _HEARD & {token.text for token in tokens} else set())
         facts |= {"no sound"} if "heard sound" not in facts and not _sounds(about.name) else set()
     facts |= {token.kind for token in tokens if token.kind in ("clip", "image")}
@@ -171,25 +162,25 @@ def unmet_by(tokens: Sequence[Token], inquiry: Inquiry, used: frozenset[int]) ->
     return None if found is None else getattr(found, "question", "A map cannot answer this.")
 
 
-def lacking(tokens: Sequence[Token], named: frozenset[int]) -> Clarify:
+def lacking(tokens: Sequence[Token], named: frozenset[int]) -> act.Clarify:
     """Return the question for what an unclear command lacks; ``named`` are the words of known names."""
     found = _first("unclear", _Marked(tokens, named, {}), frozenset())
-    assert isinstance(found, Clarify)  # the last row fits all
+    assert isinstance(found, act.Clarify)  # the last row fits all
     return found
 
 
-def in_direction(tokens: Sequence[Token], intents: Sequence[Intent]) -> tuple[Intent, ...] | Clarify:
+def in_direction(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tuple[act.Intent, ...] | act.Clarify:
     """Return intents whose circles run in the direction that is said, or the question which one is meant."""
     ways = [_WAYS[token.text] for token in tokens if token.text in _WAYS]
-    steps = steps_of(intents)
+    steps = act.steps_of(intents)
     circles = sum(isinstance(step, act.Circle) for step in steps)
     if not circles or not ways or any(isinstance(step, act.Turn) for step in steps):
         return tuple(intents)
     if len(ways) != circles:
-        return Clarify("Which way round? Say it for each: go clockwise around the table.")
+        return act.Clarify("Which way round? Say it for each: go clockwise around the table.")
     left = iter(ways)
 
-    def turned(intent: Intent) -> Intent:
+    def turned(intent: act.Intent) -> act.Intent:
         if isinstance(intent, act.Repeat):
             return replace(intent, body=tuple(map(turned, intent.body)))
         return replace(intent, way=next(left)) if isinstance(intent, act.Circle) else intent
@@ -205,17 +196,17 @@ def _sounds(name: str) -> bool:
     return known or any(sounds_like(word) or word in told for word in words)
 
 
-def _kinds(targets: Sequence[Target]) -> dict[str, str]:
+def _kinds(targets: Sequence[act.Target]) -> dict[str, str]:
     return {word: _MARKS.get(target.kind, "^") for target in targets for word in target.name.split()}
 
 
-def _facts_of_targets(targets: Sequence[Target]) -> Iterator[str]:
+def _facts_of_targets(targets: Sequence[act.Target]) -> Iterator[str]:
     for target in targets:
         if target.pick:
             yield str(target.pick)
         if target.near:
-            yield from ("near", "room near") if target.kind is TargetKind.AREA else ("near",)
-        if target.kind is TargetKind.SOUND:
+            yield from ("near", "room near") if target.kind is act.TargetKind.AREA else ("near",)
+        if target.kind is act.TargetKind.SOUND:
             yield "sound"
         *before, last = target.name.split() or ("",)
         if before and any(lexicon().find(target.name, kind) for kind in (EntryKind.THING, EntryKind.ROOM)):
@@ -226,12 +217,12 @@ def _facts_of_targets(targets: Sequence[Target]) -> Iterator[str]:
         yield "one name"
 
 
-def _facts(intents: Sequence[Intent], targets: Sequence[Target]) -> Iterator[str]:
+def _facts(intents: Sequence[act.Intent], targets: Sequence[act.Target]) -> Iterator[str]:
     """Yield what a reading of a command does, in the words of `if` and `unless`."""
     yield from _facts_of_targets(targets)
-    if len({one for intent in intents for one in targets_of(intent) if one.kind is TargetKind.OBJECT}) < 2:
+    if len({one for intent in intents for one in act.targets_of(intent) if one.kind is act.TargetKind.OBJECT}) < 2:
         yield "one thing"
-    steps = steps_of(intents)
+    steps = act.steps_of(intents)
     if len(steps) == 1:
         yield "one step"
     for step in steps:
@@ -240,7 +231,7 @@ def _facts(intents: Sequence[Intent], targets: Sequence[Target]) -> Iterator[str
                 yield "kept"
             case act.Beside(of=target, side=side, metres=metres):
                 yield from ("beside", str(side), *(["kept"] if metres is not None else []))
-                yield "beside room" if target.kind is TargetKind.AREA else "beside"
+                yield "beside room" if target.kind is act.TargetKind.AREA else "beside"
             case act.Face(side=side):
                 yield str(side)
             case act.Move(metres=metres):

@@ -8,19 +8,6 @@ from avlmaps.core.errors import LanguageError, QueryError
 from avlmaps.language import intents as act
 from avlmaps.language.claims import claimed_words, forbidden
 from avlmaps.language.gate import NoOrder, no_order
-from avlmaps.language.intents import (
-    Ask,
-    Clarify,
-    Intent,
-    Pick,
-    RefusalReason,
-    Refuse,
-    Target,
-    TargetKind,
-    on_targets,
-    steps_of,
-    targets_of,
-)
 from avlmaps.language.learned.decision import EXAMPLE, NameResolver, Weighed, decided, refusal_of, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
@@ -71,16 +58,16 @@ class Command:
             where the sentence may be no order.
     """
 
-    intents: tuple[Intent, ...]
+    intents: tuple[act.Intent, ...]
     notes: tuple[str, ...]
     readings: tuple[Weighed, ...]
     why: str
 
     @property
-    def stops(self) -> Refuse | Clarify | None:
+    def stops(self) -> act.Refuse | act.Clarify | None:
         """The refusal or the question; None where the robot may drive."""
         first = self.intents[0]
-        return first if isinstance(first, Refuse | Clarify) else None
+        return first if isinstance(first, act.Refuse | act.Clarify) else None
 
 
 def read_command(text: str, given: Attachments | None = None) -> Command:
@@ -97,12 +84,13 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
         return branched
     read = _read(text, given)
     stop = read.stops
-    if is_stop(tokenise(text)) or isinstance(stop, Clarify):
+    if is_stop(tokenise(text)) or isinstance(stop, act.Clarify):
         return read
     closed = no_order(text)
-    if closed is None or (stop is not None and (closed.is_unsure or stop.reason is RefusalReason.HARM)):
+    if closed is None or (stop is not None and (closed.is_unsure or stop.reason is act.RefusalReason.HARM)):
         return read
-    answer = _asked(closed, read.intents) if stop is None else Refuse(RefusalReason.UNKNOWN, _not_ordered(closed))
+    refused = act.Refuse(act.RefusalReason.UNKNOWN, _not_ordered(closed))
+    answer = _asked(closed, read.intents) if stop is None else refused
     return replace(read, intents=(answer,), why="gate")
 
 
@@ -123,15 +111,15 @@ def _branched(text: str, given: Attachments | None) -> Command | None:
         return replace(stopped, notes=notes)
     before, then, otherwise = (read.intents for read in reads)
     if thing is None:  # "go to the piano if there is one"
-        thing = next((target for step in then for target in targets_of(step)), None)
+        thing = next((target for step in then for target in act.targets_of(step)), None)
     if thing is None:
         return None
     if bool(parts.get("none")) != bool(parts.get("unless")):
         then, otherwise = otherwise, then
-    return Command((*before, act.If(replace(thing, pick=Pick.ANY), then, otherwise)), notes, (), "words")
+    return Command((*before, act.If(replace(thing, pick=act.Pick.ANY), then, otherwise)), notes, (), "words")
 
 
-def _thing(what: str, given: Attachments | None) -> Target | None:
+def _thing(what: str, given: Attachments | None) -> act.Target | None:
     """Return the thing or room that a condition is about; None for what no map holds, such as a person."""
     try:
         inquiry = read_question(f"is there a {what}", given).inquiry
@@ -139,8 +127,8 @@ def _thing(what: str, given: Attachments | None) -> Target | None:
         return None
     alive = claimed_words("persons") | claimed_words("living") | claimed_words("passing")
     thing = inquiry.of[0]
-    is_thing = thing.kind in (TargetKind.OBJECT, TargetKind.AREA) and what.startswith(thing.name)
-    alone = inquiry.ask is Ask.EXISTS and len(inquiry.of) == 1 and thing.name.split()[-1] not in alive
+    is_thing = thing.kind in (act.TargetKind.OBJECT, act.TargetKind.AREA) and what.startswith(thing.name)
+    alone = inquiry.ask is act.Ask.EXISTS and len(inquiry.of) == 1 and thing.name.split()[-1] not in alive
     return thing if is_thing and alone else None
 
 
@@ -168,7 +156,7 @@ def check_order(text: str) -> None:
     """
     read = read_command(text)
     stop = read.stops
-    harms = isinstance(stop, Refuse) and stop.reason is RefusalReason.HARM
+    harms = isinstance(stop, act.Refuse) and stop.reason is act.RefusalReason.HARM
     if stop is not None and (harms or read.why == "gate"):
         raise UnclearError(verbalise((stop,)), getattr(stop, "choices", ()))
     closed = None if stop is None else no_order(text)  # the reader refuses it too, perhaps for another reason
@@ -180,23 +168,23 @@ def _not_ordered(closed: NoOrder) -> str:
     return f"{closed.answer} Say what to do now, such as: go to the kitchen."
 
 
-def _asked(closed: NoOrder, intents: Sequence[Intent]) -> Clarify:
+def _asked(closed: NoOrder, intents: Sequence[act.Intent]) -> act.Clarify:
     order = verbalise(intents).removeprefix("I will ").rstrip(".")
-    return Clarify(f"{closed.answer} Shall I {order}?", (order,), (tuple(intents),))
+    return act.Clarify(f"{closed.answer} Shall I {order}?", (order,), (tuple(intents),))
 
 
 def _read(text: str, given: Attachments | None) -> Command:
     stand = stand_ins(text, () if given is None else given.own, orders=True)
     if stand.own:
         read = _read(stand.text, replace(given or Attachments(), own=()))
-        intents = tuple(_back(on_targets(one, stand.target), stand) for one in read.intents)
+        intents = tuple(_back(act.on_targets(one, stand.target), stand) for one in read.intents)
         return replace(read, intents=intents, notes=tuple(map(stand.back, read.notes)))
     language = language_of(text)
     tokens = tokenise(text)
     if is_stop(tokens):
         return Command((act.Wait(),), (), (), "words")
     if language is not None:
-        return Command((Clarify(ASK.format(language=language)),), (), (), "words")
+        return Command((act.Clarify(ASK.format(language=language)),), (), (), "words")
     sentence = Sentence(text, given)
     stop = forbidden(sentence.tokens)
     if stop is not None:
@@ -208,11 +196,11 @@ def _read(text: str, given: Attachments | None) -> Command:
             return named
         numbered = [one.said for one in storeys if one.number is not None]
         if numbered:
-            return Command((Clarify(ON_ITS_STOREY.format(said=numbered[0])),), (), (), "words")
+            return Command((act.Clarify(ON_ITS_STOREY.format(said=numbered[0])),), (), (), "words")
     reader = learned_reader()
     readings = weighed_readings(sentence, reader)
     if not readings:
-        question = Clarify(f"I do not understand this. Say it like: {EXAMPLE}.")
+        question = act.Clarify(f"I do not understand this. Say it like: {EXAMPLE}.")
         return Command((question,), (), (), "unsure")
     answer = decided(readings, reader.limits)
     notes = (*sentence.notes, *_without_effect(sentence), *answer.notes, *_lost_sides(answer.intents, sentence))
@@ -220,22 +208,22 @@ def _read(text: str, given: Attachments | None) -> Command:
     return Command(intents, tuple(dict.fromkeys(notes)), readings, answer.why)
 
 
-def _picked(intents: Sequence[Intent], said: str) -> tuple[Intent, ...]:
+def _picked(intents: Sequence[act.Intent], said: str) -> tuple[act.Intent, ...]:
     """Return intents with the nearest picked where any thing of a name will do: "a chair", "the nearest chair"."""
 
-    def nearest(target: Target) -> Target:
-        if target.pick is not Pick.ANY or target.kind not in (TargetKind.OBJECT, TargetKind.AREA):
+    def nearest(target: act.Target) -> act.Target:
+        if target.pick is not act.Pick.ANY or target.kind not in (act.TargetKind.OBJECT, act.TargetKind.AREA):
             return target
         at = re.search(rf"(?<!\S){re.escape(target.name.lower())}(?!\S)", said)
         if at is None or not any_one(said[: at.start()], said[at.end() :]):
             return target
-        return replace(target, pick=Pick.NEAREST)
+        return replace(target, pick=act.Pick.NEAREST)
 
-    return tuple(on_targets(intent, nearest) for intent in intents)
+    return tuple(act.on_targets(intent, nearest) for intent in intents)
 
 
-def _back(intent: Intent, stand: StandIns) -> Intent:
-    if not isinstance(intent, Clarify):
+def _back(intent: act.Intent, stand: StandIns) -> act.Intent:
+    if not isinstance(intent, act.Clarify):
         return intent
     return replace(intent, question=stand.back(intent.question), choices=tuple(map(stand.back, intent.choices)))
 
@@ -246,15 +234,15 @@ def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | No
     if len(storeys) > 1 or not word.said or word.isnt or not word.rest or changes_storey(text):
         return None
     inner = _read(word.rest, given)
-    targets = {target for intent in inner.intents for target in targets_of(intent)}
+    targets = {target for intent in inner.intents for target in act.targets_of(intent)}
     if inner.stops is not None or len(targets) != 1:
         return None
     (target,) = targets
-    if target.is_file or target.kind is TargetKind.HERE:
+    if target.is_file or target.kind is act.TargetKind.HERE:
         return None
     at = word.said if word.above is not None and "stairs" in word.said else f"on the {word.said}"
     there = replace(target, name=f"{target.name} {at}")
-    return replace(inner, intents=tuple(on_targets(one, lambda _: there) for one in inner.intents), readings=())
+    return replace(inner, intents=tuple(act.on_targets(one, lambda _: there) for one in inner.intents), readings=())
 
 
 def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed, ...]:
@@ -268,13 +256,13 @@ def _without_effect(sentence: Sentence) -> list[str]:
     return [f"'{word}' has no effect: the robot has one speed." for word in words if word in slow]
 
 
-def _lost_sides(intents: Sequence[Intent], sentence: Sentence) -> tuple[str, ...]:
+def _lost_sides(intents: Sequence[act.Intent], sentence: Sentence) -> tuple[str, ...]:
     """Return a note for each side ("the chair left of the table") that only says which thing is meant."""
-    steps = steps_of(intents)
+    steps = act.steps_of(intents)
     # The side is where it drives or looks.
     if any(isinstance(step, act.Beside | act.Face | act.StopAt) for step in steps):
         return ()
-    return sentence.side_notes if any(target.near for intent in intents for target in targets_of(intent)) else ()
+    return sentence.side_notes if any(target.near for intent in intents for target in act.targets_of(intent)) else ()
 
 
 def _check_length(text: str) -> None:

@@ -4,6 +4,7 @@
 clockwise (positive is to the right); distances are in metres.
 """
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -126,155 +127,136 @@ class Target:
         return told
 
 
+class Step:
+    """A step of a command; ``do`` is its name in JSON, such as ``stop_at``."""
+
+    __slots__ = ()
+    do: ClassVar[str]
+
+    def __init_subclass__(cls) -> None:
+        cls.do = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+
+
 @dataclass(frozen=True, slots=True)
-class Go:
+class Go(Step):
     """Drive to a target."""
 
-    do: ClassVar[str] = "go"
     to: Target
 
 
 @dataclass(frozen=True, slots=True)
-class Face:
+class Face(Step):
     """Turn on the spot until a target is ahead, on the left, on the right, or behind."""
 
-    do: ClassVar[str] = "face"
     to: Target
     side: Side = Side.AHEAD
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class Turn(Step):
     """Turn on the spot by an angle, or to a heading of the compass (0 north, 90 east); one of the two is given."""
 
-    do: ClassVar[str] = "turn"
     degrees: float | None = None
     heading: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class Move(Step):
     """Drive straight ahead, or backwards by a negative distance."""
 
-    do: ClassVar[str] = "move"
     metres: float
 
 
 @dataclass(frozen=True, slots=True)
-class Between:
+class Between(Step):
     """Drive to the middle between two targets; `TargetKind.HERE` is where the robot stands."""
 
-    do: ClassVar[str] = "between"
     of: tuple[Target, Target]
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class Beside(Step):
     """Drive to a side of a target; without a distance as near as the robot's skill goes."""
 
-    do: ClassVar[str] = "beside"
     of: Target
     side: Side
     metres: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class StopAt:
+class StopAt(Step):
     """Stop at a distance from a target, on the side where the robot comes from."""
 
-    do: ClassVar[str] = "stop_at"
     of: Target
     metres: float
 
 
 @dataclass(frozen=True, slots=True)
-class Circle:
+class Circle(Step):
     """Drive around a target, once; with ``views`` stop at this many points and look at it."""
 
-    do: ClassVar[str] = "circle"
     of: Target
     views: int | None = None
     way: TurnSense = TurnSense.ANY
 
 
 @dataclass(frozen=True, slots=True)
-class VisitEach:
+class VisitEach(Step):
     """Drive to every instance of a target, the nearest first."""
 
-    do: ClassVar[str] = "visit_each"
     of: Target
 
 
 @dataclass(frozen=True, slots=True)
-class Wait:
+class Wait(Step):
     """Stand still for some seconds; None where no time was said."""
 
-    do: ClassVar[str] = "wait"
     seconds: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Return:
+class Return(Step):
     """Drive back to where the robot stood when the command began."""
-
-    do: ClassVar[str] = "return"
 
 
 @dataclass(frozen=True, slots=True)
-class Repeat:
+class Repeat(Step):
     """Do the same several times."""
 
-    do: ClassVar[str] = "repeat"
     times: int
     body: "tuple[Intent, ...]"
 
 
 @dataclass(frozen=True, slots=True)
-class If:
+class If(Step):
     """Do one thing where the map has a target, and another where it has none; one of them may be nothing."""
 
-    do: ClassVar[str] = "if"
     of: Target
     body: "tuple[Intent, ...]" = ()
     otherwise: "tuple[Intent, ...]" = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Refuse:
+class Refuse(Step):
     """The robot does nothing; ``said`` is the sentence that says why."""
 
-    do: ClassVar[str] = "refuse"
     reason: RefusalReason
     said: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, slots=True)
-class Clarify:
+class Clarify(Step):
     """The robot does nothing until a question is answered: one of ``choices``, whose intents are ``meanings``."""
 
-    do: ClassVar[str] = "clarify"
     question: str = field(default="", compare=False)
     choices: tuple[str, ...] = field(default=(), compare=False)
     meanings: "tuple[tuple[Intent, ...], ...]" = field(default=(), compare=False)
 
 
 Intent = (
-    Go
-    | Face
-    | Turn
-    | Move
-    | Between
-    | Beside
-    | StopAt
-    | Circle
-    | VisitEach
-    | Wait
-    | Return
-    | Repeat
-    | If
-    | Refuse
+    Go | Face | Turn | Move | Between | Beside | StopAt | Circle | VisitEach | Wait | Return | Repeat | If | Refuse
     | Clarify
-)
+)  # fmt: skip
 
 
 def to_json(intent: Intent) -> dict[str, Any]:

@@ -199,9 +199,14 @@ def examples() -> tuple[tuple[str, str], ...]:
 
 def prompt(command: str) -> str:
     """Return the examples that are nearest to a command, the nearest last, and the command as a comment."""
-    own, forms = _form(command), enumerate(_forms()[_ALWAYS:], _ALWAYS)
-    nearest = sorted((_alike(own, form), at) for at, form in forms)[-_NEAREST:]
-    return f"{_head()}{_shown([at for _, at in nearest])}# {' '.join(command.split())}\n"
+    own, forms, weights = _form(command), _forms(), _weights()
+
+    def likeness(at: int) -> float:
+        size = sum(weights[part] for part in forms[at])
+        return sum(weights[part] for part in own & forms[at]) / math.sqrt(size or 1.0)
+
+    nearest = sorted(range(_ALWAYS, len(forms)), key=likeness)[-_NEAREST:]
+    return f"{_head()}{_shown(nearest)}# {' '.join(command.split())}\n"
 
 
 def _head() -> str:
@@ -230,12 +235,6 @@ def _forms() -> tuple[frozenset[str], ...]:
 def _weights() -> Mapping[str, float]:
     counts = Counter(part for form in _forms() for part in form)
     return {part: math.log(len(_forms()) / count) for part, count in counts.items()}
-
-
-def _alike(a: frozenset[str], b: frozenset[str]) -> float:
-    weights = _weights()
-    shared, of_a, of_b = (sum(weights.get(part, 1.0) for part in parts) for parts in (a & b, a, b))
-    return shared / math.sqrt((of_a or 1.0) * (of_b or 1.0))
 
 
 # The model.

@@ -81,20 +81,9 @@ class ChatTranslator:
         return self._translated(command, _opening(command))
 
     def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
-        """Return a program for what is left of a command after its program failed, None where no round is left.
+        """Return a program for the rest of a command, see `Translator.repair`; None where no round is left.
 
-        The new program continues from where the robot stands: it is not to repeat what was done, and nothing that the
-        failed program gave a name to is known in it.
-
-        Args:
-            command: what the person said.
-            program: the program that failed.
-            error: the sentence that says why.
-            done: the steps that were done before it failed, one text each, such as `move_to(target="sofa")`. Without
-                them the prompt says that all before the failing line was done; the model has to find that line.
-
-        Raises:
-            LanguageError: no answer came, or none held a program.
+        Without the steps that were done the prompt says that all before the failing line was.
         """
         if command != self._command:
             self._command, self._rounds_used = command, 0
