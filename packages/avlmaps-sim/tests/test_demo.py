@@ -14,7 +14,7 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.core.question import Modality
 from avlmaps.language.translator import command_to_program
 from avlmaps.navigate.instruct import Outcome
-from avlmaps.navigate.motion_log import LoggedMove
+from avlmaps.navigate.skills import LoggedMove
 from avlmaps.perception.embedded.scene_network import load_network
 from avlmaps_sim import furniture
 from avlmaps_sim.demo import run_demo

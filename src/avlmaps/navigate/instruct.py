@@ -21,8 +21,7 @@ from avlmaps.navigate.brake import Brake, braked
 from avlmaps.navigate.driver import Driver
 from avlmaps.navigate.file_access import Readable, offered_by
 from avlmaps.navigate.grounding import Heats
-from avlmaps.navigate.motion_log import LoggedMove
-from avlmaps.navigate.skills import Robot, RobotSettings
+from avlmaps.navigate.skills import LoggedMove, Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.sound_sources import no_sources
 from avlmaps.query.whereabouts import own_names

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import pi, radians
 from time import sleep
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -24,12 +24,82 @@ from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline, bearing_rad, middle_between, to_the_left
 from avlmaps.navigate.grounding import Heats, Seeker, kind_of, number_of, text_of
 from avlmaps.navigate.instances import Destination
-from avlmaps.navigate.motion_log import LoggedMove, Triple, concat_motions
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 
 _NORTH, _EAST = np.array([0.0, 1.0]), np.array([1.0, 0.0])
 _MOST_M, _MOST_TURNS_DEG, _MOST_WAIT_S = 1000.0, 3600.0, 600.0
+
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoggedMove:
+    """One movement that a skill made.
+
+    Attributes:
+        skill: which skill.
+        name: of the thing that it went to; ``""`` for a turn or a place.
+        goal: where it was to end, world, metres; None for a turn.
+        stop: where it ended, world, on the floor.
+        distance_m: from the goal to where it ended, over the ground (the world need not be level); None for a turn.
+        heading_rad: where it looks then, level frame, counter-clockwise from +x.
+        reached: whether the driver reached its goal.
+        actions: the discrete actions taken.
+        path: (n, 2) places passed, level x and y.
+        note: what the driver had to say.
+        contacts: how often the robot touched something.
+    """
+
+    skill: str
+    name: str
+    goal: Triple | None
+    stop: Triple
+    distance_m: float | None
+    heading_rad: float
+    reached: bool
+    actions: tuple[Action, ...]
+    path: Float[np.ndarray, "n 2"]
+    note: str = ""
+    contacts: int = 0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as a subgoal or a step's result is printed."""
+        answer: dict[str, Any] = {"skill": self.skill, "name": self.name}
+        if self.goal is not None:
+            answer |= {"goal": _rounded(self.goal)}
+        answer |= {"stop": _rounded(self.stop)}
+        if self.distance_m is not None:
+            answer |= {"distance_m": round(self.distance_m, 4)}
+        answer |= {"heading_rad": round(self.heading_rad, 4), "reached": self.reached}
+        return (
+            answer | ({"contacts": self.contacts} if self.contacts else {}) | ({"note": self.note} if self.note else {})
+        )
+
+    def __str__(self) -> str:
+        x, y, z = self.stop
+        where = f"stands at ({x:.2f}, {y:.2f}, {z:.2f}) m, heading {np.rad2deg(self.heading_rad):.0f}°"
+        away = "" if self.distance_m is None else f", {self.distance_m:.2f} m from the goal"
+        return where + away + (f" ({self.note.rstrip('.')})" if self.note else "")
+
+
+def _joined(arrivals: Sequence[Arrival]) -> Arrival:
+    """Return several movements as one."""
+    last = arrivals[-1]
+    notes = dict.fromkeys(arrival.note for arrival in arrivals if arrival.note)
+    return Arrival(
+        all(arrival.reached for arrival in arrivals),
+        last.pose,
+        tuple(action for arrival in arrivals for action in arrival.actions),
+        np.concatenate([arrival.path for arrival in arrivals]),
+        "; ".join(notes),
+        sum(arrival.contacts for arrival in arrivals),
+    )
+
+
+def _rounded(place: Triple) -> list[float]:
+    return [round(value, 4) for value in place]
 
 
 @dataclass(frozen=True, slots=True)
@@ -342,7 +412,7 @@ class Robot:
         """
         if goal is not None and arrivals[-1].actions and arrivals[-1].actions[-1] is not Action.STOP:
             arrivals = [*arrivals, self.driver.stop()]
-        arrival = concat_motions(arrivals)
+        arrival = _joined(arrivals)
         world = self.asked.space.world
         pose = arrival.pose
         here = np.array([pose.x_m, pose.y_m])

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.printable import plot_text
 from avlmaps.maps.obstacles import CellState, Obstacles
-from avlmaps.navigate.motion_log import LoggedMove
+from avlmaps.navigate.skills import LoggedMove
 from avlmaps.query.plots import INK, TopDown, aside, draw_ground, finish, mark, panels, save
 from avlmaps.query.voxel_space import Space
 

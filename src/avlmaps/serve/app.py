@@ -145,7 +145,7 @@ async def _answered(service: Service, operation: Operation, request: Request) ->
         if request.headers.get("if-none-match") == tag and not request.query_params and request.method == "GET":
             return Response(status_code=304, headers={"etag": tag})
         file = await lane.run(job)
-        return Response(file.content, 200, file.headers, file.media_type)
+        return Response(file.content, 200, {"etag": tag}, file.media_type)
     if EVENTS not in request.headers.get("accept", ""):
         return Response(await lane.run(job), media_type=JSON_TYPE)
     loop = asyncio.get_running_loop()

@@ -73,7 +73,6 @@ class File:
 
     content: bytes
     media_type: str
-    headers: dict[str, str] = field(default_factory=dict)
 
 
 class MapEntry(TypedDict):
@@ -221,7 +220,7 @@ def sound_clip(task: WorkInput, query: requests.SoundQuery) -> File:
         raise RequestError(
             "The map is being replaced and its old clips are gone; try again in a second.", 503
         ) from None
-    return File(content, "audio/flac", {"etag": f'"{task.map.version}"'})
+    return File(content, "audio/flac")
 
 
 def ask_map(task: WorkInput, query: requests.AskQuery) -> Answer:
@@ -279,13 +278,11 @@ def path(task: WorkInput, query: requests.PathQuery) -> PathAnswer:
 
 def picture(task: WorkInput, query: requests.PictureQuery) -> File:
     """Return a PNG of an answer, or of the map."""
-    values = {name: getattr(query, name) for name in requests.AskQuery.__struct_fields__}
-    named = any(values[name] is not None for name in ("object", "sound", "area"))
-    asks = named or bool((query.sentence or "").strip()) or task.files
+    asks = query.object or query.sound or query.area or (query.sentence or "").strip() or task.files
     if not asks and query.intrinsics is None:
         content = map_picture(task.map) if query.size == "full" else small_picture(task.map)
         return File(content, "image/png")
-    answer = ask_map(task, requests.AskQuery(**values))
+    answer = ask_map(task, query)
     task.watch.step("drawing")
     draw = full_picture if query.size == "full" else small_picture
     return File(draw(task.map, answer), "image/png")
@@ -309,7 +306,7 @@ def tile(task: WorkInput, query: requests.TilesQuery) -> File:
     content = _pyramid(task).tile(query.level, (query.i, query.j, query.k), heat)
     if content is None:
         raise RequestError("There is no such tile; /maps/{map}/tiles lists them.", 404, "tile")
-    return File(content, "application/octet-stream", {"etag": f'"{task.map.version}"'})
+    return File(content, "application/octet-stream")
 
 
 # For agents.
@@ -501,7 +498,7 @@ def keyframe(task: WorkInput, query: requests.KeyframeQuery) -> File:
         raise RequestError(
             f"The map has {len(keyframes)} keyframes, counted from 0; there is no picture of {number}.", 404
         )
-    return File(jpeg, "image/jpeg", {"etag": f'"{task.map.version}"'})
+    return File(jpeg, "image/jpeg")
 
 
 def ask_in_view(task: WorkInput, query: AskQuery) -> File:

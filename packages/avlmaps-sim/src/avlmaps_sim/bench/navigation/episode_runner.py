@@ -14,8 +14,7 @@ from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.bodies import Body
 from avlmaps.navigate.driver import Driver
 from avlmaps.navigate.file_access import Readable
-from avlmaps.navigate.motion_log import LoggedMove
-from avlmaps.navigate.skills import Robot, RobotSettings
+from avlmaps.navigate.skills import LoggedMove, Robot, RobotSettings
 from avlmaps_sim.bench.navigation.episodes import Episode, Leg, path_length_m
 from avlmaps_sim.bench.navigation.evidence import Floor
 from avlmaps_sim.bench.navigation.map_variants import Configuration, KnownScene, Perceived
