@@ -16,7 +16,7 @@ from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import (
     ChannelSound,
     GrowingTrack,
-    channel_faults,
+    level_faults,
     read_channels,
     useless_channels,
     with_microphones,
@@ -142,7 +142,8 @@ def test_files_of_channels_lie_beside_the_description(tmp_path: Path, name: str)
 def faults(folder: Path, samples: np.ndarray) -> list[str]:
     soundfile.write(folder / "track.wav", samples.T, RATE_HZ, subtype="FLOAT")
     track = AudioTrack.open(folder / "track.wav")
-    return channel_faults(with_microphones(track, Microphones(microphones_named("square4").position_m[: len(samples)])))
+    track = with_microphones(track, Microphones(microphones_named("square4").position_m[: len(samples)]))
+    return [*useless_channels(track), *level_faults(track)[1]]
 
 
 def test_faults_of_channels_are_named_and_a_sound_array_has_none(tmp_path: Path) -> None:

@@ -95,12 +95,12 @@ def test_a_reader_that_is_wrong_is_told_how(tmp_path: Path, shoebox: Format, cha
 def test_a_package_that_cannot_be_imported_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     broken = EntryPoint("gone", "no_such_package:FORMAT", known_formats.ENTRY_POINT_GROUP)
     monkeypatch.setattr(known_formats, "entry_points", lambda group: [broken])
-    known_formats.forget_brought()
+    known_formats._brought_formats.cache_clear()
     try:
         with pytest.raises(RecordingError, match=r"The recording format 'gone' cannot be loaded from no_such_package"):
             find_format(tmp_path)
     finally:
-        known_formats.forget_brought()
+        known_formats._brought_formats.cache_clear()
 
 
 @pytest.mark.nightly

@@ -118,16 +118,6 @@ def write_channels(path: Path, sound: ChannelSound) -> None:
     write_samples(path, [sound.samples.T], sound.rate_hz, len(sound.samples))
 
 
-def channel_faults(track: AudioTrack) -> list[str]:
-    """Return a sentence for each fault of a track's channels: dead, copied or clipped.
-
-    Looks at pieces spread over the track. Channels that are exchanged show only where they are compared with the
-    geometry along the drive (``avlmaps.maps.sources.wiring``).
-    """
-    samples = _looked_at(track)
-    return [*_dead(samples, track), *_copied(samples, track), *_clipped(samples, track)]
-
-
 def level_faults(track: AudioTrack, name: str = "") -> tuple[list[str], list[str]]:
     """Return what is silent about a track, and which of its channels are clipped: their loud sounds are like others.
 
@@ -139,7 +129,11 @@ def level_faults(track: AudioTrack, name: str = "") -> tuple[list[str], list[str
 
 
 def useless_channels(track: AudioTrack, name: str = "") -> list[str]:
-    """Return those of the faults with which an array shows no direction: channels that are dead, or another's copy."""
+    """Return a sentence for each channel that is dead or another's copy, so that an array shows no direction.
+
+    Channels that are exchanged show only where they are compared with the geometry along the drive
+    (``avlmaps.maps.sources.wiring``).
+    """
     samples = _looked_at(track)
     if not np.ptp(samples) and (silent := _silent(samples, track, name)):
         return [f"{silent[0]} Check the microphones, and which input was recorded."]

@@ -174,11 +174,6 @@ def formats() -> tuple[Format, ...]:
     return (*FORMATS, *(known for name, known in own.items() if name not in _BUILT_IN))
 
 
-def forget_brought() -> None:
-    """Look for other packages' formats again at the next call of ``formats``."""
-    _brought_formats.cache_clear()
-
-
 @cache
 def _brought_formats() -> tuple[Format, ...]:
     return tuple(_brought(entry.name, entry.value) for entry in entry_points(group=ENTRY_POINT_GROUP))

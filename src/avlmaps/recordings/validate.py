@@ -10,7 +10,7 @@ from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.core.files import user_path
 from avlmaps.core.progress import progress
 from avlmaps.recordings import images
-from avlmaps.recordings.channels import channel_faults
+from avlmaps.recordings.channels import level_faults, useless_channels
 from avlmaps.recordings.corrections import uncorrected
 from avlmaps.recordings.faults import Fault, listed, report
 from avlmaps.recordings.formats.file_recording import FileRecording
@@ -60,8 +60,9 @@ def _check_audio(recording: Recording) -> None:
     try:
         for _ in recording.audio.blocks(60.0):
             pass
-        for sentence in channel_faults(recording.audio) if recording.audio.microphones is not None else ():
-            report(sentence, recording.audio.path, fatal=False)
+        if recording.audio.microphones is not None:
+            for sentence in (*useless_channels(recording.audio), *level_faults(recording.audio)[1]):
+                report(sentence, recording.audio.path, fatal=False)
     except AvlmapsError as error:
         report(str(error), recording.audio.path, fatal=False)
 

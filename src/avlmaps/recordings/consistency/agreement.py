@@ -179,16 +179,15 @@ def _apart(pose: Float[np.ndarray, "n 4 4"]) -> list[tuple[int, int]]:
     return found
 
 
-def steps_between(one: Float[np.ndarray, "4 4"], others: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, " n"]:
-    """Return how far cameras are from one, in steps."""
-    away_m = np.linalg.norm(others[:, :3, 3] - one[:3, 3], axis=1)
+def steps_between(one: Float[np.ndarray, "*n 4 4"], others: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, " n"]:
+    """Return how far cameras are from one, or each from its own, in steps."""
+    away_m = np.linalg.norm(others[:, :3, 3] - one[..., :3, 3], axis=1)
     return away_m / STEP_M + rotation_angle_rad(np.broadcast_to(one, others.shape), others) / STEP_RAD
 
 
 def steps_between_all(pose: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, " m"]:
     """Return how far each camera is from the one before, in steps."""
-    away_m = np.linalg.norm(np.diff(pose[:, :3, 3], axis=0), axis=1)
-    return away_m / STEP_M + rotation_angle_rad(pose[:-1], pose[1:]) / STEP_RAD
+    return steps_between(pose[:-1], pose[1:])
 
 
 def odd_steps(recording: Recording) -> Bool[np.ndarray, " m"]:

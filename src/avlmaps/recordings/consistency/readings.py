@@ -414,10 +414,6 @@ def _told(reading: Reading, rig: Rig, median_m: float) -> Iterator[tuple[str, st
         parts = zip(reading.off_centre, (rig.rgb.width, rig.rgb.height), "xy", strict=True)
         by = " and ".join(f"{share * size:+.0f} pixels in {axis}" for share, size, axis in parts if share)
         yield f"the principal point looks {by} off, or the camera turned by as many in its mount", ""
-    yield from _told_of_pictures(reading)
-
-
-def _told_of_pictures(reading: Reading) -> Iterator[tuple[str, str]]:
     if late := reading.depth_late:
         by_hand = f"pair each frame with the depth picture {abs(late)} {'later' if late > 0 else 'earlier'}"
         yield f"the depth pictures look {abs(late)} frame(s) {_late(late)}", by_hand
