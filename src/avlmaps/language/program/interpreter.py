@@ -136,12 +136,7 @@ def run_program(
         budget: what the run may use up; the defaults where none is given.
         on_step: called with each step once it is over, a failed one too.
         clock: seconds; replaced in tests.
-
-    Raises:
-        TypeError: the vocabulary lacks a skill, or a skill returned what its signature does not promise.
     """
-    if not isinstance(vocabulary, RobotSkills):
-        raise TypeError(f"{type(vocabulary).__name__} does not have every skill of a Vocabulary")
     run = _Run(vocabulary, budget or Budget(), on_step or (lambda step: None), clock)
     error = error_type = None
     try:
