@@ -8,7 +8,7 @@ from avlmaps.core.extras import SIMULATOR, how_to_get, install_command
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.registry import brought, entry_points
 from avlmaps.navigate.bodies import BASE, BodyShape
-from avlmaps.navigate.driver import Driver, MapDriver
+from avlmaps.navigate.driver import Driver, Holdable, MapDriver
 from avlmaps.navigate.interrupts import Halt
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 SCENES_GROUP, ROBOTS_GROUP = "avlmaps.scenes", "avlmaps.robots"
 
 
-class RobotDriver(Driver, Protocol):
-    """Drives a robot that may move on when nobody watches it."""
+class RobotDriver(Driver, Holdable, Protocol):
+    """Drives a robot that may move on when nobody watches it, and whose movement under way can be ended."""
 
     def fault(self) -> str:
         """Return why the robot cannot be driven now, in part of a sentence; "" where it can."""

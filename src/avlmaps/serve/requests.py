@@ -87,10 +87,13 @@ class ListedThingsQuery(ThingsQuery):
     at: Annotated[Short | None, Meta(description=f"of a map of several days: {_DAY}")] = None
 
 
-class ThingsToolQuery(ListedThingsQuery):
+class ThingsToolQuery(ThingsQuery):
     """Which things an agent reads."""
 
-    top: Top = 10  # pyright: ignore[reportIncompatibleVariableOverride] - always a page
+    room: Annotated[Name | None, Meta(description="one, or all of a kind")] = None
+    near: Annotated[Name | None, Meta(description="x,y,z or a thing's name: nearest first")] = None
+    top: Top = 10
+    page: Page = 1
 
 
 class RoomsQuery(Request):
