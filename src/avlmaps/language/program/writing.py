@@ -6,9 +6,12 @@ A target that is needed more than once, or in a loop, is looked up once, so that
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from keyword import kwlist
 
 from avlmaps.language import intents as act
 from avlmaps.language.intents import Intent, Pick, Side, Target, TargetKind, TurnSense, blocks_of, targets_of
+from avlmaps.language.program.parser import BUILTINS
+from avlmaps.language.program.vocabulary import SKILLS
 
 _CORNERS = 8
 _WAIT_S = 3.0
@@ -16,6 +19,7 @@ _SKILLS = {
     Side.LEFT: "move_to_left", Side.RIGHT: "move_to_right", Side.NORTH: "move_north", Side.SOUTH: "move_south",
     Side.EAST: "move_east", Side.WEST: "move_west",
 }  # fmt: skip
+_RESERVED = frozenset({*map(str.lower, kwlist), *BUILTINS, *SKILLS, "robot", "start", "place", "print"})
 _FACING = {Side.AHEAD: "face", Side.LEFT: "with_object_on_left", Side.RIGHT: "with_object_on_right"}
 
 
@@ -211,15 +215,6 @@ class _Writer:
         heat = f"heat{self.taken['heat']}"
         self.add(f"{heat} = {' * '.join(factors)}")
         return heat
-
-
-_RESERVED = frozenset({
-    "robot", "start", "place", "for", "in", "if", "and", "or", "not", "is", "range", "len", "def", "pass", "while",
-    "from",
-    "import", "with", "as", "none", "true", "false", "class", "return", "else", "elif", "del", "try", "lambda", "abs",
-    "min",
-    "max", "print",
-})  # fmt: skip
 
 
 def _counted(intents: Sequence[Intent]) -> Counter[Target]:
