@@ -290,9 +290,10 @@ def add_features(
         if not size < np.inf:
             faults += 1
             continue
-        weight[rows[voxel]] += amount
+        row = np.int64(rows[voxel])  # looked up once, or the loop is not vectorised: sums might lie over rows
+        weight[row] += amount
         for column in range(dim):
-            feature_sum[rows[voxel], column] += total[column]
+            feature_sum[row, column] += total[column]
     return faults
 
 
