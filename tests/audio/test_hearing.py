@@ -107,7 +107,7 @@ def test_an_encoder_that_breaks_its_promise_is_named(tmp_path: Path) -> None:
 
 
 def test_settings_that_make_no_sense_are_told() -> None:
-    with pytest.raises(AudioError, match=r"hearing.quiet_s is -1.0; choose 0 or more\."):
+    with pytest.raises(AudioError, match=r"quiet_s of HearingSettings is -1; choose 0 or more\."):
         HearingSettings(quiet_s=-1.0)
 
 

@@ -207,7 +207,7 @@ def test_the_papers_rule_hears_both_signs(tmp_path: Path) -> None:
 
 
 def test_settings_that_make_no_sense_are_told() -> None:
-    with pytest.raises(AudioError, match=r"The segmentation's max_length_s is -1.0; choose a positive number\."):
+    with pytest.raises(AudioError, match=r"max_length_s of SegmentationSettings is -1; choose a positive number\."):
         SegmentationSettings(max_length_s=-1.0)
     with pytest.raises(AudioError, match=r"onset_db is 1.0, less than release_db \(2.5\); choose more."):
         SegmentationSettings(onset_db=1.0)

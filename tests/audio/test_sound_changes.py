@@ -169,7 +169,7 @@ def test_an_encoder_that_breaks_its_promise_is_named(tmp_path: Path) -> None:
 
 
 def test_settings_that_make_no_sense_are_told_and_old_maps_lack_them() -> None:
-    with pytest.raises(AudioError, match=r"hearing.changes.change_s is 0.0; choose a positive number\."):
+    with pytest.raises(AudioError, match=r"change_s of SoundChangeSettings is 0; choose a positive number\."):
         SoundChangeSettings(change_s=0.0)
     with pytest.raises(AudioError, match=r"max_length_s is 0.3; choose at least twice change_s \(0.2\)\."):
         SoundChangeSettings(max_length_s=0.3)

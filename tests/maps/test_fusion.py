@@ -240,7 +240,7 @@ def test_parts_of_another_profile_are_refused():
 
 @pytest.mark.parametrize("settings", [(0.0, 1.0), (2.0, 1.0), (0.1, np.inf), (0.1, np.nan), (-1.0, 1.0)])
 def test_depth_limits_that_are_no_range_are_refused(settings):
-    with pytest.raises(MapError, match="are no range; let it begin above 0 and end at a finite, greater depth"):
+    with pytest.raises(MapError, match="are no range; let it end farther|choose a positive number"):
         FusionSettings(*settings)
 
 
@@ -261,12 +261,6 @@ def test_parts_may_be_memory_mapped_and_results_written_to_files(tmp_path):
     merged = VoxelAccumulator(GRID, 5)
     merged.merge(mapped)
     assert_same_sums(merged.sums(), expected)
-    out = np.lib.format.open_memmap(tmp_path / "out.npy", "w+", np.float16, (len(whole), 5))
-    written = whole.voxels(feature_out=out)
-    assert written.feature is out
-    np.testing.assert_array_equal(np.load(tmp_path / "out.npy"), whole.voxels().feature)
-    with pytest.raises(ValueError, match=r"feature_out is float32 of \(1, 5\); this map needs float16"):
-        whole.voxels(feature_out=np.zeros((1, 5), np.float32))
 
 
 def test_a_map_grows_through_many_enlargements():

@@ -99,8 +99,18 @@ def checked(error: type[Exception]) -> Callable[[Callable[P, T]], Callable[P, T]
     return of
 
 
-def hold_numbers(settings: Any, error: type[Exception]) -> None:
-    """Make the numbers of frozen settings those of Python, so that they can be compared and written into a map."""
+def hold_numbers(
+    settings: Any, error: type[Exception], *, positive: str = "", least_0: str = "", least_1: str = ""
+) -> None:
+    """Make the numbers of frozen settings those of Python, so that they can be compared and written into a map.
+
+    Args:
+        settings: of which a field has a wrong kind, or a number that is not finite or out of its bounds, is refused.
+        error: how.
+        positive: names of fields, one after the other, that must be more than 0; None is no number.
+        least_0: that must be 0 or more.
+        least_1: that must be 1 or more.
+    """
     for field in fields(settings):
         kind: Any = field.type
         given, name = getattr(settings, field.name), f"{field.name} of {type(settings).__name__}"
@@ -112,3 +122,9 @@ def hold_numbers(settings: Any, error: type[Exception]) -> None:
         if held is None:
             raise error(f"{name} must be {_WANTED[kind]}, not {_came(given)}.")
         object.__setattr__(settings, field.name, held)
+    bounds = (positive, 5e-324, "a positive number"), (least_0, 0, "0 or more"), (least_1, 1, "1 or more")
+    for names, least, wanted in bounds:
+        for name in names.split():
+            value: float | None = getattr(settings, name)
+            if value is not None and not least <= value < inf:
+                raise error(f"{name} of {type(settings).__name__} is {value:g}; choose {wanted}.")

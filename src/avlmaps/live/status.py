@@ -37,13 +37,10 @@ class LiveSettings:
     """Seconds from one save to the next, at least."""
 
     def __post_init__(self) -> None:
-        hold_numbers(self, MapError)
-        for name in ("most_waiting", "known_views", "first_frames"):
-            if not getattr(self, name) >= 1:
-                raise MapError(f"{name} of a live map is {getattr(self, name)}; choose 1 or more.")
-        for name in ("still_m", "still_deg", "new_share", "snapshot_s", "save_s"):
-            if not getattr(self, name) >= 0.0:
-                raise MapError(f"{name} of a live map is {getattr(self, name)}; choose 0 or more.")
+        hold_numbers(
+            self, MapError, least_0="still_m still_deg new_share snapshot_s save_s",
+            least_1="most_waiting known_views first_frames",
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

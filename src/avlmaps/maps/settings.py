@@ -34,11 +34,8 @@ class FrameSettings:
         return self.per_submap or self.per_part
 
     def __post_init__(self) -> None:
-        hold_numbers(self, MapError)
-        _require(self.step >= 1, f"frames.step is {self.step}", "1 or more")
-        _require(self.per_part >= 1, f"frames.per_part is {self.per_part}", "1 or more")
-        _require(self.per_submap >= 0, f"frames.per_submap is {self.per_submap}", "0 (none) or more")
-        _require(0.0 <= self.max_bad_share <= 1.0, f"max_bad_share is {self.max_bad_share}", "between 0 and 1")
+        hold_numbers(self, MapError, least_0="per_submap max_bad_share", least_1="step per_part")
+        _require(self.max_bad_share <= 1.0, f"max_bad_share is {self.max_bad_share}", "between 0 and 1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +48,7 @@ class GravitySettings:
     """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames."""
 
     def __post_init__(self) -> None:
-        hold_numbers(self, MapError)
-        _require(self.frames >= 1, f"gravity.frames is {self.frames}", "1 or more")
+        hold_numbers(self, MapError, least_1="frames")
         height_m = self.camera_height_m
         _require(
             height_m is None or 0.02 <= height_m <= 10.0,
@@ -81,9 +77,8 @@ class BuildSettings:
     """Seed of what is drawn at random (visual words, RANSAC)."""
 
     def __post_init__(self) -> None:
-        hold_numbers(self, MapError)
+        hold_numbers(self, MapError, least_0="seed")
         _require(0.001 <= self.voxel_size_m <= 10.0, f"The voxel size is {self.voxel_size_m} m", "between 0.001 and 10")
-        _require(self.seed >= 0, f"seed is {self.seed}", "0 or more")
 
     def for_profile(self, weight_variance_m2: float) -> "BuildSettings":
         """Return the settings with what was left to the profile filled in."""

@@ -3,8 +3,6 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-
 from avlmaps.core.errors import AudioError
 from avlmaps.core.numbers import hold_numbers
 
@@ -41,12 +39,10 @@ class SegmentationSettings:
     """Of method silence: a pause of this length divides two sounds."""
 
     def __post_init__(self) -> None:
-        hold_numbers(self, AudioError)
-        positive = ("smoothing_s", "background_window_s", "range_db", "tail_db", "max_length_s", "silence_s")
-        for name in (*positive, "merge_gap_s", "min_length_s", "padding_s", "silence_threshold", "release_db"):
-            value = getattr(self, name)
-            if not np.isfinite(value) or value < 0.0 or (name in positive and value == 0.0):
-                raise AudioError(f"The segmentation's {name} is {value}; choose a positive number.")
+        hold_numbers(
+            self, AudioError, positive="smoothing_s background_window_s range_db tail_db max_length_s silence_s",
+            least_0="merge_gap_s min_length_s padding_s silence_threshold release_db",
+        )  # fmt: skip
         if self.onset_db < self.release_db:
             raise AudioError(f"onset_db is {self.onset_db}, less than release_db ({self.release_db}); choose more.")
         if self.max_length_s <= self.min_length_s:
@@ -64,16 +60,9 @@ class SoundChangeSettings:
     """A stretch that lasts longer is cut where that costs least: the robot moves on, and its places with it."""
 
     def __post_init__(self) -> None:
-        hold_numbers(self, AudioError)
-        for name in ("change_s", "max_length_s"):
-            value = getattr(self, name)
-            if not np.isfinite(value) or value <= 0.0:
-                raise AudioError(f"hearing.changes.{name} is {value}; choose a positive number.")
+        hold_numbers(self, AudioError, positive="change_s max_length_s")
         if self.max_length_s < 2.0 * self.change_s:
-            raise AudioError(
-                f"hearing.changes.max_length_s is {self.max_length_s}; choose at least twice change_s "
-                f"({self.change_s})."
-            )
+            raise AudioError(f"max_length_s is {self.max_length_s}; choose at least twice change_s ({self.change_s}).")
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +82,4 @@ class HearingSettings:
     """Dividing the track where what sounds changes."""
 
     def __post_init__(self) -> None:
-        hold_numbers(self, AudioError)
-        for name in ("noise_reduction_db", "quiet_s"):
-            value = getattr(self, name)
-            if not np.isfinite(value) or value < 0.0:
-                raise AudioError(f"hearing.{name} is {value}; choose 0 or more.")
+        hold_numbers(self, AudioError, least_0="noise_reduction_db quiet_s")

@@ -50,15 +50,10 @@ class SensorModel:
     """Remove groups of up to this many voxels that stand alone and that no more than 2 frames hit."""
 
     def __post_init__(self) -> None:
-        hold_numbers(self, MapError)
-        finite = np.isfinite([self.noise_m, self.noise_per_m, self.clear_sigmas, self.smear_sigmas]).all()
-        limits = self.worst_voxels, self.edge_sigmas, self.steepest_deg, self.smear_ratio
-        positive = all(limit > 0.0 for limit in limits if limit is not None)
-        errors = self.noise_m, self.noise_per_m, self.clear_sigmas, self.smear_sigmas, self.speck_voxels
-        if not (finite and positive and min(errors) >= 0.0):
-            raise MapError(
-                f"The sensor model {self} is not usable; choose finite errors of 0 or more and limits greater than 0."
-            )
+        hold_numbers(
+            self, MapError, positive="worst_voxels edge_sigmas steepest_deg smear_ratio",
+            least_0="noise_m noise_per_m clear_sigmas smear_sigmas speck_voxels",
+        )  # fmt: skip
         if self.steepest_deg > 90.0:
             raise MapError(f"steepest_deg is {self.steepest_deg}; choose an angle up to 90 degrees.")
 
@@ -120,14 +115,9 @@ class FusionSettings:
     paper."""
 
     def __post_init__(self) -> None:
-        hold_numbers(self, MapError)
-        if not 0.0 < self.min_depth_m < self.max_depth_m < np.inf:
-            raise MapError(
-                f"Depths from {self.min_depth_m} to {self.max_depth_m} m are no range; "
-                "let it begin above 0 and end at a finite, greater depth."
-            )
-        if not 0.0 < self.variance_m2 < np.inf:
-            raise MapError(f"The weight's variance is {self.weight_variance_m2}; it must be positive and finite.")
+        hold_numbers(self, MapError, positive="min_depth_m max_depth_m weight_variance_m2")
+        if self.min_depth_m >= self.max_depth_m:
+            raise MapError(f"Depths from {self.min_depth_m} to {self.max_depth_m} m are no range; let it end farther.")
 
     @property
     def variance_m2(self) -> float:

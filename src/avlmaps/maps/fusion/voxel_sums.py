@@ -116,12 +116,6 @@ class VoxelTable:
         self.last_seen_s[known : self.count] = -np.inf
         return found
 
-    def enter(self, index: Int32[np.ndarray, "n 3"], last_seen_s: float | np.ndarray) -> Int32[np.ndarray, " n"]:
-        """Return the row of each voxel, which all differ, as ``rows_of``, and note when it was seen."""
-        found = self.rows_of(index)
-        self.last_seen_s[found] = np.maximum(self.last_seen_s[found], last_seen_s)
-        return found
-
     @property
     def arrays(self) -> Table:
         """What `kernels.commit` adds to."""
@@ -152,7 +146,8 @@ class VoxelTable:
         if not part.spread.shape[1] or not self.spread.shape[1]:
             summed.remove("spread")
         for block in blocks(len(part), self.dim):
-            rows = self.enter(part.index[block], part.last_seen_s[block])
+            rows = self.rows_of(part.index[block])
+            self.last_seen_s[rows] = np.maximum(self.last_seen_s[rows], part.last_seen_s[block])
             for name in summed:
                 getattr(self, name)[rows] += getattr(part, name)[block]
 
@@ -160,34 +155,25 @@ class VoxelTable:
         """Return the rows in the order of their index (x, then y, then z)."""
         return sorted_rows(self.index[: self.count])
 
-    def sums(self, feature_out: np.ndarray | None = None) -> VoxelSums:
-        """Return a copy of the sums, sorted by index.
-
-        Args:
-            feature_out: where to write the sums of features, such as a memory-mapped file; by default a new array.
-        """
+    def sums(self) -> VoxelSums:
+        """Return a copy of the sums, sorted by index."""
         rows = self.sort_rows()
-        feature_sum = feature_array(feature_out, (self.count, self.dim), np.float32)
-        for block in blocks(self.count, self.dim):
-            feature_sum[block] = self.feature_sum[rows[block]]
-        others = [name for name in _FIELDS if name != "feature_sum"]
-        return VoxelSums(feature_sum=feature_sum, **{name: getattr(self, name)[rows] for name in others})
+        return VoxelSums(**{name: getattr(self, name)[rows] for name in _FIELDS})
 
     def evidence(self) -> VoxelViews:
         """Return the evidence of each voxel's surface, sorted by index, for `free_space.clean`."""
         rows = self.sort_rows()
         return VoxelViews(self.index[rows], self.hits[rows], self.views[rows], self.sharp[rows])
 
-    def voxels(self, feature_out: np.ndarray | None = None, kept: Bool[np.ndarray, " n"] | None = None) -> Voxels:
+    def voxels(self, kept: Bool[np.ndarray, " n"] | None = None) -> Voxels:
         """Return the means, sorted by index: features of unit length, colours.
 
         Args:
-            feature_out: where to write the features, such as a memory-mapped file; by default a new array.
             kept: which voxels of `evidence` to return; all by default.
         """
         rows = self.sort_rows()
         rows = rows if kept is None else rows[kept]
-        feature = feature_array(feature_out, (len(rows), self.dim), np.float16)
+        feature = np.empty((len(rows), self.dim), np.float16)
         for block in blocks(len(rows), self.dim):
             feature[block] = unit_rows(self.feature_sum[rows[block]])
         rgb_weight = self.rgb_weight[rows, None]
@@ -237,12 +223,3 @@ def blocks(count: int, dim: int) -> list[slice]:
     """Return slices that cover ``count`` rows of ``dim`` float32 in blocks of `BLOCK_BYTES`."""
     step = max(1, BLOCK_BYTES // (4 * max(dim, 1)))
     return [slice(start, min(start + step, count)) for start in range(0, count, step)]
-
-
-def feature_array(out: np.ndarray | None, shape: tuple[int, int], dtype: type[np.generic]) -> np.ndarray:
-    """Return the array that features are to be written to, checked, or a new one."""
-    if out is None:
-        return np.empty(shape, dtype)
-    if out.shape != shape or out.dtype != dtype:
-        raise ValueError(f"feature_out is {out.dtype} of {out.shape}; this map needs {np.dtype(dtype)} of {shape}")
-    return out

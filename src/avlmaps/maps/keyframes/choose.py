@@ -7,6 +7,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from avlmaps.core.arrays import Float, Int
+from avlmaps.core.errors import MapError
 from avlmaps.core.numbers import hold_numbers
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.recordings.types import Recording
@@ -35,10 +36,9 @@ class KeyframeSettings:
     """Keypoints farther away get no 3D point: the depth of most sensors is poor out there."""
 
     def __post_init__(self) -> None:
-        hold_numbers(self, ValueError)
-        for name in ("translation_m", "rotation_deg", "max_gap_s", "thumbnail_width_px", "max_depth_m"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} is {getattr(self, name):g}; it must be positive")
+        hold_numbers(
+            self, MapError, positive="translation_m rotation_deg max_gap_s thumbnail_width_px max_depth_m"
+        )  # fmt: skip
 
 
 DEFAULT_KEYFRAMES = KeyframeSettings()
