@@ -33,8 +33,8 @@ from avlmaps.days.find import (
 )
 from avlmaps.days.life import changed_things
 from avlmaps.days.surfaces import Occupied, resampled
-from avlmaps.maps.build import require_place
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
+from avlmaps.maps.plan import require_place
 from avlmaps.maps.sources.find import carry_evidence
 from avlmaps.maps.store.edits import Edit, World, carried_edits, read_edits, write_edits
 from avlmaps.maps.store.folder import read, write

@@ -12,7 +12,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import user_path
 from avlmaps.core.progress import progress, say, silence_progress
 from avlmaps.days.merge import merge_maps, merged_key
-from avlmaps.maps.build import build_map, require_place
+from avlmaps.maps.build import build_map
 from avlmaps.maps.cluster import (
     ClusterWorkers,
     Models,
@@ -23,6 +23,7 @@ from avlmaps.maps.cluster import (
     software,
     unseen,
 )
+from avlmaps.maps.plan import require_place
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.folder import MANIFEST
 from avlmaps.maps.store.tables import explain_write_errors
@@ -44,7 +45,7 @@ class BuildJob:
     settings: BuildSettings
     allow: tuple[str, ...]
     overwrite: bool
-    software: dict[str, str]
+    software: str
     token: Path
 
 

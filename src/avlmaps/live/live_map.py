@@ -9,7 +9,6 @@ import contextlib
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Generator
-from concurrent.futures import Future
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
@@ -29,10 +28,10 @@ from avlmaps.core.progress import say
 from avlmaps.core.wording import option
 from avlmaps.live.pose_check import PoseCheck
 from avlmaps.live.status import LiveSettings, LiveStatus, memory_mb
-from avlmaps.maps.build import require_place
 from avlmaps.maps.hearing import device_of
 from avlmaps.maps.keyframes.choose import KeyframeSettings
 from avlmaps.maps.mapper import Mapper
+from avlmaps.maps.plan import require_place
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.map_data import MapData
@@ -107,8 +106,6 @@ _STEP_S = 0.1
 _MOST_DOUBTS, _MOST_TIMES = 100, 5000
 _LISTEN_S = 0.4  # from one look for sounds that ended to the next
 _REST_S = 1.0  # between two snapshots, at most, where one takes longer than that
-
-_Correction = tuple[Any, Any, "Future[tuple[float, float]]"]  # stamps, poses, and what it did
 
 
 class LiveMap:
@@ -192,7 +189,6 @@ class LiveMap:
         # Under the door: sound, what came and waits, and whether that ends.
         self._door = Condition()
         self._queue: deque[tuple[Frame, float]] = deque()
-        self._to_correct: deque[_Correction] = deque()
         self._in_hand_s: float | None = None  # when the frame arrived that is being fused
         self._closing, self._fuser_ended = False, False
         self._is_pressed = False  # whether the frames come by the clock, and are late if we are slow
@@ -262,7 +258,9 @@ class LiveMap:
             self._queue.append((frame, arrived_s))
             self._is_pressed = not wait
             self._door.notify_all()
-            self._raise_fault()
+            fault, self._fault = self._fault, None
+        if fault is not None:
+            raise fault
 
     @property
     def microphones(self) -> Microphones | None:
@@ -331,21 +329,22 @@ class LiveMap:
     def correct_poses(self, stamps_s: Any, poses: Any) -> tuple[float, float]:
         """Move the map to corrected poses of its frames; see ``VoxelMap.correct_poses``. Any thread may call it.
 
-        It waits for the frames before it and for the snapshot that is being made, and then takes its turn among the
-        frames; those that come meanwhile may be late. Questions have the old map until the next snapshot.
+        It waits for the frames before it and for the snapshot that is being made; frames that come meanwhile may be
+        late. Questions have the old map until the next snapshot.
 
         Raises:
             MapError: there are no submaps or no frames, the poses are not of its frames, or the map is closed.
             RecordingError: a pose is no rigid motion.
         """
-        answer: Future[tuple[float, float]] = Future()
-        with self._door:
-            self._require_open()
-            if self._fuser_ended:
-                raise MapError(f"The live map {self.path} is closed; begin another.")
-            self._to_correct.append((stamps_s, poses, answer))
-            self._door.notify_all()
-        return answer.result()
+        with self._ending:
+            with self._door:
+                self._require_open()
+                self._door.wait_for(lambda: self._fuser_ended or not (self._queue or self._in_hand_s))
+                self._require_open()
+            moved = self._mapper.correct_poses(stamps_s, poses)
+            self._check = PoseCheck()  # the next pose is of the corrected world, which is no jump
+            self._came(time.perf_counter())
+            return moved
 
     @property
     def map(self) -> AVLMap:
@@ -492,11 +491,6 @@ class LiveMap:
             self._is_told = True
             raise self._broken
 
-    def _raise_fault(self) -> None:
-        fault, self._fault = self._fault, None
-        if fault is not None:
-            raise fault
-
     def _in_thread(self, work: Callable[[], None]) -> None:
         try:
             work()
@@ -508,34 +502,26 @@ class LiveMap:
 
     def _fuse_all(self) -> None:
         try:
-            while self._fuse_next():
-                pass
+            while True:
+                with self._door:
+                    self._in_hand_s = None
+                    self._door.notify_all()
+                    self._door.wait_for(lambda: self._queue or self._closing)
+                    if not self._queue:
+                        return
+                    frame, self._in_hand_s = self._queue.popleft()
+                    self._door.notify_all()
+                    arrived_s = self._in_hand_s
+                self._fuse(frame, arrived_s)
         finally:
             with self._door:
                 self._fuser_ended = True
-                for _, _, answer in self._to_correct:
-                    answer.set_exception(MapError(f"The live map {self.path} was closed before; begin another."))
-                self._to_correct.clear()
                 self._door.notify_all()
-
-    def _fuse_next(self) -> bool:
-        with self._door:
-            self._door.wait_for(lambda: self._queue or self._to_correct or self._closing)
-            if not (self._queue or self._to_correct):
-                return False
-            frame, arrived_s = self._queue.popleft() if self._queue else (None, 0.0)
-            self._in_hand_s = None if frame is None else arrived_s
-            self._door.notify_all()
-        if frame is not None:
-            self._fuse(frame, arrived_s)
-        else:
-            self._correct()
-        return True
 
     def _fuse(self, frame: Frame, arrived_s: float) -> None:
         mapper, number = self._mapper, self._mapper.next_index
+        track = mapper.hearing.came
         try:
-            track = mapper.hearing.came
             for doubt in self._check.add(frame, None if track is None else track.end_s):
                 self._doubt(doubt)
                 mapper.doubt(doubt)
@@ -559,23 +545,7 @@ class LiveMap:
         except AvlmapsError as fault:
             self._dropped["wrong"] += 1
             self._doubt(str(fault))
-        self._in_hand_s = None
         self._took_ms.append(1e3 * (time.perf_counter() - arrived_s))
-
-    def _correct(self) -> None:
-        with self._door:
-            stamps_s, poses, answer = self._to_correct.popleft()
-        try:
-            moved = self._mapper.correct_poses(stamps_s, poses)
-        except BaseException as fault:
-            answer.set_exception(fault)
-            if not isinstance(fault, AvlmapsError):
-                raise
-            return
-        self._came(time.perf_counter())
-        self._counts["corrected"] += 1
-        self._check = PoseCheck()  # the next pose is of the corrected world, which is no jump
-        answer.set_result(moved)
 
     def _came(self, arrived_s: float) -> None:
         with self._door:

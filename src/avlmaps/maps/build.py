@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from avlmaps.core.arrays import Float32
-from avlmaps.core.errors import MapError, RecordingError
+from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import user_path
 from avlmaps.core.machine import run_ahead
 from avlmaps.core.progress import progress, silence_progress
@@ -23,7 +23,7 @@ from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.perceived import encode_pixels
 from avlmaps.maps.plan import BuildPlan, Span, claim, make_plan, require_unchanged, strip_folder
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.store.folder import MANIFEST, is_map_or_free, read, write
+from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.maps.store.map_data import Finds, MapData, find_nothing
 from avlmaps.maps.store.tables import lock_folder
@@ -98,16 +98,6 @@ def build_map(
             require_unchanged(plan, stamp)
             write(plan.path, made)
     return read(plan.path)
-
-
-def require_place(path: Path, overwrite: bool) -> None:
-    """Raise ``MapError`` where no map can go: on something else, or on a map that is not to be replaced."""
-    if not is_map_or_free(path):
-        raise MapError(f"{path} is there already and is not a map; give another path, nothing in it was touched.")
-    if (path / MANIFEST).is_file() and not overwrite:
-        raise MapError(
-            f"{path} is a finished map already; give another path, or replace it with {option('overwrite')}."
-        )
 
 
 def map_span(plan: BuildPlan, start: Start, frames: Iterable[EncodedFrame], file: Path) -> None:

@@ -251,7 +251,7 @@ class SpanJob:
     span: Span
     file: Path
     key: str
-    software: dict[str, str]
+    software: str
 
 
 class ClusterWorkers:
@@ -326,24 +326,22 @@ def unseen(worker: str, folder: Path) -> MapError:
 
 
 @cache
-def software() -> dict[str, str]:
+def software() -> str:
     """Return what computes here: a hash of this avlmaps' code, and the versions of what it computes by."""
     package, code = Path(__file__).parents[1], hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
         code.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
-    found = {"avlmaps": f"{__version__} ({code.hexdigest()[:12]})"}
+    found = [f"avlmaps {__version__} ({code.hexdigest()[:12]})"]
     for name in _COMPUTING:
         with suppress(metadata.PackageNotFoundError):  # without models on torch nothing of it is there
-            found[name] = metadata.version(name)
-    return found
+            found.append(f"{name} {metadata.version(name)}")
+    return ", ".join(found)
 
 
-def require_same_software(wanted: dict[str, str], host: str) -> None:
+def require_same_software(wanted: str, host: str) -> None:
     """Raise ``MapError`` where this worker computes by other software than the machine that gave the job."""
-    own = software()
-    for name, version in wanted.items():
-        if own.get(name) != version:
-            raise MapError(
-                f"The worker on {host} runs {name} {own.get(name, 'none')} and this machine {version}; install the "
-                "same on all machines of the cluster."
-            )
+    if software() != wanted:
+        raise MapError(
+            f"The worker on {host} runs {software()}, and this machine {wanted}; install the same on all machines of "
+            "the cluster."
+        )

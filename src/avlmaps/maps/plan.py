@@ -12,7 +12,7 @@ from avlmaps.core.progress import say
 from avlmaps.core.wording import option
 from avlmaps.maps.keyframes.choose import keyframes_by_motion
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.folder import PARTS, is_map_or_free, read_info, remove_parts, sweep
+from avlmaps.maps.store.folder import MANIFEST, PARTS, is_map_or_free, read_info, remove_parts, sweep
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo
 from avlmaps.maps.store.tables import SUFFIX, key_of
 from avlmaps.perception.encoders import Encoders
@@ -61,10 +61,7 @@ def make_plan(recording: Recording, path: Path, encoders: Encoders, settings: Bu
     """Gather the ingredients and refuse what cannot be built."""
     if len(recording) == 0:
         raise MapError(f"{recording.path} has no frames with a pose; there is nothing to build a map from.")
-    if not is_map_or_free(path):
-        raise MapError(
-            f"{path} is there already and is not a map; give another {option('out')}, nothing in it was touched."
-        )
+    require_place(path, overwrite=True)
     settings = settings.for_profile(encoders.weight_variance_m2)
     models = models_of(encoders)
     key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), encoders.name, models, settings)
@@ -72,6 +69,16 @@ def make_plan(recording: Recording, path: Path, encoders: Encoders, settings: Bu
     stamps_s, poses = recording.stamps_s[numbers], recording.world_from_camera[numbers]
     keyframes = numbers[keyframes_by_motion(stamps_s, poses, settings.keyframes)]
     return BuildPlan(recording, path, encoders, settings, models, key, frozenset(keyframes.tolist()))
+
+
+def require_place(path: Path, overwrite: bool) -> None:
+    """Raise ``MapError`` where no map can go: on something else, or on a map that is not to be replaced."""
+    if not is_map_or_free(path):
+        raise MapError(f"{path} is there already and is not a map; give another path, nothing in it was touched.")
+    if (path / MANIFEST).is_file() and not overwrite:
+        raise MapError(
+            f"{path} is a finished map already; give another path, or replace it with {option('overwrite')}."
+        )
 
 
 def models_of(encoders: Encoders) -> dict[str, ModelInfo]:
@@ -112,8 +119,8 @@ def claim(plan: BuildPlan, resume: bool, overwrite: bool) -> MapInfo | None:
     if there is not None:
         if there.build_key != plan.key:
             raise MapError(
-                f"{plan.path} is a finished map already, of {there.recording.name} {_difference(plan, there)}; give "
-                f"another {option('out')}, or replace it with {option('overwrite')}."
+                f"{plan.path} is a finished map already, of {there.recording.name} with {_difference(plan, there)}; "
+                f"give another {option('out')}, or replace it with {option('overwrite')}."
             )
         say(f"{plan.path} is finished already, from the same recording with the same settings; nothing to do.")
         sweep(plan.path, there)
@@ -138,15 +145,13 @@ def require_unchanged(plan: BuildPlan, stamp: str) -> None:
 
 
 def _difference(plan: BuildPlan, there: MapInfo) -> str:
-    if there.recording.fingerprint != plan.recording.fingerprint:
-        return "(another recording, or it has changed)"
-    if there.profile != plan.encoders.name:
-        return f"with the profile {there.profile}"
-    if there.settings != plan.settings:
-        return "with other settings"
-    if there.models != plan.models:
-        return "with other models"
-    return "with another sound track or an older avlmaps"
+    rows = (
+        ("another recording, or one that has changed", there.recording.fingerprint, plan.recording.fingerprint),
+        (f"the profile {there.profile}", there.profile, plan.encoders.name),
+        ("other settings", there.settings, plan.settings),
+        ("other models", there.models, plan.models),
+    )
+    return next((what for what, one, other in rows if one != other), "another sound track or an older avlmaps")
 
 
 def strip_folder(sentence: str, recording: Recording) -> str:

@@ -12,9 +12,9 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import lasting_path
 from avlmaps.core.numbers import as_number
-from avlmaps.maps.build import require_place
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.perceived import given_features
+from avlmaps.maps.plan import require_place
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.tables import lock_folder
