@@ -16,7 +16,6 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.maps.gravity.floor import (
     USUAL_HEIGHT_M,
     Expected,
-    FoundFloor,
     FoundGround,
     Sight,
     find_ground,
@@ -85,7 +84,7 @@ def _ground_of_half_the_desks() -> FoundGround:
 def test_the_floor_is_found_and_not_the_table_tops(height_m: float) -> None:
     found = find_ground(walked(height_m), UP)
     assert np.abs(errors_m(walked(height_m), height_m, found)).max() < 0.03
-    assert found.floors[0].confidence > 0.9
+    assert found.floors[0].best.confidence > 0.9
 
 
 @pytest.mark.few(1)
@@ -97,17 +96,17 @@ def test_a_walk_that_films_tables_for_nine_tenths_has_its_floor(on_floor: int) -
 
 def test_a_walk_without_any_floor_in_view_says_so() -> None:
     found = find_ground(film(office(), over_the_desks(1.15, 88.0)), UP)
-    assert found.floors[0].confidence < 0.7
+    assert found.floors[0].best.confidence < 0.7
     wall = find_ground(film(office(), [(0.6, 3.0 + 0.01 * i, 1.3, 180.0, 0.0) for i in range(8)]), UP)
-    assert not wall.floors[0].choice.best.seen and wall.floors[0].confidence <= 0.5
+    assert not wall.floors[0].best.in_view and wall.floors[0].best.confidence <= 0.5
 
 
 def test_without_any_depth_the_camera_is_taken_to_be_held_as_usual() -> None:
     blind = [replace(frame, depth_m=np.zeros_like(frame.depth_m)) for frame in walked(1.0)[:2]]
     found = find_ground(blind, UP)
     assert found.ground.camera_height_m(blind[0].world_from_camera) == pytest.approx(USUAL_HEIGHT_M)
-    assert found.floors[0].confidence <= 0.5
-    assert find_ground([], UP).floors[0].confidence <= 0.5
+    assert found.floors[0].best.confidence <= 0.5
+    assert find_ground([], UP).floors[0].best.confidence <= 0.5
 
 
 def test_depth_that_is_not_finite_is_no_surface() -> None:
@@ -125,7 +124,7 @@ def test_each_camera_stands_over_the_floor_of_its_own_storey() -> None:
     true_m = [1.35] * len(walked(1.35)) + [frame.world_from_camera[2, 3] for frame in filmed_desks(6)]
     found = find_ground(both, UP)
     assert np.abs(errors_m(both, true_m, found)).max() < 0.05
-    assert [round(floor.height_m, 1) for floor in found.floors] == [0.0, 2.9]
+    assert [round(floor.best.height_m, 1) for floor in found.floors] == [0.0, 2.9]
 
 
 @pytest.mark.few(1)
@@ -138,8 +137,8 @@ def test_stairs_lift_the_floor_with_the_camera(height_m: float, steps: int) -> N
     off_m = np.abs(errors_m(frames, height_m, found))
     assert np.mean(off_m < 0.05) > 0.85  # a step that few frames show may be taken for its neighbours
     assert off_m.max() < 0.6
-    assert found.floors[0].height_m == pytest.approx(0.0, abs=0.03)
-    assert found.floors[-1].height_m == pytest.approx(0.18 * steps, abs=0.03)
+    assert found.floors[0].best.height_m == pytest.approx(0.0, abs=0.03)
+    assert found.floors[-1].best.height_m == pytest.approx(0.18 * steps, abs=0.03)
 
 
 @pytest.mark.few(1)
@@ -162,7 +161,7 @@ def test_a_given_height_holds_where_no_floor_is_in_view() -> None:
     frames = film(office(), over_the_desks(1.15, 88.0))
     found = find_ground(frames, UP, Expected(0.0, 1.15))
     assert found.ground.camera_height_m(frames[0].world_from_camera) == pytest.approx(1.15, abs=0.05)
-    assert found.floors[0].confidence > 0.9
+    assert found.floors[0].best.confidence > 0.9
 
 
 def test_a_given_height_yields_to_the_floor_in_view_within_a_decimetre() -> None:
@@ -173,7 +172,7 @@ def test_a_given_height_yields_to_the_floor_in_view_within_a_decimetre() -> None
 def test_the_floor_does_not_lie_above_the_robots_base() -> None:
     frames = film(office(), over_the_desks(1.15, 88.0))
     found = find_ground(frames, UP, Expected(0.1, 1.05, exact=False))
-    assert found.floors[0].height_m < 0.2
+    assert found.floors[0].best.height_m < 0.2
 
 
 @pytest.mark.slow
@@ -195,7 +194,7 @@ def test_the_floor_is_the_same_in_every_world(yaw_rad: float, shift_m: tuple[flo
             after.ground.camera_height_m(there.world_from_camera),
         )
         assert new == pytest.approx(old, abs=0.03)
-    assert after.floors[0].confidence == pytest.approx(before.floors[0].confidence, abs=0.1)
+    assert after.floors[0].best.confidence == pytest.approx(before.floors[0].best.confidence, abs=0.1)
 
 
 @pytest.mark.nightly
@@ -206,9 +205,9 @@ def test_more_samples_do_not_flip_a_confident_answer(seed: int, few: int) -> Non
     order = np.random.default_rng(seed).permutation(len(sights))
     some = ground_of_sights([sights[i] for i in order[:few]], UP).floors
     every = ground_of_sights([sights[i] for i in order], UP).floors
-    if len(some) == 1 and some[0].confidence > 0.9:
-        assert every[0].height_m == pytest.approx(some[0].height_m, abs=0.05)
-    assert len(every) == 1 and every[0].confidence > 0.9
+    if len(some) == 1 and some[0].best.confidence > 0.9:
+        assert every[0].best.height_m == pytest.approx(some[0].best.height_m, abs=0.05)
+    assert len(every) == 1 and every[0].best.confidence > 0.9
 
 
 @pytest.mark.nightly
@@ -226,8 +225,8 @@ def test_the_floor_is_never_above_a_level_that_is_seen_through(
     looks: list[Look] = [(0.5 + 0.6 * i, 0.5, height_m, float(h), 20.0) for i, h in enumerate(heading)]
     found = find_ground(film(room(boxes), looks, seed), UP)
     for floor in found.floors:
-        assert floor.choice.best.below < 0.1
-        assert floor.height_m < 0.1 or floor.confidence < 0.9
+        assert floor.best.below < 0.1
+        assert floor.best.height_m < 0.1 or floor.best.confidence < 0.9
 
 
 # Real frames -----------------------------------------------------------------------------------------------------
@@ -258,7 +257,7 @@ def test_every_sample_of_the_red_kitchen_has_its_floor_and_not_its_table(
         found = ground_of_sights([sights[i] for i in chosen], up)
         camera_m = np.median(found.ground.camera_m - found.ground.floor_m)
         assert camera_m == pytest.approx(1.41, abs=0.12), f"sample {seed}"
-        assert np.ptp(found.ground.floor_m) < 0.05 and found.floors[0].confidence > 0.7
+        assert np.ptp(found.ground.floor_m) < 0.05 and found.floors[0].best.confidence > 0.7
 
 
 def nyu_frames(folder: Path, every: int) -> list[tuple[str, Frame, np.ndarray, float]]:
@@ -298,7 +297,7 @@ def test_single_kinect_frames_of_homes_have_their_floor(shared_data: Path) -> No
     assert len(frames) > 33
     wrong = []
     for name, frame, up, true_m in frames:
-        found: FoundFloor = find_ground([frame], up).floors[0]
+        found = find_ground([frame], up).floors[0].best
         if abs(found.camera_height_m - true_m) > 0.15:
             wrong.append((name, round(true_m, 2), round(found.camera_height_m, 2), round(found.confidence, 2)))
     assert len(wrong) <= 1, wrong

@@ -14,8 +14,9 @@ from avlmaps.maps.build import build_map
 from avlmaps.maps.estimate import estimate_ground, ground_notices
 from avlmaps.maps.settings import DEFAULTS, BuildSettings, GravitySettings
 from avlmaps.maps.store.folder import read
-from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, UpInfo
+from avlmaps.maps.store.manifest import GroundInfo, UpInfo
 from avlmaps.maps.store.map_data import MapData, describe
+from avlmaps.maps.types import FloorGuess, FloorInfo
 from avlmaps.recordings.types import BaseHeight, Frame, Recording
 from helpers.filmed_rooms import RIG, UP, film, office
 

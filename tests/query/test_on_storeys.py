@@ -17,8 +17,8 @@ from avlmaps.query.goals import Goal
 from avlmaps.query.lists import answer_on_storey, how_many
 
 INF = float("inf")
-TWO = Storeys((Storey(0, 0.0, 2.5, -INF, 2.6, 40.0), Storey(1, 2.8, 5.3, 2.6, INF, 40.0)))
-THREE = Storeys((*TWO.all[:1], Storey(1, 2.8, 5.3, 2.6, 5.5, 40.0), Storey(2, 5.6, None, 5.5, INF, 40.0)))
+TWO = Storeys((Storey(0, 0.0, -INF, 2.6), Storey(1, 2.8, 2.6, INF)))
+THREE = Storeys((*TWO.all[:1], Storey(1, 2.8, 2.6, 5.5), Storey(2, 5.6, 5.5, INF)))
 PART = Question.of([Part(Modality.OBJECT, "bed")]).parts[0]
 
 

@@ -13,12 +13,12 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.fusion.sensor import FRAMES, MODELS, SensorModel, measure_noise, nearest_model
-from avlmaps.maps.gravity.floor import Expected, FloorEvidence, FoundFloor, find_ground
+from avlmaps.maps.gravity.floor import Expected, find_ground
 from avlmaps.maps.gravity.up import some_frames, up_doubts
 from avlmaps.maps.plan import strip_folder
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.sources.wiring import check_wiring
-from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, SensorInfo, UpInfo
+from avlmaps.maps.store.manifest import GroundInfo, SensorInfo, UpInfo
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import useless_channels
 from avlmaps.recordings.consistency.check import Finding, Grade, Reason, Verdict, check_recording
@@ -110,25 +110,23 @@ def _of_microphones(track: AudioTrack, walk: Trajectory, useless: Sequence[str] 
     )
     if found.turned:
         named = " and ".join(str(channel + 1) for channel in found.turned)
-        of_them = ("Channels", "are", "their signs") if len(found.turned) > 1 else ("Channel", "is", "its sign")
         sentence = (
-            f"{of_them[0]} {named} of the microphones {of_them[1]} wired the other way round: {fits} with {of_them[2]} "
-            "turned, as sources are found."
+            f"Microphones of these channels are wired the other way round: {named}; {fits} with the sign turned, as "
+            "sources are found."
         )
-        return [_doubtful(sentence, f"Exchange the two wires of each ({named}), or turn its sign.")]
-    moved = [str(channel + 1) for channel, microphone in enumerate(found.order) if channel != microphone]
-    order = ", ".join(str(microphone + 1) for microphone in found.order)
-    sentence = (
-        f"Channels {' and '.join([', '.join(moved[:-1]), moved[-1]])} of the microphones look exchanged: their "
-        f"delays do not fit the places; {fits} with the places in the order {order}."
-    )
-    turned = " (or that order turned or mirrored, which fits as well)" if found.unsure else ""
-    remedy = f"Put the wires right, or write positions_m of {DESCRIPTION} in that order{turned}, and build again."
-    return [_doubtful(sentence, remedy)]
-
-
-def _doubtful(sentence: str, remedy: str) -> Finding:
-    return Finding(Reason.MICROPHONES, Grade.SUSPICIOUS, sentence, remedy)
+        remedy = f"Exchange the two wires of each ({named}), or turn its sign."
+    else:
+        moved = [str(channel + 1) for channel, microphone in enumerate(found.order) if channel != microphone]
+        order = ", ".join(str(microphone + 1) for microphone in found.order)
+        sentence = (
+            f"Channels {' and '.join([', '.join(moved[:-1]), moved[-1]])} of the microphones look exchanged: their "
+            f"delays do not fit the places; {fits} with the places in the order {order}."
+        )
+        remedy = (
+            f"Put the wires right, or write positions_m of {DESCRIPTION} in that order (of a ring, the order turned or "
+            "mirrored may fit as well), and build again."
+        )
+    return [Finding(Reason.MICROPHONES, Grade.SUSPICIOUS, sentence, remedy)]
 
 
 _LEAVES_OPEN = 0.7  # a floor of a lower confidence gets a notice,
@@ -192,18 +190,7 @@ def estimate_ground(recording: Recording, settings: BuildSettings, up: UpInfo) -
     """Return the floor under each camera height, and what is known of it for the manifest."""
     expected, known_from = _expected(recording, settings, up)
     found = find_ground(spread_frames(recording, settings.gravity.frames), up.vector(), expected)
-    cameras = len(found.ground.camera_m)
-    return found.ground, GroundInfo(
-        known_from=known_from,
-        floors=tuple(
-            FloorInfo(
-                best=_guess(floor.choice.best, floor.confidence, floor.camera_height_m),
-                runner_up=_runner_up(floor),
-                cameras=len(floor.cameras_m) / cameras,
-            )
-            for floor in found.floors
-        ),
-    )
+    return found.ground, GroundInfo(known_from=known_from, floors=found.floors)
 
 
 def _expected(
@@ -217,25 +204,6 @@ def _expected(
         expected = Expected(start_m - base.below_camera_m, base.below_camera_m, base.on_floor)
         return expected, "recording" if base.on_floor else "surfaces"
     return None, "surfaces"
-
-
-def _guess(evidence: FloorEvidence, confidence: float, camera_height_m: float) -> FloorGuess:
-    return FloorGuess(
-        height_m=round(evidence.height_m, 4),
-        camera_height_m=round(camera_height_m, 4),
-        confidence=round(confidence, 4),
-        in_view=evidence.seen,
-        level_m2=round(evidence.level_m2, 2),
-        below=round(evidence.below, 4),
-    )
-
-
-def _runner_up(floor: FoundFloor) -> FloorGuess | None:
-    second = floor.choice.runner_up
-    if second is None:
-        return None
-    camera_height_m = floor.camera_height_m + floor.height_m - second.height_m
-    return _guess(second, floor.choice.runner_up_confidence, camera_height_m)
 
 
 def ground_notices(ground: GroundInfo) -> Iterator[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float, Int
 
 _APART_M = 1.8  # two floors closer than this are one storey with a step, a landing or stairs
-_BELOW_M = 0.3  # what lies at most this far below a floor belongs to its storey
+_BELOW_M = 0.15  # what lies at most this far below a floor belongs to its storey
 _CELL_M = 0.1  # of the columns that surfaces are looked for in, or the voxels' edge where that is more
 _HEADROOM_M = 1.5
 _KNEE_M = 0.5  # what reaches higher over a step stands beside it, and is no next step
@@ -25,8 +25,6 @@ _CAMERA_M = 1.3  # over a floor that nobody measured
 _ROUND_M = 0.25  # about a camera lies what it stands over
 _SAME_M = 0.12  # two heights closer than this are one
 _STOOD_SHARE = 0.02  # of the cameras: fewer do not make a storey
-_BORNE_SHARE = 0.02  # of a floor is covered by what stands on it
-_CEILING_M, _CEILING_SHARE = 1.9, 0.2  # a ceiling is no lower, and covers this share of the floor
 _BODY_M = 0.2  # radius of who climbs
 _GAP = 2  # columns that a step may reach: narrow ones are unseen
 _MOST_KEYS = 2**62
@@ -41,18 +39,14 @@ class Storey:
     Attributes:
         number: counted from 0, the lowest of the map.
         floor_m: height of the floor.
-        ceiling_m: height of the ceiling; None where none is known.
         low_m: what lies higher than this belongs to the storey,
         high_m: and lower than this.
-        area_m2: floor with headroom that was seen.
     """
 
     number: int
     floor_m: float
-    ceiling_m: float | None
     low_m: float
     high_m: float
-    area_m2: float
 
     @property
     def name(self) -> str:
@@ -90,7 +84,7 @@ class Storeys:
     @classmethod
     def single(cls, floor_m: float) -> "Storeys":
         """Return one storey that everything belongs to, with its floor at a height."""
-        return cls((Storey(0, floor_m, None, -np.inf, np.inf, 0.0),))
+        return cls((Storey(0, floor_m, -np.inf, np.inf),))
 
     def __len__(self) -> int:
         return len(self.all)
@@ -214,27 +208,25 @@ def said_storeys(storeys: Storeys | None) -> str:
 
 
 def find_storeys(
-    level: Float[np.ndarray, "n 3"], voxel_size_m: float, cameras: Float[np.ndarray, "k 3"] | None = None
+    level: Float[np.ndarray, "n 3"], voxel_size_m: float, cameras: Float[np.ndarray, "k 3"]
 ) -> Storeys | None:
     """Find the storeys of a map; None for a map that has one, or that has none at all.
 
     Args:
         level: middles of its voxels, level frame, metres.
         voxel_size_m: their edge.
-        cameras: where its cameras were, level frame; a storey is where one was carried. Without any, a floor is where
-            something stands on it.
+        cameras: where its cameras were, level frame; a storey is where one was carried.
     """
-    cameras_m = np.zeros(0) if cameras is None else np.asarray(cameras, np.float64)[:, 2]
-    if not len(level) or stayed_on_one(cameras_m):
-        return None
-    columns = _Columns.of(level, voxel_size_m)
+    cameras = np.asarray(cameras, np.float64).reshape(-1, 3)
+    columns = None if not len(level) or stayed_on_one(cameras[:, 2]) else _Columns.of(level, voxel_size_m)
     if columns is None:
         return None
     surface = columns.surfaces()
-    floors = _floors(columns, surface, np.zeros((0, 3)) if cameras is None else np.asarray(cameras, np.float64))
-    if len(floors) < 2:
+    floors_m = _floors(columns, surface, cameras)
+    if len(floors_m) < 2:
         return None
-    storeys = _storeys(columns, surface, floors, float(level[:, 2].max()))
+    edges = [-np.inf, *(floor_m - _BELOW_M for floor_m in floors_m[1:]), np.inf]
+    storeys = [Storey(number, floor_m, *edges[number : number + 2]) for number, floor_m in enumerate(floors_m)]
     stairs = [one for below in range(len(storeys) - 1) for one in _stairs(columns, surface, storeys, below)]
     return Storeys(tuple(storeys), tuple(stairs))
 
@@ -256,9 +248,7 @@ def stayed_on_one(cameras_m: Float[np.ndarray, " k"]) -> bool:
     return bool(len(cameras_m)) and float(np.ptp(cameras_m)) < 0.5 * _APART_M
 
 
-def _floors(
-    columns: _Columns, surface: Int[np.ndarray, " m"], cameras: Float[np.ndarray, "k 3"]
-) -> list[tuple[float, float]]:
+def _floors(columns: _Columns, surface: Int[np.ndarray, " m"], cameras: Float[np.ndarray, "k 3"]) -> list[float]:
     height_m, cell_m2 = columns.heights_m(surface), columns.cell_m[0] ** 2
     layer = surface % columns.span[2]
     count = np.bincount(layer, minlength=columns.span[2])
@@ -273,44 +263,13 @@ def _floors(
         below = [k for k, (at_m, _) in enumerate(known) if _CARRIED_M[0] <= camera_m - at_m <= _CARRIED_M[1]]
         if below:
             stood[max(below, key=lambda k: known[k][1])] += 1
-    if not len(cameras):
-        stood = [int(_bears(columns, floor)) for floor in known]
     fewest = max(1.0, _STOOD_SHARE * len(cameras))
-    chosen: list[tuple[float, float]] = []
+    chosen: list[float] = []
     for number in sorted(range(len(known)), key=lambda number: (-stood[number], -known[number][1])):
-        apart = all(abs(known[number][0] - other) >= _APART_M for other, _ in chosen)
+        apart = all(abs(known[number][0] - other) >= _APART_M for other in chosen)
         if stood[number] >= fewest and apart:
-            chosen.append(known[number])
+            chosen.append(known[number][0])
     return sorted(chosen)
-
-
-def _bears(columns: _Columns, floor: tuple[float, float]) -> bool:
-    all_m = columns.heights_m(columns.keys)
-    over = np.count_nonzero((all_m > floor[0] + _KNEE_M) & (all_m < floor[0] + _HEADROOM_M))
-    layers = (_HEADROOM_M - _KNEE_M) / columns.cell_m[1]
-    return bool(over / layers * columns.cell_m[0] ** 2 >= _BORNE_SHARE * floor[1])
-
-
-def _storeys(
-    columns: _Columns, surface: Int[np.ndarray, " m"], floors: Sequence[tuple[float, float]], top_m: float
-) -> list[Storey]:
-    all_m = columns.heights_m(columns.keys)
-    out: list[Storey] = []
-    for number, (height, m2) in enumerate(floors):
-        upper = floors[number + 1][0] - 0.1 if number + 1 < len(floors) else top_m + 1.0
-        layer = np.floor((all_m[(all_m > height + _CEILING_M) & (all_m < upper)]) / columns.cell_m[1]).astype(np.int64)
-        ceiling = None
-        if len(layer):
-            count = np.bincount(layer - layer.min())
-            if count.max() * columns.cell_m[0] ** 2 >= _CEILING_SHARE * m2:
-                ceiling = float((layer.min() + int(count.argmax()) + 0.5) * columns.cell_m[1])
-        slab_m = _BELOW_M
-        if ceiling is not None and number + 1 < len(floors):  # what hangs from a ceiling is below it
-            slab_m = min(slab_m, 0.5 * (floors[number + 1][0] - ceiling))
-        low_m = out[-1].high_m if out else -np.inf
-        high_m = floors[number + 1][0] - slab_m if number + 1 < len(floors) else np.inf
-        out.append(Storey(number, height, ceiling, low_m, high_m, m2))
-    return out
 
 
 def _stairs(columns: _Columns, surface: Int[np.ndarray, " m"], storeys: Sequence[Storey], below: int) -> list[Stairs]:
@@ -361,15 +320,12 @@ def _shortest(
 ) -> list[int]:
     from scipy.sparse import csgraph, csr_array
 
-    foot, top = (np.flatnonzero(kind[other] == end) for end in (_FOOT, _TOP))
-    feet, source = np.unique(other[foot]), len(kind)  # from one node more there is a step to every foot
-    rows = np.concatenate([one, other[foot], np.full(len(feet), source)])
-    columns = np.concatenate([other, one[foot], feet])
-    values = np.concatenate([cost, cost[foot], np.full(len(feet), 1e-6)])
-    graph = csr_array((values, (rows, columns)), (source + 1, source + 1))
-    total, before = csgraph.dijkstra(graph, indices=source, return_predecessors=True)
-    tops = np.unique(other[top])
+    foot = np.flatnonzero(kind[other] == _FOOT)
+    pairs = np.concatenate([one, other[foot]]), np.concatenate([other, one[foot]])
+    graph = csr_array((np.concatenate([cost, cost[foot]]), pairs), (len(kind), len(kind)))
+    feet, tops = (np.unique(other[kind[other] == end]) for end in (_FOOT, _TOP))
+    total, before, _ = csgraph.dijkstra(graph, indices=feet, return_predecessors=True, min_only=True)
     path = [int(tops[np.argmin(total[tops])])]
-    while before[path[-1]] != source:
+    while before[path[-1]] >= 0:
         path.append(int(before[path[-1]]))
     return path[::-1]

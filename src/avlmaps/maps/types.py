@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
+import msgspec
 import numpy as np
 
 from avlmaps.core.arrays import Float16, Float32, Float64, Int, Int8, Int32, Int64, UInt8, UInt16
@@ -200,3 +201,38 @@ class SourceEvidence:
 
     def __repr__(self) -> str:
         return f"SourceEvidence({len(self)} sounds over {len(self.place):,} candidates)"
+
+
+class FloorGuess(msgspec.Struct, frozen=True, kw_only=True):
+    """One hypothesis of where a floor is.
+
+    Attributes:
+        height_m: of the floor along up, in the recording's world.
+        camera_height_m: of the cameras over it, their median.
+        confidence: how likely the floor lies within 0.12 m of that height under all the evidence, in [0, 1].
+        in_view: whether level surface was seen there; False says that no floor is in view, so that it was put at the
+            bottom of what is in view or where cameras usually have it.
+        level_m2: area of level surface seen there.
+        below: share of the surface in view that lies below it, in [0, 1]; near 0 for a floor.
+    """
+
+    height_m: float
+    camera_height_m: float
+    confidence: float
+    in_view: bool
+    level_m2: float
+    below: float
+
+
+class FloorInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """A floor that cameras stood over.
+
+    Attributes:
+        best: the hypothesis that was taken.
+        runner_up: the best one at another height, None where there is none.
+        cameras: share of the cameras that stood over this floor, in [0, 1].
+    """
+
+    best: FloorGuess
+    runner_up: FloorGuess | None
+    cameras: float

@@ -13,9 +13,12 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int64
+from msgspec import structs
 
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.columns import concat, take
 from avlmaps.core.poses import apply
+from avlmaps.maps.types import FloorGuess, FloorInfo
 from avlmaps.recordings.types import Frame, Ground, Recording, Subset
 
 COLUMNS = 107  # blocks across a picture
@@ -26,7 +29,6 @@ _FULL = 0.6  # a block counts when this share of its pixels has a depth,
 _STEP = 0.15  # and when they differ by less than this share of it
 _BITS = 20  # of a voxel's number, for each axis
 _BIAS = 1 << (_BITS - 1)
-STEP_X, STEP_Y = 1 << _BITS, 1  # between the numbers of neighbouring columns
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,20 +53,19 @@ class Voxelised:
         index = np.floor(point_m / (CELL_M, CELL_M, SLICE_M)).astype(np.int64)
         index = np.clip(index + _BIAS, 0, (1 << _BITS) - 1)
         key = (index[:, 0] << 2 * _BITS) | (index[:, 1] << _BITS) | index[:, 2]
-        return _gathered(key, np.ones(len(key)), point_m[:, 2], range_m)
+        return cls.union([cls(key, np.ones(len(key)), point_m[:, 2], range_m)])
 
     @classmethod
-    def union(cls, parts: "list[Voxelised]") -> "Voxelised":
-        """Gather the voxels of several frames."""
-        if not parts:
-            return _gathered(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(0))
-        key, count, height_m, range_m = (
-            np.concatenate([getattr(part, name) for part in parts]) for name in ("key", "count", "height_m", "range_m")
-        )
-        return _gathered(key, count, height_m, range_m)
+    def union(cls, parts: "Sequence[Voxelised]") -> "Voxelised":
+        """Gather the voxels of several frames, at least one."""
+        every = concat(parts)
+        key, place = np.unique(every.key, return_inverse=True)
+        count = np.bincount(place, every.count)
+        height_m, range_m = (np.bincount(place, every.count * of) / count for of in (every.height_m, every.range_m))
+        return cls(key, count, height_m, range_m)
 
     def __getitem__(self, chosen: Bool[np.ndarray, " n"]) -> "Voxelised":
-        return Voxelised(self.key[chosen], self.count[chosen], self.height_m[chosen], self.range_m[chosen])
+        return take(self, chosen)
 
     def __len__(self) -> int:
         return len(self.key)
@@ -78,19 +79,6 @@ class Voxelised:
         column = self.columns()
         index = np.stack([column >> _BITS, column & ((1 << _BITS) - 1)], axis=-1) - _BIAS
         return (index + 0.5) * CELL_M
-
-
-def _gathered(
-    key: Int64[np.ndarray, " n"],
-    count: Float[np.ndarray, " n"],
-    height_m: Float[np.ndarray, " n"],
-    range_m: Float[np.ndarray, " n"],
-) -> Voxelised:
-    unique, place = np.unique(key, return_inverse=True)
-    place = place.reshape(-1)
-    total = np.bincount(place, count, minlength=len(unique))
-    sums = [np.bincount(place, count * value, minlength=len(unique)) for value in (height_m, range_m)]
-    return Voxelised(unique, total, sums[0] / np.maximum(total, 1.0), sums[1] / np.maximum(total, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,68 +216,35 @@ class Expected:
     exact: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class FloorEvidence:
-    """The evidence for and against a floor at one height.
+Weighed = tuple[float, FloorGuess]
+"""A hypothesis with all that speaks for and against it as one sum, nats; its confidence is not known yet."""
 
-    Attributes:
-        height_m: of the floor, along up.
-        camera_height_m: of the camera over it.
-        level_m2: area of level surface at this height; 0 for a floor out of view.
-        below: share of all surface in view that lies below, in [0, 1].
-        undercut: share of its own footprint with surface seen beneath, in [0, 1].
-        stood: share of the cameras that stand over it, among those of which that is known, in [0, 1].
-        trusted: whether that many cameras over so large a level, or at the recording's usual height, make it a floor
-            though other surface lies below.
-        seen: whether a level surface lies there; False says that the floor is out of view.
-        nats: all of it as one sum, the higher the better.
+
+def choose_floor(
+    view: SurfacesAtHeight, expected: Expected | None = None, usual_m: float | None = None
+) -> tuple[FloorGuess, FloorGuess | None]:
+    """Return the floor under the cameras of a view, and the best hypothesis at another height, if there is one.
+
+    The confidence of a floor out of view is 0.5 at most.
     """
-
-    height_m: float
-    camera_height_m: float
-    level_m2: float
-    below: float
-    undercut: float
-    stood: float
-    trusted: bool
-    seen: bool
-    nats: float
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """The floor under a camera.
-
-    Attributes:
-        best: the hypothesis that is taken.
-        confidence: how likely the floor lies within 0.12 m of that height under all the evidence, in [0, 1]; at most
-            0.5 for a floor out of view.
-        runner_up: the best hypothesis at another height, None where there is none.
-        runner_up_confidence: how likely that one is, in [0, 1].
-    """
-
-    best: FloorEvidence
-    confidence: float
-    runner_up: FloorEvidence | None
-    runner_up_confidence: float
-
-
-def choose_floor(view: SurfacesAtHeight, expected: Expected | None = None, usual_m: float | None = None) -> Choice:
-    """Return the floor under the cameras of a view."""
     found = [weigh(view, height_m, expected, usual_m) for height_m in hypotheses(view)]
-    found = sorted([*found, out_of_view(view, expected)], key=lambda evidence: -evidence.nats)
-    weight = np.exp(np.array([evidence.nats for evidence in found]) - found[0].nats)
+    found = sorted([*found, out_of_view(view, expected)], key=lambda one: -one[0])
+    weight = np.exp(np.array([nats for nats, _ in found]) - found[0][0])
     weight /= weight.sum()
     if expected is None or not expected.exact:
-        weight *= np.array([1.0 if evidence.seen else _GUESSED for evidence in found])
-    best = found[0]
-    same = np.array([abs(evidence.height_m - best.height_m) < SAME_M for evidence in found])
-    others = np.flatnonzero(~same)
-    if not len(others):
-        return Choice(best, float(weight[same].sum()), None, 0.0)
-    second = found[int(others[0])]
-    near = ~same & np.array([abs(evidence.height_m - second.height_m) < SAME_M for evidence in found])
-    return Choice(best, float(weight[same].sum()), second, float(weight[near].sum()))
+        weight *= np.array([1.0 if guess.in_view else _GUESSED for _, guess in found])
+    height_m = np.array([guess.height_m for _, guess in found])
+    first, rest = None, np.ones(len(found), bool)
+    for _ in range(2):
+        if not rest.any():
+            break
+        near = rest & (np.abs(height_m - height_m[rest][0]) < SAME_M)
+        taken = structs.replace(found[int(rest.argmax())][1], confidence=float(weight[near].sum()))
+        if first is not None:
+            return first, taken
+        first, rest = taken, rest & ~near
+    assert first is not None
+    return first, None
 
 
 def hypotheses(view: SurfacesAtHeight) -> list[float]:
@@ -308,13 +263,12 @@ def hypotheses(view: SurfacesAtHeight) -> list[float]:
 
 def weigh(
     view: SurfacesAtHeight, height_m: float, expected: Expected | None = None, usual_m: float | None = None
-) -> FloorEvidence:
+) -> Weighed:
     """Return the evidence for a floor at a height where level surface was seen."""
     at = np.abs(view.level.height_m - height_m) < 2.5 * _BIN_M
     off = (view.level.height_m[at] - height_m) / _BLUR_M
     support = float(np.exp(-0.5 * off**2).sum())
-    below, beneath = _beneath(view, height_m)
-    undercut = _undercut(view.level[at], beneath)
+    below = _below(view, height_m)
     known = view.under_m[np.isfinite(view.under_m)]
     stood = float(np.mean(np.abs(known - height_m) < SAME_M)) if len(known) else 0.0
     level_m2 = len(np.unique(view.level[at].columns())) * CELL_M**2
@@ -322,19 +276,12 @@ def weigh(
     trusted = stood >= _MOST_STOOD and (level_m2 >= _LARGE_M2 or usual)
     given = expected is not None and expected.exact
     prior = 0.0 if trusted and usual and not given else prior_nats(height_m, view.camera_m, expected)
-    nats = (
-        np.log(support / (support + _FEW))
-        + 0.7 * np.log1p(support / _MANY)
-        - _BELOW_NATS * min(undercut if trusted else below, _MOST_BELOW)
-        + _STOOD_NATS * trusted
-        + prior
-    )
-    return FloorEvidence(
-        height_m, view.camera_m - height_m, level_m2, below, undercut, stood, trusted, True, float(nats)
-    )
+    against = 0.0 if trusted else min(below, _MOST_BELOW)
+    nats = np.log(support / (support + _FEW)) + 0.7 * np.log1p(support / _MANY) - _BELOW_NATS * against
+    return float(nats + _STOOD_NATS * trusted + prior), _guess(view, height_m, level_m2, below, seen=True)
 
 
-def out_of_view(view: SurfacesAtHeight, expected: Expected | None = None) -> FloorEvidence:
+def out_of_view(view: SurfacesAtHeight, expected: Expected | None = None) -> Weighed:
     """Return the hypothesis that no level surface in view is the floor.
 
     The floor then lies where someone said; else at the bottom of what is in view, or where cameras usually have it if
@@ -348,8 +295,14 @@ def out_of_view(view: SurfacesAtHeight, expected: Expected | None = None) -> Flo
         camera_height_m = given_m if HIGHEST_M < given_m < DEEPEST_M else expected.camera_height_m
     height_m = view.camera_m - camera_height_m
     nats = _UNSEEN_NATS + prior_nats(height_m, view.camera_m, expected)
-    below, _ = _beneath(view, height_m)
-    return FloorEvidence(height_m, camera_height_m, 0.0, below, 0.0, 0.0, False, False, float(nats))
+    return nats, _guess(view, height_m, 0.0, _below(view, height_m), seen=False)
+
+
+def _guess(view: SurfacesAtHeight, height_m: float, level_m2: float, below: float, *, seen: bool) -> FloorGuess:
+    return FloorGuess(
+        height_m=height_m, camera_height_m=view.camera_m - height_m, confidence=0.0, in_view=seen,
+        level_m2=round(level_m2, 2), below=round(below, 4),
+    )  # fmt: skip
 
 
 def prior_nats(height_m: float, camera_m: float, expected: Expected | None = None) -> float:
@@ -368,21 +321,11 @@ def prior_nats(height_m: float, camera_m: float, expected: Expected | None = Non
     return float(np.log(likely + (0.07 if ratio < 0.0 else 0.002))) - _NOT_SAID_NATS * too_high
 
 
-def _beneath(view: SurfacesAtHeight, height_m: float) -> tuple[float, Voxelised]:
-    window = view.surface.height_m > view.camera_m - DEEPEST_M
-    deep_m = height_m - view.surface.height_m - _BELOW_M - _BELOW_PER_M * view.surface.range_m
-    below = float(np.clip(deep_m[window] / _DEEP_M, 0.0, 1.0).mean()) if window.any() else 0.0
-    return below, view.surface[window & (deep_m > 0.0)]
-
-
-def _undercut(level: Voxelised, beneath: Voxelised) -> float:
-    column = np.unique(level.columns())
-    inner = np.ones(len(column), bool)
-    for step in (STEP_X, -STEP_X, STEP_Y, -STEP_Y):
-        inner &= np.isin(column + step, column)
-    if not inner.any():
-        return 0.0
-    return float(np.isin(column[inner], beneath.columns()).mean())
+def _below(view: SurfacesAtHeight, height_m: float) -> float:
+    """Return the share of all surface in view that lies below a height."""
+    window = view.surface[view.surface.height_m > view.camera_m - DEEPEST_M]
+    deep_m = height_m - window.height_m - _BELOW_M - _BELOW_PER_M * window.range_m
+    return float(np.clip(deep_m / _DEEP_M, 0.0, 1.0).mean()) if len(window) else 0.0
 
 
 def stood_over(camera_m: Float[np.ndarray, "k 3"], level: Voxelised) -> Float[np.ndarray, " k"]:
@@ -413,28 +356,6 @@ _STOREY_M = 0.6  # a camera's view counts for others whose height differs by no 
 
 
 @dataclass(frozen=True, slots=True)
-class FoundFloor:
-    """A floor that cameras stood over.
-
-    Attributes:
-        cameras_m: (k,) rising heights of these cameras, along up.
-        height_m: of the floor, along up.
-        confidence: how likely this is the floor under all the evidence, in [0, 1]; mean over the cameras.
-        choice: the hypotheses behind it, of the group with the most cameras.
-    """
-
-    cameras_m: Float[np.ndarray, " k"]
-    height_m: float
-    confidence: float
-    choice: Choice
-
-    @property
-    def camera_height_m(self) -> float:
-        """Median height of these cameras over the floor."""
-        return float(np.median(self.cameras_m)) - self.height_m
-
-
-@dataclass(frozen=True, slots=True)
 class FoundGround:
     """The floors of a recording, and their confidence.
 
@@ -444,7 +365,7 @@ class FoundGround:
     """
 
     ground: Ground
-    floors: tuple[FoundFloor, ...]
+    floors: tuple[FloorInfo, ...]
 
 
 def find_ground(
@@ -468,18 +389,22 @@ def ground_of_sights(
     sights: Sequence[Sight], up_in_world: Float[np.ndarray, "3"], start: Expected | None = None
 ) -> FoundGround:
     """Find the floors from what frames show; see ``find_ground``."""
-    nothing = Voxelised.union([])
+    nothing = Voxelised.of(np.zeros((0, 3)), np.zeros(0))
     sights = sorted(sights or [Sight(np.zeros(3), nothing, nothing)], key=lambda sight: float(sight.camera_m[2]))
     cameras_m = np.array([sight.camera_m[2] for sight in sights])
     everywhere = Voxelised.union([sight.level for sight in sights])
     under_m = stood_over(np.stack([sight.camera_m for sight in sights]), everywhere)
     bands = list(_bands(cameras_m))
     views = [_view(sights, cameras_m, under_m, band) for band in bands]
-    usual_m = _usual_height_m(bands, [choose_floor(view, start) for view in views])
+    sure_m = [
+        guess.camera_height_m
+        for guess, band in ((choose_floor(view, start)[0], band) for view, band in zip(views, bands, strict=True))
+        if guess.in_view and guess.confidence >= CERTAIN
+        for _ in band
+    ]
+    usual_m = float(np.median(sure_m)) if sure_m else None
     choices = [choose_floor(view, start, usual_m) for view in views]
-    floor_m = np.concatenate(
-        [np.full(len(band), choice.best.height_m) for band, choice in zip(bands, choices, strict=True)]
-    )
+    floor_m = np.repeat([best.height_m for best, _ in choices], [len(band) for band in bands])
     return FoundGround(Ground(up_in_world, cameras_m, floor_m), _floors(cameras_m, bands, choices))
 
 
@@ -508,37 +433,32 @@ def _view(
     )
 
 
-def _usual_height_m(bands: Sequence[Int[np.ndarray, " m"]], choices: Sequence[Choice]) -> float | None:
-    known = [
-        (choice.best.camera_height_m, len(band))
-        for band, choice in zip(bands, choices, strict=True)
-        if choice.best.seen and choice.confidence >= CERTAIN
-    ]
-    heights_m = [height_m for height_m, count in known for _ in range(count)]
-    return float(np.median(heights_m)) if heights_m else None
-
-
 def _floors(
-    cameras_m: Float[np.ndarray, " k"], bands: Sequence[Int[np.ndarray, " m"]], choices: Sequence[Choice]
-) -> tuple[FoundFloor, ...]:
-    order = sorted(range(len(bands)), key=lambda index: choices[index].best.height_m)
+    cameras_m: Float[np.ndarray, " k"],
+    bands: Sequence[Int[np.ndarray, " m"]],
+    choices: Sequence[tuple[FloorGuess, FloorGuess | None]],
+) -> tuple[FloorInfo, ...]:
+    """Return each floor once, lowest first; of bands with the same one, that with the most cameras speaks for it."""
     joined: list[list[int]] = []
-    for index in order:
-        height_m = choices[index].best.height_m
-        if joined and height_m - choices[joined[-1][0]].best.height_m < SAME_M:
-            joined[-1].append(index)
-        else:
-            joined.append([index])
-    return tuple(_joined(cameras_m, [bands[i] for i in group], [choices[i] for i in group]) for group in joined)
-
-
-def _joined(
-    cameras_m: Float[np.ndarray, " k"], bands: Sequence[Int[np.ndarray, " m"]], choices: Sequence[Choice]
-) -> FoundFloor:
-    count = np.array([len(band) for band in bands])
-    main = choices[int(count.argmax())]
-    confidence = float(np.average([choice.confidence for choice in choices], weights=count))
-    return FoundFloor(np.sort(cameras_m[np.concatenate(bands)]), main.best.height_m, confidence, main)
+    for index in sorted(range(len(bands)), key=lambda index: choices[index][0].height_m):
+        same = joined and choices[index][0].height_m - choices[joined[-1][0]][0].height_m < SAME_M
+        joined = [*joined[:-1], [*joined[-1], index]] if same else [*joined, [index]]
+    floors: list[FloorInfo] = []
+    for group in joined:
+        count = [len(bands[index]) for index in group]
+        (best, second), cameras = choices[group[int(np.argmax(count))]], sum(count)
+        middle_m = float(np.median(cameras_m[np.concatenate([bands[index] for index in group])]))
+        confidence = float(np.average([choices[index][0].confidence for index in group], weights=count))
+        best, *others = (
+            structs.replace(
+                guess, height_m=round(guess.height_m, 4), camera_height_m=round(middle_m - guess.height_m, 4),
+                confidence=round(sure, 4),
+            )
+            for guess, sure in ((best, confidence), *(() if second is None else ((second, second.confidence),)))
+        )  # fmt: skip
+        share = cameras / len(cameras_m)
+        floors.append(FloorInfo(best=best, runner_up=others[0] if others else None, cameras=share))
+    return tuple(floors)
 
 
 class GroundedRecording(Subset):

@@ -12,6 +12,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.tables import FileInfo
+from avlmaps.maps.types import FloorInfo
 from avlmaps.perception.models import public_choice, public_name
 from avlmaps.perception.protocols import ModelCard
 
@@ -130,41 +131,6 @@ class UpInfo(msgspec.Struct, frozen=True, kw_only=True):
     def vector(self) -> Float[np.ndarray, "3"]:
         """Return the direction as an array."""
         return np.array(self.direction, np.float64)
-
-
-class FloorGuess(msgspec.Struct, frozen=True, kw_only=True):
-    """One hypothesis of where a floor is.
-
-    Attributes:
-        height_m: of the floor along up, in the recording's world.
-        camera_height_m: of the cameras over it, their median.
-        confidence: how likely the floor lies within 0.12 m of that height under all the evidence, in [0, 1].
-        in_view: whether level surface was seen there; False says that no floor is in view, so that it was put at the
-            bottom of what is in view or where cameras usually have it.
-        level_m2: area of level surface seen there.
-        below: share of the surface in view that lies below it, in [0, 1]; near 0 for a floor.
-    """
-
-    height_m: float
-    camera_height_m: float
-    confidence: float
-    in_view: bool
-    level_m2: float
-    below: float
-
-
-class FloorInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """A floor that cameras stood over.
-
-    Attributes:
-        best: the hypothesis that was taken.
-        runner_up: the best one at another height, None where there is none.
-        cameras: share of the cameras that stood over this floor, in [0, 1].
-    """
-
-    best: FloorGuess
-    runner_up: FloorGuess | None
-    cameras: float
 
 
 class GroundInfo(msgspec.Struct, frozen=True, kw_only=True):
