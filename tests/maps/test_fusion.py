@@ -240,7 +240,7 @@ def test_parts_of_another_profile_are_refused():
 
 @pytest.mark.parametrize("settings", [(0.0, 1.0), (2.0, 1.0), (0.1, np.inf), (0.1, np.nan), (-1.0, 1.0)])
 def test_depth_limits_that_are_no_range_are_refused(settings):
-    with pytest.raises(MapError, match="are no range; let it end farther|choose a positive number"):
+    with pytest.raises(MapError, match=r"are no range; let it end farther|choose a positive number"):
         FusionSettings(*settings)
 
 

@@ -184,7 +184,7 @@ class SubmapBook:
         self._whole.append(submap)
 
     def close(self) -> None:
-        """Let the next frames begin another submap."""
+        """End the submap that is being filled; the next frames begin another."""
         self._whole += [] if self._open is None else [self._open.submap()]
         self._open = None
 

@@ -224,7 +224,10 @@ def seen_through(through: Int32[np.ndarray, " n"], views: Int32[np.ndarray, " n"
 
 
 def smear_reach(evidence: VoxelViews, sensor: SensorModel) -> Float64[np.ndarray, " n"]:
-    """Return how far the surface that a voxel's hits came from may be, voxels."""
+    """Return the error of the depths that fell into each voxel, times ``smear_sigmas``, in voxels.
+
+    The surface that was measured there may lie as far off; a voxel nearer than that which is much better seen is it.
+    """
     # sharp / hits is the mean of 1 / (1 + (σ / half a voxel)²)
     exact = np.clip(evidence.sharp / (SHARP_UNITS * evidence.hits), 1.0 / SHARP_UNITS, 1.0)
     return np.minimum(sensor.smear_sigmas * 0.5 * np.sqrt(1.0 / exact - 1.0), MOST_REACH)

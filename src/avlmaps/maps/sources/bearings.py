@@ -151,12 +151,10 @@ class BearingEvidence:
 
     Attributes:
         heard: for each sound the log-likelihood of each candidate.
-        of_device: (s, g, o) for each sound the log-likelihood of each combination of noise, outliers and offset.
         device: what all of them say of the device; None without directions.
     """
 
     heard: list[Float[np.ndarray, " c"]]
-    of_device: Float[np.ndarray, "s g o"]
     device: Device | None
 
 
@@ -166,13 +164,11 @@ def evidence_of_bearings(
     candidates: Candidates,
     expected: Sequence[Float[np.ndarray, " c"]],
     known_rad: tuple[float, float] | None = None,
-    others: Float[np.ndarray, "s g o"] | None = None,
 ) -> BearingEvidence:
     """Return the log-likelihood of each candidate for each sound, and what was found out about the device.
 
-    ``expected`` is the log-likelihood of each candidate without the sound, ``known_rad`` the device's offset and its
-    standard deviation, as an earlier recording has shown them, and ``others`` what other sounds say of the device
-    (``BearingEvidence.of_device``).
+    ``expected`` is the log-likelihood of each candidate without the sound, and ``known_rad`` the device's offset and
+    its standard deviation, as an earlier recording has shown them.
     """
     place = candidates.place_m.astype(np.float64)
     # Azimuths depend on the plan alone: one candidate for each of its cells stands for those above and below it.
@@ -189,8 +185,7 @@ def evidence_of_bearings(
         counts = one.residuals(place[some], between)
         of_sound.append(np.stack([_log_sum(before[:, None] + counts @ table) for table in tables]))
     of_device = np.array([_bounded(own) for own in of_sound]).reshape(-1, len(_GRID), _BINS)
-    every = of_device if others is None else np.concatenate([others, of_device])
-    known = every.sum(axis=0) + _known_before(known_rad)
+    known = of_device.sum(axis=0) + _known_before(known_rad)
     result: list[Float[np.ndarray, " c"]] = []
     for one, between, own, high in zip(heard, walls, of_device, elevations, strict=True):
         if not len(one):
@@ -206,8 +201,8 @@ def evidence_of_bearings(
                 value = counts @ table[:, chosen] + np.log(weight[number, chosen])
                 parts = np.concatenate([parts, _log_sum(value.T)[None]])
         result.append(_log_sum(parts) + high)
-    sounds = int((np.ptp(every, axis=(1, 2)) > 0.0).sum())  # those of which no direction was said have all alike
-    return BearingEvidence(result, of_device, _device(known, sounds) if sounds else None)
+    sounds = int((np.ptp(of_device, axis=(1, 2)) > 0.0).sum())  # those of which no direction was said have all alike
+    return BearingEvidence(result, _device(known, sounds) if sounds else None)
 
 
 def _known_before(known_rad: tuple[float, float] | None) -> Float[np.ndarray, " o"]:

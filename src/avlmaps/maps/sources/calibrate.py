@@ -109,7 +109,7 @@ def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float
         solution, measured = fit.solve(start, hold_heights=True)
         covered = fit.covariance(solution, measured, hold_heights=True)
     place_sd, delay_sd = covered
-    frames = int(measured.used.any(axis=1).sum())
+    frames = int(np.isfinite(measured).any(axis=1).sum())
     if frames < _FEWEST:
         raise RecordingError(_too_little(frames, begin_s, end_s))
     worst = int(place_sd.max(axis=1).argmax())
@@ -133,18 +133,19 @@ def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float
             f"{1e6 * WORST_RESIDUAL_S:g}) from those of one still source. Give the time when a single source sounds "
             f"({option('between', 'BEGIN END')}), in a room with few echoes; are poses and clocks right?"
         )
-    moved_m = fit.moved_m(solution)
+    place, late_s = fit.split(solution)
+    moved_m = np.linalg.norm(place - array.position_m, axis=1)
     if moved_m.max() > MOST_MOVED_M:
         raise RecordingError(
             f"Microphone {int(moved_m.argmax()) + 1} would lie {100 * moved_m.max():.0f} cm from its given place, more "
             f"than the {100 * MOST_MOVED_M:g} cm that a ruler may be off: a source that moves with the robot looks so, "
             "and so do channels in another order. Let the source stand still in the room, and check the given places."
         )
-    refined = fit.array_of(solution)
+    refined = replace(array, position_m=place, delay_s=late_s if array.delay_s is None else array.delay_s + late_s)
+    as_given = fit.with_source(np.concatenate([np.zeros(len(solution) - 3), solution[-3:]]), measured)
     return ArrayCalibration(
-        refined, fit.source_of(solution), _scale(fit.residual_s(fit.only_source(solution, measured), measured)),
-        after_s, place_sd.max(axis=1), delay_sd, moved_m,
-        frames, held, tuple(np.flatnonzero(signs < 0.0).tolist()),
+        refined, solution[-3:], _scale(fit.residual_s(as_given, measured)), after_s, place_sd.max(axis=1), delay_sd,
+        moved_m, frames, held, tuple(np.flatnonzero(signs < 0.0).tolist()),
     )  # fmt: skip
 
 
@@ -184,17 +185,7 @@ def _frames(track: AudioTrack, array: Microphones, begin_s: float, end_s: float)
     return found.take(np.flatnonzero((found.at_s >= begin_s) & (found.at_s <= end_s)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Measured:
-    """Delays that were measured.
-
-    Attributes:
-        delay_s: (f, p) of each frame and pair.
-        used: (f, p) where there is one.
-    """
-
-    delay_s: Float[np.ndarray, "f p"]
-    used: Bool[np.ndarray, "f p"]
+_Delays = Float[np.ndarray, "f p"]  # that were measured, of each frame and pair; NaN where there is none, seconds
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -241,26 +232,23 @@ class _Fit:
         some = np.unique(np.linspace(0, len(ears) - 1, min(len(ears), 200)).astype(int))
         return self.found.take(some).smoothed(_SMOOTHING), ears[some], place
 
-    def solve(self, start: Float[np.ndarray, " n"], hold_heights: bool) -> tuple[Float[np.ndarray, " n"], _Measured]:
+    def solve(self, start: Float[np.ndarray, " n"], hold_heights: bool) -> tuple[Float[np.ndarray, " n"], _Delays]:
         free = self._free(hold_heights)
         solution = start.copy()
         solution[: len(free)][~free] = 0.0
         measured = self._measure(solution, _WINDOWS_S[0])
         # The source alone at first: the array is nearly right, its place is a cell of the grid.
-        solution = self._with_source(solution, measured)
+        solution = self.with_source(solution, measured)
         for window_s in _WINDOWS_S[1:]:
             measured = self._measure(solution, window_s)
             solution = self._least_squares(solution, free, measured)
         return solution, measured
 
-    def only_source(self, solution: Float[np.ndarray, " n"], measured: _Measured) -> Float[np.ndarray, " n"]:
-        return self._with_source(np.concatenate([np.zeros(len(solution) - 3), solution[-3:]]), measured)
-
-    def _with_source(self, solution: Float[np.ndarray, " n"], measured: _Measured) -> Float[np.ndarray, " n"]:
+    def with_source(self, solution: Float[np.ndarray, " n"], measured: _Delays) -> Float[np.ndarray, " n"]:
         return self._least_squares(solution, np.arange(len(solution)) >= len(solution) - 3, measured)
 
     def _least_squares(
-        self, solution: Float[np.ndarray, " n"], chosen: Bool[np.ndarray, " n"], measured: _Measured
+        self, solution: Float[np.ndarray, " n"], chosen: Bool[np.ndarray, " n"], measured: _Delays
     ) -> Float[np.ndarray, " n"]:
         from scipy.optimize import least_squares
 
@@ -275,13 +263,14 @@ class _Fit:
         return whole
 
     def covariance(
-        self, solution: Float[np.ndarray, " n"], measured: _Measured, hold_heights: bool
+        self, solution: Float[np.ndarray, " n"], measured: _Delays, hold_heights: bool
     ) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, " m"]]:
         from scipy.optimize import approx_fprime
 
         free = np.flatnonzero(self._free(hold_heights))
-        if measured.used.sum() <= len(free):
-            return np.full((len(self.array), 3), np.inf), np.full(len(self.array), np.inf)
+        unknown = np.full((len(self.array), 3), np.inf), np.full(len(self.array), np.inf)
+        if np.isfinite(measured).sum() <= len(free):
+            return unknown
 
         def residual(values: Float[np.ndarray, " k"]) -> np.ndarray:
             whole = solution.copy()
@@ -294,7 +283,7 @@ class _Fit:
         inner = np.linalg.pinv(slope.T @ slope, rcond=1e-12) * spread_s**2
         blind = np.linalg.svd(slope, compute_uv=False)
         if blind[-1] < 1e-9 * blind[0]:
-            return np.full((len(self.array), 3), np.inf), np.full(len(self.array), np.inf)
+            return unknown
         whole = np.zeros((len(solution), len(solution)))
         whole[np.ix_(free, free)] = inner
         count = self.basis.shape[1]
@@ -303,23 +292,12 @@ class _Fit:
         delay = np.einsum("ma,ab,mb->m", self.basis, whole[3 * count : -3, 3 * count : -3], self.basis)
         return np.sqrt(np.maximum(place, 0.0)), np.sqrt(np.maximum(delay, 0.0)) * 1e-3
 
-    def array_of(self, solution: Float[np.ndarray, " n"]) -> Microphones:
-        (place, late_s), given = self._split(solution), self.array.delay_s
-        return replace(self.array, position_m=place, delay_s=late_s if given is None else given + late_s)
+    def residual_s(self, solution: Float[np.ndarray, " n"], measured: _Delays) -> Float[np.ndarray, " k"]:
+        return (measured - self._predicted_s(solution))[np.isfinite(measured)]
 
-    def moved_m(self, solution: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
-        return np.linalg.norm(self._split(solution)[0] - self.array.position_m, axis=1)
-
-    @staticmethod
-    def source_of(solution: Float[np.ndarray, " n"]) -> Float[np.ndarray, "3"]:
-        return solution[-3:]
-
-    def residual_s(self, solution: Float[np.ndarray, " n"], measured: _Measured) -> Float[np.ndarray, " k"]:
-        return (measured.delay_s - self._predicted_s(solution))[measured.used]
-
-    def explained(self, measured: _Measured) -> float:
-        clear = self.found.curve.max(axis=2) > _LEAST_PEAK * self.found.weight[:, None]
-        return float(measured.used.sum() / max(int((clear | measured.used).sum()), 1))
+    def explained(self, measured: _Delays) -> float:
+        clear, used = self.found.curve.max(axis=2) > _LEAST_PEAK * self.found.weight[:, None], np.isfinite(measured)
+        return float(used.sum() / max(int((clear | used).sum()), 1))
 
     def _free(self, hold_heights: bool) -> Bool[np.ndarray, " n"]:
         count = self.basis.shape[1]
@@ -327,7 +305,7 @@ class _Fit:
         free[2 : 3 * count : 3] = not hold_heights
         return free
 
-    def _split(self, solution: Float[np.ndarray, " n"]) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, " m"]]:
+    def split(self, solution: Float[np.ndarray, " n"]) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, " m"]]:
         count = self.basis.shape[1]
         place = self.array.position_m + self.basis @ solution[: 3 * count].reshape(count, 3)
         return place, 1e-3 * self.basis @ solution[3 * count : 4 * count]
@@ -337,12 +315,12 @@ class _Fit:
         return np.swapaxes(turned, 1, 2) + self.world_from_robot[:, None, :3, 3]
 
     def _predicted_s(self, solution: Float[np.ndarray, " n"]) -> Float[np.ndarray, "f p"]:
-        place, late_s = self._split(solution)
+        place, late_s = self.split(solution)
         arrival_s = np.linalg.norm(self._ears(place) - solution[-3:], axis=2) / SPEED_M_S + late_s
         one, other = self.found.pair.T
         return arrival_s[:, one] - arrival_s[:, other]
 
-    def _measure(self, solution: Float[np.ndarray, " n"], window_s: float) -> _Measured:
+    def _measure(self, solution: Float[np.ndarray, " n"], window_s: float) -> _Delays:
         curve, step_s = self.found.curve, self.found.step_s
         reach = max(int(np.ceil(window_s / step_s)), 2)
         middle = np.rint((self._predicted_s(solution) - self.found.first_s) / step_s).astype(np.int64)
@@ -356,7 +334,7 @@ class _Fit:
         part = np.where(bend < 0.0, 0.5 * (left - right) / np.where(bend < 0.0, bend, 1.0), 0.0)
         delay_s = self.found.first_s + (middle - reach - 1 + best + part) * step_s
         used = inside & is_peak & (top > _LEAST_PEAK * self.found.weight[:, None])
-        return _Measured(delay_s.astype(np.float64), used)
+        return np.where(used, delay_s.astype(np.float64), np.nan)
 
 
 def _scale(residual: Float[np.ndarray, " k"]) -> float:

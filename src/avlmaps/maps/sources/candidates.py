@@ -445,7 +445,10 @@ class Density:
 
     @cached_property
     def spread(self) -> Spread:
-        """How well the place is known; a cell that the circle of ``RIGHT_M`` cuts counts in part."""
+        """How likely the source lies within ``RIGHT_M`` of the position, and within which radii.
+
+        Of a cell on the edge of that circle the part inside counts.
+        """
         away, share = self._away_and_share
         inside = np.clip((RIGHT_M - away) / CELL_M + 0.5, 0.0, 1.0)
         right = float((inside * share).sum())

@@ -10,7 +10,7 @@ from avlmaps.core.errors import AudioError
 from avlmaps.core.poses import apply, from_rotation, rotation_to_level
 from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.bearings import BearingEvidence, Bearings, evidence_of_bearings, expected_alone
+from avlmaps.maps.sources.bearings import Bearings, evidence_of_bearings, expected_alone
 from avlmaps.maps.sources.candidates import (
     CandidateGrid,
     Candidates,
@@ -21,18 +21,18 @@ from avlmaps.maps.sources.candidates import (
     log_same_place,
 )
 from avlmaps.maps.sources.correlation import (
+    MOST_FRAMES,
     Correlations,
     SourceSettings,
-    correlate,
     levels_db,
-    loudest_frames,
+    loudest_of_sound,
     signs_along,
     unknown_offset,
 )
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import read_channels
-from avlmaps.recordings.microphones import DirectionTrack, Microphones
+from avlmaps.recordings.microphones import Microphones
 
 BEFORE_S, AFTER_S = 1.0, 0.2
 _LONGEST_S = 10.0
@@ -69,10 +69,10 @@ def evidence_of(
     the other way round.
     """
     onset_s, offset_s = span_s[0], min(span_s[1], span_s[0] + _LONGEST_S)
-    begin_s = max(onset_s - BEFORE_S, track.start_s)
-    sound = read_channels(track, begin_s, min(offset_s + AFTER_S, track.end_s))
     place = candidates.place_m.astype(np.float64)
     if len(microphones) == 1:
+        begin_s = max(onset_s - BEFORE_S, track.start_s)
+        sound = read_channels(track, begin_s, min(offset_s + AFTER_S, track.end_s))
         at_s, level_db = levels_db(sound.samples[0], sound.rate_hz, begin_s, onset_s - begin_s)
         ear = _ears(walk, microphones, at_s if len(at_s) else np.array([onset_s, offset_s]))
         legs = Legs.of(ear[:, 0], walls, place)
@@ -81,10 +81,9 @@ def evidence_of(
             away = np.linalg.norm(ear - place, axis=2)
             heard = unknown_offset(level_db, away, settings.level_noise_db, settings.reverberant_m)
         return EventEvidence(heard - heard.max(initial=-np.inf), None, legs.expected(settings))
-    found = correlate(
-        sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, microphones.longest_m, delay_s=microphones.delay_s
-    )
-    found = found.take(loudest_frames(found)).turned(signs).smoothed(settings.smoothing)
+    found = loudest_of_sound(
+        track, microphones, walk, span_s, longest_s=_LONGEST_S, most=MOST_FRAMES, smoothing=settings.smoothing
+    ).turned(signs)
     if not len(found.at_s):
         ear = _ears(walk, microphones, np.array([onset_s, offset_s]))
         return EventEvidence(np.zeros(len(place)), None, Legs.of(ear.mean(axis=1), walls, place).expected(settings))
@@ -189,27 +188,13 @@ _MOVING = -1.5  # logarithm of the odds below which the two halves of a sound ar
 LEAST = -60.0  # of a log-likelihood: no difference below matters
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FoundSources:
-    """The evidence of some sounds, and what it took.
-
-    Attributes:
-        evidence: of these sounds.
-        signs: (m,) -1 for a channel that is wired the other way round, else 1.
-        of_device: what each sound says of the device that says directions, as ``BearingEvidence``.
-    """
-
-    evidence: SourceEvidence
-    signs: Float[np.ndarray, " m"]
-    of_device: Float[np.ndarray, "s g o"]
-
-
 def find_sources(
     track: AudioTrack,
     walk: Trajectory,
     spans_s: Sequence[tuple[float, float]],
     voxel_m: Float[np.ndarray, "n 3"],
     up_in_world: Float[np.ndarray, "3"],
+    signs_by_s: Sequence[tuple[float, float]] | None = None,
 ) -> SourceEvidence | None:
     """Return the evidence of every sound over the candidates of a map; None where nothing can be said.
 
@@ -219,26 +204,7 @@ def find_sources(
         spans_s: onset and offset of each sound, the recording's time.
         voxel_m: middles of the map's voxels, world.
         up_in_world: unit vector.
-    """
-    found = find_among(track, walk, spans_s, voxel_m, up_in_world, signs_by_s=spans_s)
-    return None if found is None else found.evidence
-
-
-def find_among(
-    track: AudioTrack,
-    walk: Trajectory,
-    spans_s: Sequence[tuple[float, float]],
-    voxel_m: Float[np.ndarray, "n 3"],
-    up_in_world: Float[np.ndarray, "3"],
-    *,
-    signs_by_s: Sequence[tuple[float, float]],
-    signs: Float[np.ndarray, " m"] | None = None,
-    others: Float[np.ndarray, "s g o"] | None = None,
-) -> FoundSources | None:
-    """Return the evidence of some sounds of a drive; see ``find_sources``.
-
-    The signs of the channels are found by the sounds of ``signs_by_s``, unless ``signs`` gives them. ``others`` is what
-    other sounds of the drive say of the device (``FoundSources.of_device``).
+        signs_by_s: the sounds by which the signs of the channels are found; these by default.
     """
     microphones, directions = track.microphones, track.directions
     if (microphones is None and directions is None) or not len(spans_s) or not len(voxel_m):
@@ -255,10 +221,9 @@ def find_among(
     channels = 0 if microphones is None else len(microphones)
     settings, plan = SourceSettings.of(channels), CandidateGrid.of(candidates.place_m)
     walls: dict[int, Walls] = {}
-    if signs is None:
-        signs = np.ones(max(channels, 1))
-        if microphones is not None:
-            signs = signs_along(track, microphones, walked, signs_by_s, candidates.place_m, settings)
+    signs = np.ones(max(channels, 1))
+    if microphones is not None:
+        signs = signs_along(track, microphones, walked, signs_by_s or spans_s, candidates.place_m, settings)
     layers: list[Walls] = []
     heard: list[EventEvidence] = []
     for begin_s, end_s in progress(spans_s, "sources", unit="sound"):
@@ -276,10 +241,14 @@ def find_among(
             heard.append(EventEvidence(np.zeros(len(candidates)), None, alone))
     said = None
     if directions is not None:
-        said = _said(heard, directions, walked, spans_s, layers, candidates, others)
+        bearings = [Bearings.of(directions, walked, (float(begin_s), float(end_s))) for begin_s, end_s in spans_s]
+        expected = [one.expected for one in heard]
+        said = evidence_of_bearings(bearings, layers, candidates, expected, directions.known_rad)
+        if said.device is not None:
+            say(f"note: {said.device.sentence}")
         both = [one.heard + other for one, other in zip(heard, said.heard, strict=True)]
         heard = [replace(one, heard=total - total.max()) for one, total in zip(heard, both, strict=True)]
-    evidence = SourceEvidence(
+    return SourceEvidence(
         place=(candidates.place_m.astype(np.float64) @ level).astype(np.float32),
         prior=candidates.prior.astype(np.float32),
         heard=np.maximum(np.stack([one.heard for one in heard]), LEAST).astype(np.float16),
@@ -288,24 +257,6 @@ def find_among(
         channels=np.array([channels], np.int64),
         device=np.zeros((0, 4)) if said is None or said.device is None else said.device.row[None],
     )
-    return FoundSources(evidence, signs, np.zeros((0, 1, 1)) if said is None else said.of_device)
-
-
-def _said(
-    heard: Sequence[EventEvidence],
-    directions: DirectionTrack,
-    walked: Trajectory,
-    spans_s: Sequence[tuple[float, float]],
-    walls: Sequence[Walls],
-    candidates: Candidates,
-    others: Float[np.ndarray, "s g o"] | None,
-) -> BearingEvidence:
-    said = [Bearings.of(directions, walked, (float(begin_s), float(end_s))) for begin_s, end_s in spans_s]
-    expected = [one.expected for one in heard]
-    found = evidence_of_bearings(said, walls, candidates, expected, directions.known_rad, others)
-    if found.device is not None:
-        say(f"note: {found.device.sentence}")
-    return found
 
 
 def moves(one: EventEvidence, plan: CandidateGrid, prior: Float[np.ndarray, " c"], settings: SourceSettings) -> bool:
@@ -316,7 +267,7 @@ def moves(one: EventEvidence, plan: CandidateGrid, prior: Float[np.ndarray, " c"
     return log_same_place(first, second, prior) < _MOVING
 
 
-_SIGNS_BY = 6  # sounds, by which the signs of the channels are settled until the end
+_SIGNS_BY = 6  # sounds, the last ones, by which the signs of the channels are found until the end
 _RECENT = 8  # sounds whose directions are looked at again, now that the device is known better
 
 Spans = Sequence[tuple[float, float]]
@@ -339,7 +290,7 @@ class SourceFinder:
 
     def forget(self) -> None:
         """Locate every sound again: the poses have changed."""
-        self._found: FoundSources | None = None
+        self._found: SourceEvidence | None = None
         self._rows: dict[tuple[float, float], int] = {}  # of the sounds that are located
         self._known: tuple[Spans, SourceEvidence | None] = (), None
 
@@ -353,7 +304,7 @@ class SourceFinder:
         if self._found is None or not len(row):
             return None
         if self._known[1] is None or list(self._known[0]) != list(spans_s):
-            self._known = spans_s, _taken(self._found.evidence, row)
+            self._known = spans_s, _taken(self._found, row)
         return self._known[1]
 
     def find_next(
@@ -371,23 +322,15 @@ class SourceFinder:
         now = fresh if self._at_once is None else fresh[-self._at_once :]
         if track.microphones is None:
             now = [*(span for span in spans_s[max(0, len(spans_s) - _RECENT) :] if span not in now), *now]
-        taken = {_rounded(span) for span in now}
-        old, before = {span: row for span, row in self._rows.items() if span not in taken}, self._found
-        rows = np.array(list(old.values()), np.int64)
-        told = track.directions is not None and before is not None and before.of_device.shape[1] > 1
-        # By all sounds, also those that wait: else signs change with the order, and what was located waits again.
-        found = find_among(
-            track, walk, now, voxel_m, up_in_world, signs_by_s=spans_s,
-            signs=before.signs if before is not None and len(old) >= _SIGNS_BY else None,
-            others=before.of_device[rows] if told and before is not None and len(old) else None,
-        )  # fmt: skip
+        found = find_sources(track, walk, now, voxel_m, up_in_world, spans_s[-_SIGNS_BY:])
         if found is None:
             return None
-        self._rows = {_rounded(span): row for row, span in enumerate(now)}
-        if before is not None and len(old) and np.array_equal(before.signs, found.signs):  # else by other signs
-            found = _joined(found, before, rows)
-            self._rows |= {span: len(now) + row for row, span in enumerate(old)}
-        self._found, self._known = found, ((), None)
+        rows = {_rounded(span): row for row, span in enumerate(now)}
+        old = {span: row for span, row in self._rows.items() if span not in rows}
+        if self._found is not None and old:
+            found = _joined(found, _taken(self._found, np.array(list(old.values()))))
+            rows |= {span: len(now) + row for row, span in enumerate(old)}
+        self._found, self._rows, self._known = found, rows, ((), None)
         return self.known(spans_s)
 
 
@@ -403,21 +346,14 @@ def _taken(evidence: SourceEvidence, row: Int[np.ndarray, " n"]) -> SourceEviden
     )  # fmt: skip
 
 
-def _joined(new: FoundSources, before: FoundSources, rows: Int[np.ndarray, " k"]) -> FoundSources:
-    """Return new sounds, and those of some rows of before on the candidates of the new ones."""
-    own = _taken(before.evidence, rows)
-    carried = laid(own, np.eye(4), new.evidence.place.astype(np.float64))
+def _joined(new: SourceEvidence, before: SourceEvidence) -> SourceEvidence:
+    """Return the evidence of all sounds, on the candidates of the new ones."""
+    carried = laid(before, np.eye(4), new.place.astype(np.float64))
     heard, expected = (np.maximum(values, LEAST).astype(np.float16) for values in carried)
-    evidence = replace(
-        new.evidence, heard=np.concatenate([new.evidence.heard, heard]),
-        expected=np.concatenate([new.evidence.expected, expected]),
-        moving=np.concatenate([new.evidence.moving, own.moving]),
+    return replace(
+        new, heard=np.concatenate([new.heard, heard]), expected=np.concatenate([new.expected, expected]),
+        moving=np.concatenate([new.moving, before.moving]),
     )  # fmt: skip
-    said = np.zeros((len(evidence), *new.of_device.shape[1:]))
-    if len(new.of_device):
-        said[: len(new.of_device)] = new.of_device
-        said[len(new.of_device) :] = before.of_device[rows] if before.of_device.shape[1] > 1 else 0.0
-    return FoundSources(evidence, new.signs, said)
 
 
 def require_fit(microphones: Microphones | None, channels: int) -> None:

@@ -27,7 +27,7 @@ from avlmaps.recordings.microphones import Microphones
 
 _MOST_SOUNDS, _MOST_FRAMES, _LONGEST_S = 30, 80, 10.0
 _LEAST_FRAMES = 6
-_MOST_ORDERED = 4  # microphones of which every order is tried; of more, exchanges one after the other
+_MOST_ORDERED = 4  # microphones of which every order is tried; of more, exchanges of two, and rings turned or mirrored
 _AZIMUTHS, _AWAY_M, _OVER_EAR_M = 48, (0.5, 1.0, 2.0, 4.0), (-0.9, -0.3, 0.3)
 _SMOOTHING = 5.0
 # An order fits better when the sounds' fits grow by a factor, and by some standard errors of its logarithm: by much,
@@ -43,12 +43,12 @@ class Wiring:
     """What was found about the order of the channels.
 
     Attributes:
-        order: the microphone (its position's number, from 0) of each channel that fits best.
+        order: the microphone (its position's number, from 0) of each channel that fits best; of several that fit as
+            well, that which moves fewest channels.
         turned: the channels whose sign is turned; sources are found with it taken back (``polarity``).
         fit: share of the greatest possible correlation that the order of the recording reaches, mean over the sounds.
         best_fit: that of ``order``.
         sounds: how many were heard well enough.
-        unsure: other orders that fit about as well as ``order``, which moves fewest channels of them.
     """
 
     order: Order
@@ -56,7 +56,6 @@ class Wiring:
     fit: float
     best_fit: float
     sounds: int
-    unsure: tuple[Order, ...] = ()
 
     @property
     def is_right(self) -> bool:
@@ -73,31 +72,24 @@ def check_wiring(track: AudioTrack, walk: Trajectory, spans_s: Sequence[tuple[fl
     heard = [one for span in _spread(inside) if (one := _Heard.of(track, array, walk, span)) is not None]
     if len(heard) < _FEWEST_SOUNDS:
         return None
-    own = tuple(range(len(array)))
-    orders = _orders_of(len(array), heard)
+    own, orders = tuple(range(len(array))), _orders(len(array))
     fits = {order: np.array([one.fit(order) for one in heard]) for order in orders}
     best = max(orders, key=lambda order: float(fits[order].sum()))
     signs = signs_of([one.steered for one in heard], SourceSettings.of(len(own))) if len(own) > 2 else np.ones(2)
     taken_back = np.array([one.fit(own, signs) for one in heard])
     if (signs < 0.0).any() and taken_back.sum() > fits[best].sum() and _is_better(taken_back, fits[own]):
         turned = tuple(np.flatnonzero(signs < 0.0).tolist())
-        return Wiring(own, turned, _mean(fits[own]), _mean(taken_back), len(heard))
-    if not _is_better(fits[best], fits[own]):
-        unsure = tuple(order for order in orders if order != own and not _is_better(fits[own], fits[order]))
-        return Wiring(own, (), _mean(fits[own]), _mean(fits[own]), len(heard), unsure)
-    alike = [order for order in orders if order == best or not _is_better(fits[best], fits[order])]
-    fewest = min(_moved(order) for order in alike)
-    best = max((order for order in alike if _moved(order) == fewest), key=lambda order: _mean(fits[order]))
-    others = tuple(order for order in alike if order != best)
-    return Wiring(best, (), _mean(fits[own]), _mean(fits[best]), len(heard), others)
+        return Wiring(own, turned, float(fits[own].mean()), float(taken_back.mean()), len(heard))
+    if _is_better(fits[best], fits[own]):
+        alike = [order for order in orders if order == best or not _is_better(fits[best], fits[order])]
+        best = min(alike, key=lambda order: (_moved(order), -float(fits[order].mean())))
+    else:
+        best = own
+    return Wiring(best, (), float(fits[own].mean()), float(fits[best].mean()), len(heard))
 
 
 def _moved(order: Order) -> int:
     return sum(channel != microphone for channel, microphone in enumerate(order))
-
-
-def _mean(fits: Float[np.ndarray, " s"]) -> float:
-    return float(fits.mean())
 
 
 def _is_better(one: Float[np.ndarray, " s"], other: Float[np.ndarray, " s"], tried: int = 24) -> bool:
@@ -116,31 +108,16 @@ def _spread(spans_s: Sequence[tuple[float, float]]) -> list[tuple[float, float]]
     return [spans_s[number] for number in at.tolist()] if len(spans_s) else []
 
 
-def _orders_of(count: int, heard: Sequence["_Heard"]) -> list[Order]:
+def _orders(count: int) -> list[Order]:
     own = tuple(range(count))
     if count <= _MOST_ORDERED:
         return list(itertools.permutations(own))
-    known: dict[Order, float] = {}
-
-    def fit(order: Order) -> float:
-        if order not in known:
-            known[order] = sum(one.fit(order) for one in heard)
-        return known[order]
-
     rings = [own[turn:] + own[:turn] for turn in own]
-    best = max([*rings, *(ring[::-1] for ring in rings)], key=fit)
-    for start in {own, best}:
-        order, before = start, -np.inf
-        while fit(order) > before:
-            before = fit(order)
-            order = max((order, *(_exchanged(order, a, b) for a, b in itertools.combinations(own, 2))), key=fit)
-    return list(known)
-
-
-def _exchanged(order: Order, one: int, other: int) -> Order:
-    changed = list(order)
-    changed[one], changed[other] = order[other], order[one]
-    return tuple(changed)
+    exchanges = [
+        tuple({one: other, other: one}.get(channel, channel) for channel in own)
+        for one, other in itertools.combinations(own, 2)
+    ]
+    return list(dict.fromkeys([*rings, *(ring[::-1] for ring in rings), *exchanges]))
 
 
 @dataclass(frozen=True, eq=False)
