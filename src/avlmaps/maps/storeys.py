@@ -8,6 +8,7 @@ A floor is a height at which much surface has headroom and over which the camera
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -324,7 +325,8 @@ def _shortest(
     pairs = np.concatenate([one, other[foot]]), np.concatenate([other, one[foot]])
     graph = csr_array((np.concatenate([cost, cost[foot]]), pairs), (len(kind), len(kind)))
     feet, tops = (np.unique(other[kind[other] == end]) for end in (_FOOT, _TOP))
-    total, before, _ = csgraph.dijkstra(graph, indices=feet, return_predecessors=True, min_only=True)
+    shortest: Any = csgraph.dijkstra  # its types know no min_only with predecessors
+    total, before, _ = shortest(graph, indices=feet, return_predecessors=True, min_only=True)
     path = [int(tops[np.argmin(total[tops])])]
     while before[path[-1]] >= 0:
         path.append(int(before[path[-1]]))
