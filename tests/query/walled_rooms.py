@@ -30,4 +30,4 @@ def two_rooms(door_m: float = 0.0, wall: bool = True) -> Space:
 def storeys_at(*floors_m: float) -> Storeys:
     """Return storeys with floors at these heights, rising."""
     ends = [-np.inf, *(floor - 0.3 for floor in floors_m[1:]), np.inf]
-    return Storeys(tuple(Storey(k, floor, None, ends[k], ends[k + 1], 10.0) for k, floor in enumerate(floors_m)))
+    return Storeys(tuple(Storey(k, floor, ends[k], ends[k + 1]) for k, floor in enumerate(floors_m)))

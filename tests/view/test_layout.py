@@ -54,10 +54,10 @@ def test_the_description_places_the_cameras_in_the_map(layout: Layout) -> None:
 def test_the_description_of_a_map_of_several_storeys_cuts_each_out(layout: Layout, room: AVLMap) -> None:
     assert "storeys" not in layout.describe()
     two = copy(room)
-    two.storeys = Storeys((Storey(0, 0.0, 2.5, -np.inf, 2.6, 9.0), Storey(1, 2.8, None, 2.6, np.inf, 9.0)))
+    two.storeys = Storeys((Storey(0, 0.0, -np.inf, 2.6), Storey(1, 2.8, 2.6, np.inf)))
     ground, first = Layout(two).describe()["storeys"]
     assert (ground["name"], first["name"]) == ("ground floor", "first floor")
-    assert ground["cut"][0] < ground["floor_m"] < ground["cut"][1] == pytest.approx(2.4)
+    assert ground["cut"][0] < ground["floor_m"] < ground["cut"][1] == pytest.approx(2.3)
     assert first["cut"][0] == first["low_m"] == 2.6
     assert all(np.isfinite(one["cut"]).all() for one in (ground, first))
 

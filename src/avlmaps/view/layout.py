@@ -25,7 +25,7 @@ RECORD = np.dtype([("cell", "<u2", (3,)), ("seen", "<u2"), ("rgb", "u1", (3,)), 
 """One voxel as the page reads it: where, when it was last seen (65535 is the end of the recording), its colour."""
 _MOST_CELLS = 65535
 _NEAR_SHARE = 0.25  # of the map's extent: voxels up to this far out of the bulk of it count as the whole map
-_UNDER_CEILING_M = 0.1  # a storey is shown from below its floor to this far under its ceiling
+_CEILING_M, _BELOW_M = 0.3, 0.1  # a storey is shown from below its floor to this far under its upper end
 _MEASURED = 300_000  # voxels from which the first view of a page is computed: an even picture of the map
 _HEADROOM_M = 0.3  # the page opens with what is higher over the highest camera cut away
 
@@ -152,8 +152,7 @@ def _storeys(storeys: "Storeys", low_m: float, high_m: float) -> list[dict[str, 
     """Return the storeys, lowest first, each with the heights between which it is shown without its ceiling."""
     told: list[dict[str, Any]] = []
     for storey in storeys.all:
-        top_m = (storey.ceiling_m or min(storey.high_m, high_m)) - _UNDER_CEILING_M
-        bottom_m = max(storey.low_m, low_m - _UNDER_CEILING_M)
+        top_m, bottom_m = min(storey.high_m, high_m) - _CEILING_M, max(storey.low_m, low_m - _BELOW_M)
         told.append({"name": storey.name, "floor_m": storey.floor_m, "low_m": bottom_m, "cut": [bottom_m, top_m]})
     return told
 
