@@ -45,6 +45,22 @@ def test_without_gates_the_end_is_the_build_of_the_same_frames(tmp_path: Path) -
     assert live.status().dropped == {} and len(live) == 25
 
 
+def test_corrected_poses_move_what_came_and_a_closed_map_takes_none(tmp_path: Path) -> None:
+    settings, shift = BuildSettings(frames=FrameSettings(per_submap=4)), np.eye(4)
+    shift[0, 3] = 0.5
+    moved = [replace(one, world_from_camera=shift @ one.world_from_camera) for one in map(frame, range(13))]
+    corrected = np.array([one.stamp_s for one in moved[:12]]), np.stack([one.world_from_camera for one in moved[:12]])
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, settings=settings, live=EVERY) as live:
+        for number in range(12):
+            add(live, frame(number))
+        assert live.correct_poses(*corrected) == pytest.approx((0.5, 0.5))
+        add(live, moved[12])
+    with pytest.raises(MapError, match="is closed"):
+        live.correct_poses(*corrected)
+    assert len(live) == 13 and live.doubts == ()
+    assert live.map.data.info.bounding_box_m.low[0] == pytest.approx(-0.5, abs=0.2)  # 1 m to the left of the first
+
+
 def test_it_answers_from_other_threads_on_snapshots_that_do_not_change(tmp_path: Path) -> None:
     chosen = LiveSettings(first_frames=2, snapshot_s=0.0, new_share=0.0)
     faults: list[BaseException] = []
