@@ -193,10 +193,6 @@ class Encoders:
         """Return these encoders, and others for the modules that they leave out."""
         return Encoders.of(others.name, {**others.sources, **self.sources}, self.weight_variance_m2)
 
-    def without(self, kind: Kind) -> "Encoders":
-        """Return the encoders but for one module's."""
-        return self.having(**{kind.value: None})
-
     def __contains__(self, kind: object) -> bool:
         return kind in self.sources
 
@@ -327,23 +323,6 @@ def encoders_of(chosen: str | Encoders) -> Encoders:
         )
     _known(dict(chosen.sources))
     return chosen
-
-
-def choose_models(name: str, words: Sequence[str] = ()) -> Encoders:
-    """Return a profile's encoders with other backends or models for some modules.
-
-    Args:
-        name: of the profile.
-        words: ``module=backend`` or ``module=backend@model``.
-
-    Raises:
-        BackendError: a word is not of that form, or there is no such profile or backend.
-    """
-    try:
-        choices = read_choices(words)
-    except ValueError as problem:
-        raise BackendError(f"A choice of models {problem}") from None
-    return profile(name).choosing(choices)
 
 
 def read_choices(words: Sequence[str]) -> dict[Kind, str]:

@@ -17,6 +17,7 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.files import replace_atomically, user_path, write_bytes_atomically
+from avlmaps.core.registry import Kind, load
 from avlmaps.perception.models import user_folder
 from avlmaps.perception.protocols import SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound
@@ -81,7 +82,7 @@ def teach_sound(
         raise BackendError(f"The name has {len(name)} characters; choose one of at most {LONGEST_NAME}.")
     if not clips:
         raise AudioError(f"No clips were given to learn {name!r} from; give at least one sound file.")
-    encoder = _embedded() if encoder is None else encoder
+    encoder = load(Kind.SOUNDS, "embedded") if encoder is None else encoder
     sounds = [_audible(clip) for clip in clips]
     taught = TaughtSound(
         name=name,
@@ -118,12 +119,6 @@ def forget_sound(name: str, folder: Path | None = None) -> None:
     _refuse_link(place)
     (place / "sound.json").unlink()  # first: a folder without notes is not a sound, even with other files left in it
     shutil.rmtree(place)
-
-
-def _embedded() -> SoundEncoder:
-    from avlmaps.core.registry import Kind, load
-
-    return load(Kind.SOUNDS, "embedded")
 
 
 def _slug(name: str) -> str:

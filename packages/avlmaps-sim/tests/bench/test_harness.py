@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.registry import Kind
-from avlmaps.perception.encoders import choose_models
 from avlmaps.recordings.audio import Sound, write_flac
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
@@ -30,7 +29,7 @@ from avlmaps_sim.bench.harness.figures import (
     write_answer,
 )
 from avlmaps_sim.bench.harness.own_recording import OwnRecording, is_recording
-from avlmaps_sim.bench.harness.settings import TaskError, shipped_checksums, unheard_folder, unheard_rows
+from avlmaps_sim.bench.harness.settings import TaskError, models_of, shipped_checksums, unheard_folder, unheard_rows
 from avlmaps_sim.bench.indexing.runs import PAPER_SIZES, IndexingSettings, _in_turn, run
 from avlmaps_sim.bench.indexing.scene_queries import cut_out, mixed, surface_regions
 from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
@@ -84,8 +83,8 @@ def test_a_folder_that_does_not_say_what_was_trained_on_is_refused(tmp_path: Pat
 
 
 def test_a_model_is_chosen_by_its_word():
-    assert choose_models("embedded", ["views=clip"]).name_of(Kind.VIEWS) == "clip"
-    assert choose_models("embedded").name_of(Kind.VIEWS) == "embedded"
+    assert models_of("embedded", ["views=clip"]).name_of(Kind.VIEWS) == "clip"
+    assert models_of("embedded").name_of(Kind.VIEWS) == "embedded"
 
 
 @pytest.mark.parametrize(
@@ -93,7 +92,7 @@ def test_a_model_is_chosen_by_its_word():
 )
 def test_a_word_that_chooses_no_model_is_refused(words: list[str]):
     with pytest.raises(BackendError):
-        choose_models("embedded", words)
+        models_of("embedded", words)
 
 
 def test_weights_are_outdated_where_their_checksum_is_not_the_shipped_one():

@@ -176,12 +176,16 @@ class ColourWords:
 
     def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf 16"]:
         """Return a feature for each four by four pixels' mean colour."""
-        return self._table[_codes(frame.rgb)]
+        import cv2
 
-    def encode_colours(self, rgb: UInt8[np.ndarray, "n 3"]) -> Float32[np.ndarray, "n 16"]:
+        height, width = frame.rgb.shape[:2]
+        size = max(1, round(width / _CELL)), max(1, round(height / _CELL))
+        return self.encode_colours(np.asarray(cv2.resize(frame.rgb, size, interpolation=cv2.INTER_AREA), np.uint8))
+
+    def encode_colours(self, rgb: UInt8[np.ndarray, "*n 3"]) -> Float32[np.ndarray, "*n 16"]:
         """Return a feature for each colour."""
         level = rgb.astype(np.int32) >> 3
-        return self._table[(level[:, 0] << 10) | (level[:, 1] << 5) | level[:, 2]]
+        return self._table[(level[..., 0] << 10) | (level[..., 1] << 5) | level[..., 2]]
 
     def without_colours(self, phrase: str) -> str:
         """Return the rest of a phrase without its words of colour."""
@@ -207,16 +211,6 @@ class ColourWords:
     def understood(self, word: str) -> str:
         """Return the words of colour in a phrase, or ``""``."""
         return " ".join(text for text, _, _ in _colours_in(word))
-
-
-def _codes(rgb: UInt8[np.ndarray, "h w 3"]) -> np.ndarray:
-    """Return the number in the table of each cell's mean colour."""
-    import cv2
-
-    height, width = rgb.shape[:2]
-    size = max(1, round(width / _CELL)), max(1, round(height / _CELL))
-    cells = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA).astype(np.int32) >> 3
-    return (cells[..., 0] << 10) | (cells[..., 1] << 5) | cells[..., 2]
 
 
 def _meaning(token: str) -> str:

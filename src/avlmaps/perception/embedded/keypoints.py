@@ -8,6 +8,7 @@ of the heat in windows of 5x5; their descriptors are interpolated between the ce
 
 import hashlib
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -246,11 +247,6 @@ def match_mutual(
     return np.stack([kept, nearest[kept]], axis=1)
 
 
-def xfeat_places() -> Vlad:
-    """Return the encoder of places by these keypoints."""
-    return Vlad(DIM)
-
-
-def xfeat_matcher() -> MutualRatio:
-    """Return the matcher of these keypoints."""
-    return MutualRatio(DIM, _XFEAT_RATIO)
+# The encoder of places by these keypoints, and their matcher.
+xfeat_places = partial(Vlad, DIM)
+xfeat_matcher = partial(MutualRatio, DIM, _XFEAT_RATIO)

@@ -152,9 +152,9 @@ class EmbeddedSounds:
         Two things speak for it: that some windows of both are alike, and that both are taken for the same kind.
         """
         taught = self.taught
-        ours = _direction(self._hear(asked, taught).kinds)
+        ours = np.sqrt(self._hear(asked, taught).kinds)  # the product of two roots is their Bhattacharyya coefficient
         cosines = np.array([float((features @ asked.T).max()) for features in sounds])
-        agreement = np.array([float(_direction(self._hear(features, taught).kinds) @ ours) for features in sounds])
+        agreement = np.array([float(np.sqrt(self._hear(features, taught).kinds) @ ours) for features in sounds])
         return np.asarray(same_kind(cosines, agreement, self.calibration), np.float32).reshape(len(sounds))
 
     def describe(self, features: Float32[np.ndarray, "windows d"]) -> EncodedSound:
@@ -204,11 +204,6 @@ class EmbeddedSounds:
             likely = np.hstack([likely * (1.0 - own.max(axis=1, keepdims=True)), own])
             known = np.maximum(known, own.max(axis=1))
         return EncodedSound(likely.max(axis=0), float(known.max()))
-
-
-def _direction(kinds: Float[np.ndarray, " kinds"]) -> Float[np.ndarray, " kinds"]:
-    """Return square roots of the probabilities, so that the product of two is their Bhattacharyya coefficient."""
-    return np.sqrt(kinds)
 
 
 Array = Float[np.ndarray, "..."]

@@ -10,7 +10,6 @@ from jaxtyping import Float, Int, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
-from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.album import perceive_keyframes
 from avlmaps.maps.keyframes.choose import KeyframeSettings, select_keyframes
 from avlmaps.perception.encoders import Encoders
@@ -91,7 +90,7 @@ def run(
 
 def map_of(recording: Recording, used: Encoders, rng: np.random.Generator) -> LocatableMap:
     """Return the pictures of a map of a recording, without its voxels, its sounds and the features of its views."""
-    used = used.without(Kind.VIEWS)
+    used = used.having(views=None)
     keyframes, place_state = perceive_keyframes(
         recording, select_keyframes(recording, _KEYFRAMES), used, rng, settings=_KEYFRAMES
     )

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
-from avlmaps.perception.encoders import Encoders, choose_models, encoders_of
+from avlmaps.perception.encoders import Encoders
 from avlmaps_sim.bench.harness.figures import BenchError, Table, in_words, markdown, write_answer
-from avlmaps_sim.bench.harness.settings import checksums, shipped_checksums
+from avlmaps_sim.bench.harness.settings import checksums, models_of, shipped_checksums
 
 if TYPE_CHECKING:
     from avlmaps_sim.bench.harness.settings import SceneSettings
@@ -85,7 +85,7 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
         from avlmaps_sim.bench.navigation.suite import run_navigation
 
         return run_navigation(inputs.navigation, out)
-    used = encoders_of(choose_models(inputs.profile, inputs.models))
+    used = models_of(inputs.profile, inputs.models)
     weights = _weights(suite, used)
     if suite == "objects":
         from avlmaps_sim.bench.objects import run_objects
@@ -181,7 +181,7 @@ def _locate(inputs: SuiteInputs) -> Mapping[str, Table]:
         if len(recording) < 20:
             raise RecordingError(f"{path} has {len(recording)} frames; half as map and half as photos takes 20.")
         tables[f"photos located in {path.resolve().name}"] = locate.run(
-            recording, inputs.seed, used=encoders_of(choose_models(inputs.profile, inputs.models))
+            recording, inputs.seed, used=models_of(inputs.profile, inputs.models)
         )
     return tables
 
@@ -193,7 +193,7 @@ def _frames(inputs: SuiteInputs) -> Mapping[str, Table]:
     if inputs.nyuv2 is None:
         raise BenchError("This suite measures on labelled frames (docs/guides/train-eyes.md); name their folder with "
                          f"{option('nyuv2')}.")  # fmt: skip
-    used = encoders_of(choose_models(inputs.profile, inputs.models))
+    used = models_of(inputs.profile, inputs.models)
     encoder = used.pixels
     if not isinstance(encoder, EmbeddedPixels):
         raise BenchError(

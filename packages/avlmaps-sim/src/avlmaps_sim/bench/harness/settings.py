@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
@@ -13,11 +14,11 @@ from typing import Literal, TypeVar
 
 import msgspec
 
-from avlmaps.core.errors import AudioError, AvlmapsError
+from avlmaps.core.errors import AudioError, AvlmapsError, BackendError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
-from avlmaps.perception.encoders import Encoders, choose_models, encoders_of
+from avlmaps.perception.encoders import Encoders, encoders_of, profile, read_choices
 from avlmaps.query.settings import Rules
 from avlmaps_sim.mixing.clips import INDEX, find_clips, index_rows
 
@@ -74,6 +75,19 @@ def unheard_folder(folder: Path, work: Path) -> Path:
     made.mkdir(parents=True, exist_ok=True)
     write_bytes_atomically(made / INDEX, content)
     return made
+
+
+def models_of(name: str, words: Sequence[str] = ()) -> Encoders:
+    """Return a profile's encoders, with the backends or models that ``module=backend[@model]`` say instead of some.
+
+    Raises:
+        BackendError: a word is not of that form, or there is no such profile or backend.
+    """
+    try:
+        choices = read_choices(words)
+    except ValueError as problem:
+        raise BackendError(f"A choice of models {problem}") from None
+    return encoders_of(profile(name).choosing(choices))
 
 
 def checksums(used: Encoders) -> dict[str, str]:
@@ -184,7 +198,7 @@ class SceneSettings:
         Raises:
             BackendError: there is no such profile or backend.
         """
-        return encoders_of(choose_models(self.profile, self.models))
+        return models_of(self.profile, self.models)
 
     def checked(self) -> dict[str, str]:
         """Check everything that is given before anything is recorded; return the models' checksums by module.

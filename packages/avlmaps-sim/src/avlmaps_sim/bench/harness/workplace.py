@@ -19,14 +19,14 @@ from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.maps.grid import GridSpec, index_ends
-from avlmaps.perception.encoders import Encoders, choose_models, encoders_of
+from avlmaps.perception.encoders import Encoders
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.modalities.image import read_picture
 from avlmaps.query.settings import Rules, build_settings, query_settings
 from avlmaps.recordings.types import Recording
 from avlmaps_sim.bench.harness.evidence import Event, Evidence, Photo
 from avlmaps_sim.bench.harness.own_recording import OwnRecording, is_recording
-from avlmaps_sim.bench.harness.settings import Recorded, SceneSettings, TaskError, unheard_folder
+from avlmaps_sim.bench.harness.settings import Recorded, SceneSettings, TaskError, models_of, unheard_folder
 from avlmaps_sim.free_space import STRUCTURE
 from avlmaps_sim.hearing.sound_library import kind_of
 from avlmaps_sim.mesh import Triple
@@ -136,7 +136,7 @@ class SceneJob:
     @property
     def used(self) -> Encoders:
         """The encoders of the profile, with the models that were chosen."""
-        return encoders_of(choose_models(self.profile, self.models))
+        return models_of(self.profile, self.models)
 
     @property
     def map_name(self) -> str:
