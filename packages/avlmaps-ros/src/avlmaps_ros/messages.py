@@ -195,7 +195,6 @@ class CancelAnswer(msgspec.Struct):
     """The answer of action_msgs/CancelGoal."""
 
     return_code: int = 0
-    goals_canceling: list[_GoalInfo] = msgspec.field(default_factory=list)
 
 
 class ActionEnd(msgspec.Struct):

@@ -62,13 +62,6 @@ class GroundTransform:
         return self.x_m + c * x_m - s * y_m, self.y_m + s * x_m + c * y_m
 
     @classmethod
-    def between(cls, in_a: GroundPose, in_b: GroundPose) -> "GroundTransform":
-        """Return ``b_from_a`` from one pose that is known in both frames: a robot that stands at a marked place."""
-        turned = cls(0.0, 0.0, in_b.heading_rad - in_a.heading_rad)
-        x_m, y_m = turned._moved(in_a.x_m, in_a.y_m)
-        return cls(in_b.x_m - x_m, in_b.y_m - y_m, turned.yaw_rad)
-
-    @classmethod
     def fit(cls, in_a: Float[np.ndarray, "n 2"], in_b: Float[np.ndarray, "n 2"]) -> tuple["GroundTransform", float]:
         """Return the ``b_from_a`` that brings places known in both frames together best, by least squares.
 
