@@ -1,3 +1,4 @@
+import csv
 import hashlib
 from itertools import pairwise
 from pathlib import Path
@@ -11,7 +12,7 @@ from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.open import open_recording
-from avlmaps_sim.mixing.add_sounds import add_sounds, read_events
+from avlmaps_sim.mixing.add_sounds import add_sounds
 from avlmaps_sim.mixing.clips import audible, find_clips, loudness_db
 from avlmaps_sim.mixing.spacing import Placer, Spacing, Walk, capacity, chosen_spacing
 
@@ -62,7 +63,9 @@ def test_the_track_holds_what_the_events_say(tmp_path: Path, clips: Path) -> Non
     recording = open_recording(tmp_path / "out")
     assert recording.audio is not None
     assert recording.audio.duration_s == pytest.approx(40.0, abs=0.01)
-    assert read_events(tmp_path / "out" / "events.csv") == events
+    with (tmp_path / "out" / "events.csv").open(newline="", encoding="utf-8") as stream:
+        rows = [(float(row["onset_s"]), float(row["offset_s"]), row["category"]) for row in csv.DictReader(stream)]
+    assert rows == [(event.onset_s, event.offset_s, event.category) for event in events]
     silence = recording.audio.read()
     for event in events:
         sound = recording.audio.read(event.onset_s, event.offset_s)

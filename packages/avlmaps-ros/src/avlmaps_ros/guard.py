@@ -95,11 +95,7 @@ class GoalGuard:
         return self._process.poll() is None
 
     def require_ready(self) -> None:
-        """Wait until the guard is ready.
-
-        Raises:
-            NavigationError: it is not.
-        """
+        """Wait until the guard is ready. ``NavigationError``: it is not."""
         assert self._process.stdout is not None
         if not (select.select([self._process.stdout], [], [], _READY_WITHIN_S)[0] and self._process.stdout.read(1)):
             self.close()

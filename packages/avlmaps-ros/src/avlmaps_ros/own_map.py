@@ -59,11 +59,7 @@ class _Grid(msgspec.Struct):
 
 
 def grid_in(message: msgspec.Raw) -> OwnGrid:
-    """Read a grid as rosbridge writes it.
-
-    Raises:
-        ValueError: it is none.
-    """
+    """Read a grid as rosbridge writes it. ``ValueError``: it is none."""
     read = msgspec.json.decode(message, type=_Grid)
     origin = read.info.origin
     return checked_grid(

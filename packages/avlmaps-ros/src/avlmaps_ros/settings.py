@@ -157,11 +157,7 @@ class RosRobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
 
     @classmethod
     def read(cls, path: Path | str) -> "RosRobotFile":
-        """Read a robot's file.
-
-        Raises:
-            NavigationError: it cannot be read, or is no such file.
-        """
+        """Read a robot's file. ``NavigationError``: it cannot be read, or is no such file."""
         try:
             with user_path(path).open("rb") as stream:
                 content = stream.read(_MOST_BYTES)

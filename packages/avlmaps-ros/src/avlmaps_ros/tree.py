@@ -89,11 +89,7 @@ class LiveTree:
         self.refused = self.overtaken = 0
 
     def hear(self, message: msgspec.Raw, static: bool) -> None:
-        """Take in one message.
-
-        Raises:
-            ValueError: it is none.
-        """
+        """Take in one message. ``ValueError``: it is none."""
         transforms, refused = transforms_in(message)
         self.refused += refused
         self.take(transforms, static)

@@ -287,11 +287,7 @@ class SimulatedBody:
         return self.building.around(place, self.radius_m).fits(place)
 
     def place_at(self, pose: GroundPose) -> None:
-        """Put it somewhere else.
-
-        Raises:
-            NavigationError: the place is not free, or there is no floor.
-        """
+        """Put it somewhere else. ``NavigationError``: the place is not free, or there is no floor."""
         if not self.fits(np.array([pose.x_m, pose.y_m])):
             clear_m = self.building.clearance_m(pose.x_m, pose.y_m)
             why = (

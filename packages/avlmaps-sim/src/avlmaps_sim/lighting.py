@@ -289,10 +289,7 @@ def _around(
 
 
 def light_map(scene: Scene, albedo: Float[np.ndarray, "m 3"]) -> LightMap:
-    """Work out the light in a scene.
-
-    ``albedo`` is the mean linear colour of each material.
-    """
+    """Work out the light in a scene. ``albedo`` is the mean linear colour of each material."""
     mesh = scene.mesh
     lights = _merged(scene.lights or default_lights(scene))
     smooth, first, incident = _smooth_corners(mesh)

@@ -14,7 +14,7 @@ from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
 from avlmaps_sim.bench.harness.evidence import MARGIN_M, NEAR_M, Box, Event, Evidence, Photo, alone_near
-from avlmaps_sim.bench.harness.factors import WeakSounds, near_polygon, true_regions
+from avlmaps_sim.bench.harness.factors import WeakSounds, true_regions
 from avlmaps_sim.bench.harness.settings import TaskError
 from avlmaps_sim.bench.harness.workplace import TrueVoxels
 from avlmaps_sim.bench.indexing.runs import (
@@ -259,14 +259,6 @@ def test_every_voxel_of_a_thing_is_labelled_with_it(kitchen_and_bedroom: _Perfec
         assert (own < np.array(thing.high) + 0.05).all()
         area_m2 = 2 * sum(thing.size[a] * thing.size[b] for a, b in ((0, 1), (1, 2), (0, 2)))
         assert len(own) * 0.05**2 > 0.7 * area_m2
-
-
-@given(st.floats(-3, 8), st.floats(-3, 8))
-def test_a_room_reaches_into_its_walls_by_the_margin_and_no_farther(x: float, y: float):
-    area = Area("kitchen", rectangle(0, 0, 5, 5))
-    away = np.hypot(max(-x, x - 5, 0), max(-y, y - 5, 0))
-    if abs(away - 0.1) > 1e-6:
-        assert bool(near_polygon(area, np.array([[x, y]]), 0.1)[0]) == (away < 0.1)
 
 
 @pytest.mark.nightly

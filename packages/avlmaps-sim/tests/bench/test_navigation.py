@@ -12,7 +12,7 @@ from avlmaps.core.motion import Action, GroundPose, Moved
 from avlmaps.language.program import parse_program
 from avlmaps.language.translator import command_to_program
 from avlmaps.maps.obstacles import CellState, Obstacles
-from avlmaps_sim.bench.harness.evidence import Box, Event, Evidence, Photo
+from avlmaps_sim.bench.harness.evidence import Box, Event, Evidence, Photo, room_distance_m
 from avlmaps_sim.bench.harness.settings import Recorded
 from avlmaps_sim.bench.indexing.tasks import near_sound_tasks, photo_tasks
 from avlmaps_sim.bench.navigation.commands import (
@@ -47,7 +47,6 @@ from avlmaps_sim.bench.navigation.missions import (
     between,
     joined,
     left_of,
-    room_distance_m,
 )
 from avlmaps_sim.bench.navigation.runs import Outcome, SceneFacts
 from avlmaps_sim.bench.navigation.suite import TITLE, tables

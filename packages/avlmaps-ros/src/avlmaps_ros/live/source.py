@@ -39,11 +39,7 @@ class Inbox(Protocol):
 
 
 def ros_topics(named: Mapping[str, str]) -> RosTopics:
-    """Return topics by what they are for.
-
-    Raises:
-        RecordingError: one is for nothing that is known.
-    """
+    """Return topics by what they are for. ``RecordingError``: one is for nothing that is known."""
     known = [one.name for one in fields(RosTopics)]
     for name in named:
         if name not in known:
@@ -52,11 +48,7 @@ def ros_topics(named: Mapping[str, str]) -> RosTopics:
 
 
 def open_ros2(topics: RosTopics) -> Inbox:
-    """Join ROS 2.
-
-    Raises:
-        BackendError: this Python has no rclpy, or a message package is missing.
-    """
+    """Join ROS 2. ``BackendError``: this Python has no rclpy, or a message package is missing."""
     try:
         from avlmaps_ros.live.inbox import Ros2Inbox
     except ImportError as fault:

@@ -316,11 +316,7 @@ def sealed() -> dict[str, Any]:
 
 
 def shipped(name: str) -> list[Row]:
-    """Return the rows of a shipped list.
-
-    Raises:
-        ValueError: the file is not the one that was sealed.
-    """
+    """Return the rows of a shipped list. ``ValueError``: the file is not the one that was sealed."""
     content = files("avlmaps_sim.bench").joinpath(f"data/language/{name}.jsonl").read_bytes()
     if hashlib.sha256(content).hexdigest() != sealed()[name]["sha256"]:
         raise ValueError(f"the list {name} is not the one that was sealed")

@@ -18,31 +18,16 @@ from avlmaps.recordings.types import Recording, Subset
 from avlmaps_sim.bench.harness.figures import in_percent, wilson
 
 COLUMNS = (
-    "map",
-    "keyframes",
-    "photos",
-    "of the place",
-    "located %",
-    "95 %",
-    "median error cm",
-    "degrees",
-    "95th percentile cm",
-    "degrees",
-    "within 5 cm and 5° %",
-    "95 %",
-    "ms a photo: median",
-    "95th percentile",
-)
+    "map", "keyframes", "photos", "of the place", "located %", "95 %", "median error cm", "degrees",
+    "95th percentile cm", "degrees", "within 5 cm and 5° %", "95 %", "ms a photo: median", "95th percentile",
+)  # fmt: skip
 NEAR_CM, NEAR_DEG = 5.0, 5.0
 _LOCATING, _KEYFRAMES = LocateSettings(), KeyframeSettings()
 
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Results of some photos.
-
-    Distances to the true place and angles are infinite where a photo was not located.
-    """
+    """Results of some photos. Distances to the true place and angles are infinite where a photo was not located."""
 
     cm: Float[np.ndarray, " n"]
     deg: Float[np.ndarray, " n"]

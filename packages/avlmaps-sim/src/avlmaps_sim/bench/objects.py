@@ -52,10 +52,7 @@ _MOSTLY, _A_QUARTER = 0.5, 0.25
 
 @dataclass(frozen=True, slots=True)
 class Instances:
-    """The map's answer for one category.
-
-    Most of the voxels of a true one lie in boxes of true things.
-    """
+    """The map's answer for one category. Most of the voxels of a true one lie in boxes of true things."""
 
     category: str
     confidence: Float[np.ndarray, " i"]

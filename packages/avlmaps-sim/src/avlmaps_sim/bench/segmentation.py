@@ -23,22 +23,10 @@ from avlmaps_sim.mixing.background import background
 from avlmaps_sim.mixing.clips import Clip, amplify, audible_part, find_clips, gain_for, index_rows
 
 COLUMNS = (
-    "clips",
-    "background",
-    "SNR dB",
-    "sounds",
-    "found %",
-    "95 %",
-    "false alarms a minute",
-    "95 %",
-    "pieces a sound",
-    "onset error ms: median",
-    "95th percentile",
-    "offset error ms: median",
-    "95th percentile",
-    "both within 100 ms %",
+    "clips", "background", "SNR dB", "sounds", "found %", "95 %", "false alarms a minute", "95 %", "pieces a sound",
+    "onset error ms: median", "95th percentile", "offset error ms: median", "95th percentile", "both within 100 ms %",
     "minutes",
-)
+)  # fmt: skip
 _RATE_HZ = 44_100
 _LOUDNESS_DB = -40.0  # so low that no clip has a peak that would have to be cut
 _PAUSES_S = (1.5, 5.0)

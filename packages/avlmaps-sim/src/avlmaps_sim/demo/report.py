@@ -38,10 +38,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One question of the demonstration and what became of it.
-
-    ``answer`` is what `avlmaps query --json` prints.
-    """
+    """One question of the demonstration and what became of it. ``answer`` is what `avlmaps query --json` prints."""
 
     ask: Ask
     answer: QueryAnswer

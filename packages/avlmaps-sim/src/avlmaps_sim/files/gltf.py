@@ -107,11 +107,7 @@ def read_parts(path: Path) -> list[MeshPart]:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object.
-
-    Raises:
-        SceneError: it is missing or no JSON object.
-    """
+    """Read a JSON object. ``SceneError``: it is missing or no JSON object."""
     try:
         content = json.loads(path.read_text("utf-8"))
     except OSError as error:
@@ -124,11 +120,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def header_of(path: Path) -> dict[str, Any]:
-    """Return the JSON part of a ``.glb`` or ``.gltf`` file.
-
-    Raises:
-        SceneError: it is missing, truncated or no glTF 2.
-    """
+    """Return the JSON part of a ``.glb`` or ``.gltf`` file. ``SceneError``: it is missing, truncated or no glTF 2."""
     header = read_json(path) if path.suffix.lower() == ".gltf" else _glb_header(path)
     version = str(header.get("asset", {}).get("version", ""))
     if not version.startswith("2"):

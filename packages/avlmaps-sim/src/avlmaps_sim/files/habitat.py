@@ -55,11 +55,7 @@ class _DataSet:
     meshes: dict[Path, Mesh] = field(default_factory=dict)
 
     def template(self, name: str, ending: str) -> _Template:
-        """Find a template by its name, which may begin with folders.
-
-        Raises:
-            SceneError: there is none.
-        """
+        """Find a template by its name, which may begin with folders. ``SceneError``: there is none."""
         short = Path(name).name.removesuffix(_MODEL).removesuffix(ending)
         for key in (short + ending, short + _MODEL):
             found = self.files.get(key)

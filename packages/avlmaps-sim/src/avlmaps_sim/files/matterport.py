@@ -84,11 +84,7 @@ def house_of(path: Path) -> Path | None:
 
 
 def read_house(path: Path) -> House:
-    """Read a ``.house`` file.
-
-    Raises:
-        SceneError: it is missing, of another version or has a line that is too short.
-    """
+    """Read a ``.house`` file. ``SceneError``: it is missing, of another version or has a line that is too short."""
     try:
         lines = path.read_text("utf-8", errors="replace").splitlines()
     except OSError as error:

@@ -49,11 +49,7 @@ class _Element:
 
 
 def read_ply(path: Path) -> PlyMesh:
-    """Read a PLY file.
-
-    Raises:
-        SceneError: it is missing, truncated or no PLY of triangles or polygons.
-    """
+    """Read a PLY file. ``SceneError``: it is missing, truncated or no PLY of triangles or polygons."""
     try:
         content = path.read_bytes()
     except OSError as error:

@@ -305,10 +305,7 @@ def ornament(rng: np.random.Generator, x: float, y: float, z: float, tall: float
 
 
 def shelf_things(rng: np.random.Generator, room: Room, looks: list[Material], full: float) -> list[Mesh]:
-    """Return the contents of one bay of a shelf: books, things or nothing.
-
-    About a share ``full`` of it is taken.
-    """
+    """Return the contents of one bay of a shelf: books, things or nothing. About a share ``full`` of it is taken."""
     (a, b, c), (d, e, f) = room.low, room.high
     if not chance(rng, min(1.0, full * 1.5)) or f - c < 0.08:
         return []

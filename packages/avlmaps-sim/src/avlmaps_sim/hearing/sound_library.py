@@ -136,11 +136,7 @@ class Recorded:
         return tuple(sorted(self._clips))
 
     def draw(self, category: str, rng: np.random.Generator) -> tuple[str, Sound]:
-        """Return any clip of the category that can be read.
-
-        Raises:
-            AudioError: none can.
-        """
+        """Return any clip of the category that can be read. ``AudioError``: none can."""
         own = self._clips[category]
         problem: AudioError | None = None
         for index in rng.permutation(len(own)):

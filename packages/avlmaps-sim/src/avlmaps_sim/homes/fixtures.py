@@ -204,10 +204,7 @@ def mouth_of(plan: Storey) -> Wall:
 
 
 def build_stairs(rng: np.random.Generator, builder: SceneBuilder, ground: Storey, upper: Storey, area: int) -> None:
-    """Add stairs and railings to a scene.
-
-    ``area`` is the hall that they start from.
-    """
+    """Add stairs and railings to a scene. ``area`` is the hall that they start from."""
     mouth = mouth_of(ground)
     rise = upper.rooms[0].floor_m - ground.rooms[0].floor_m
     ceiling = ground.rooms[0].height_m

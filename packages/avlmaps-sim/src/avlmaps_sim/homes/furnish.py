@@ -62,10 +62,7 @@ def hangs(piece: Piece) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedPiece:
-    """A piece that has its place.
-
-    ``number`` is that on the ground, -1 for what nothing can meet.
-    """
+    """A piece that has its place. ``number`` is that on the ground, -1 for what nothing can meet."""
 
     piece: Piece
     place: Place

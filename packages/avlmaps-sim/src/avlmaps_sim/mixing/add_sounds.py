@@ -226,29 +226,6 @@ def add_sounds(
     return events
 
 
-def read_events(path: Path) -> list[Event]:
-    """Read an ``events.csv``.
-
-    Raises:
-        AudioError: there is none, or a line does not hold what the header says.
-    """
-    if not path.is_file():
-        raise AudioError(f"There is no {path}; make one with avlmaps add-sounds.")
-    events: list[Event] = []
-    with path.open(newline="", encoding="utf-8") as stream:
-        rows = csv.reader(stream)
-        if tuple(next(rows, ()))[: len(EVENTS_HEADER)] != EVENTS_HEADER:  # a simulator knows more of each
-            raise AudioError(f"{path} does not begin with the line {','.join(EVENTS_HEADER)}; it lists no events.")
-        for number, row in enumerate(rows, start=2):
-            try:
-                onset, offset, category, clip, x, y, z, gain = row[: len(EVENTS_HEADER)]
-                place = (float(x), float(y), float(z))
-                events.append(Event(float(onset), float(offset), category, clip, place, float(gain)))
-            except ValueError:
-                raise AudioError(f"{path}, line {number} does not hold {len(EVENTS_HEADER)} values; fix it.") from None
-    return events
-
-
 def _check(interval_s: float, min_distance_m: float, loudness_db: float, snr_db: float | None) -> None:
     for name, value in (("interval", interval_s), ("least distance", min_distance_m)):
         if not np.isfinite(value) or value < 0.0:

@@ -17,22 +17,9 @@ if TYPE_CHECKING:
     from avlmaps_sim.bench.sources.suite import SourcesBench
 
 Suite = Literal[
-    "words",
-    "language",
-    "sounds",
-    "segmentation",
-    "locate",
-    "frames",
-    "recordings",
-    "objects",
-    "indexing",
-    "found",
-    "rooms",
-    "change",
-    "live",
-    "sources",
-    "navigation",
-]
+    "words", "language", "sounds", "segmentation", "locate", "frames", "recordings", "objects", "indexing", "found",
+    "rooms", "change", "live", "sources", "navigation",
+]  # fmt: skip
 Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
 
 

@@ -23,10 +23,7 @@ _TRUE = {"added": "appeared", "removed": "gone", "moved": "moved"}
 
 @dataclass(frozen=True, slots=True)
 class Happened:
-    """One change, as it is said or as it is true.
-
-    ``before`` is None for what appeared, ``after`` for what is gone.
-    """
+    """One change, as it is said or as it is true. ``before`` is None for what appeared, ``after`` for what is gone."""
 
     kind: str
     name: str

@@ -155,10 +155,7 @@ class HomeResult:
 def run_change(
     settings: SceneSettings, days: int, out: Path, open_spec: Callable[[str], Scene] = open_scene
 ) -> dict[str, Any]:
-    """Record homes on several days, merge their maps, and write tables.
-
-    ``out/work`` stores recordings and maps.
-    """
+    """Record homes on several days, merge their maps, and write tables. ``out/work`` stores recordings and maps."""
     weights = settings.checked()
     todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
     work = partial(_home, days=days, open_spec=open_spec)

@@ -52,10 +52,7 @@ def labelled_queries(
     evidence: Evidence, tasks: Sequence[Task], names: Sequence[str], sounds: Sequence[str], rooms: Sequence[str],
     rng: np.random.Generator,
 ) -> list[LabelledQuery]:  # fmt: skip
-    """Return the queries of a scene.
-
-    Names, sounds and rooms are those that the map's encoders know.
-    """
+    """Return the queries of a scene. Names, sounds and rooms are those that the map's encoders know."""
     held = [thing.category for thing in evidence.objects]
     absent = [name for name in names if not _any_is(held, name) and name not in STRUCTURE]
     silent = [name for name in sounds if name not in {event.category for event in evidence.events}]
@@ -178,10 +175,7 @@ REACH_M = 0.5  # a goal within this of a right place is right
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """The answer to one query.
-
-    ``right`` and the probability are those of the first goal, 0 without one.
-    """
+    """The answer to one query. ``right`` and the probability are those of the first goal, 0 without one."""
 
     scene: str
     kind: str

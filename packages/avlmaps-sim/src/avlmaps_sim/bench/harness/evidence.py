@@ -87,10 +87,7 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Photo:
-    """A picture that a query may use.
-
-    ``share`` is for each thing of the scene the part of the pixels that shows it.
-    """
+    """A picture that a query may use. ``share`` is for each thing of the scene the part of the pixels that shows it."""
 
     world_from_camera: Float[np.ndarray, "4 4"]
     share: Float[np.ndarray, " objects"]
@@ -125,3 +122,19 @@ def shown_boxes(evidence: Evidence) -> dict[str, list[Box]]:
     return {
         name: [evidence.box(i) for i in own] for name, own in sorted(found.items()) if any(map(evidence.shows, own))
     }
+
+
+def room_distance_m(corners: Float[np.ndarray, "k 2"], xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+    """Return how far places are from a polygon; 0 inside."""
+    a, b = corners, np.roll(corners, -1, axis=0)
+    off = np.full(len(xy), np.inf)
+    inside = np.zeros(len(xy), bool)
+    for start, end in zip(a, b, strict=True):
+        along = end - start
+        share = np.clip((xy - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
+        off = np.minimum(off, np.linalg.norm(xy - start - share[:, None] * along, axis=1))
+        crosses = (start[1] > xy[:, 1]) != (end[1] > xy[:, 1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at_x = (end[0] - start[0]) * (xy[:, 1] - start[1]) / (end[1] - start[1]) + start[0]
+        inside ^= crosses & (xy[:, 0] < at_x)
+    return np.where(inside, 0.0, off)

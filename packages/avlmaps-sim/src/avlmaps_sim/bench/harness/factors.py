@@ -16,6 +16,7 @@ from avlmaps.query.modalities.sound import sound_factor
 from avlmaps.query.settings import SoundSettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import AudioTrack, Sound, resample
+from avlmaps_sim.bench.harness.evidence import room_distance_m
 from avlmaps_sim.hearing.sound_library import Synthesised
 from avlmaps_sim.scene import Area
 
@@ -95,23 +96,8 @@ def true_regions(space: Space, part: Part, areas: Sequence[Area]) -> VoxelHeat:
             continue
         z = space.centres[:, 2]
         within = (z > area.floor_m - _STOREY_M) & (z < area.ceiling_m + _STOREY_M)
-        inside |= within & near_polygon(area, space.centres[:, :2], _WALL_M)
+        inside |= within & (room_distance_m(area.polygon, space.centres[:, :2]) <= _WALL_M)
     return VoxelHeat(space, part, inside.astype(np.float32), bool(inside.any()), regional=True)
-
-
-def near_polygon(area: Area, xy: Float[np.ndarray, "n 2"], margin_m: float) -> Bool[np.ndarray, " n"]:
-    """Return which points lie inside a room, or no farther from its outline than the margin."""
-    return np.asarray(area.contains(xy)) | (outline_away_m(area, xy) <= margin_m)
-
-
-def outline_away_m(area: Area, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
-    """Return how far points are from a room's outline, metres."""
-    away_m = np.full(len(xy), np.inf)
-    for start, end in zip(area.polygon, np.roll(area.polygon, -1, axis=0), strict=True):
-        along = end - start
-        t = np.clip((xy - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
-        away_m = np.minimum(away_m, np.linalg.norm(xy - start - t[:, None] * along, axis=1))
-    return away_m
 
 
 _EXAMPLES = 4

@@ -225,11 +225,7 @@ def save_versioned(tasks: object, path: Path) -> None:
 
 
 def load_versioned(path: Path, kind: type[T], schema_version: int) -> T:
-    """Read what ``save_versioned`` wrote.
-
-    Raises:
-        TaskError: there is nothing, it is of another schema, or damaged.
-    """
+    """Read what ``save_versioned`` wrote. ``TaskError``: there is nothing, it is of another schema, or damaged."""
     try:
         content = path.read_bytes()
     except OSError as fault:

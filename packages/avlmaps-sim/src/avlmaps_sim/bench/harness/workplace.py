@@ -67,7 +67,7 @@ class TrueVoxels:
         voxel, instance = np.divmod(pair, len(weight))
         order = np.lexsort((-count * weight[instance], voxel))
         most = order[np.flatnonzero(np.diff(voxel[order], prepend=-1))]
-        return cls(_packed(np.stack(np.unravel_index(voxel[most], tuple(shape)), axis=1) + first), instance[most])
+        return cls(packed(np.stack(np.unravel_index(voxel[most], tuple(shape)), axis=1) + first), instance[most])
 
     def label(self, index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
         """Return the thing of each voxel of a map, -1 for none; a voxel beside a surface counts as on it."""
@@ -87,7 +87,7 @@ class TrueVoxels:
     def _at(self, index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
         if not len(self.key):
             return np.full(len(index), NOTHING)
-        key = _packed(index)
+        key = packed(index)
         row = np.minimum(np.searchsorted(self.key, key), len(self.key) - 1)
         return np.where(self.key[row] == key, self.instance[row], NOTHING)
 
@@ -96,7 +96,8 @@ _STEPS = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshap
 _NEIGHBOURS = _STEPS[np.argsort(np.abs(_STEPS).sum(axis=1), kind="stable")][1:]  # those that share a face first
 
 
-def _packed(index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
+def packed(index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
+    """Return each voxel's index as one number that rises with it."""
     shifted = np.asarray(index, np.int64) + _OFFSET
     return (shifted[:, 0] << 42) | (shifted[:, 1] << 21) | shifted[:, 2]
 

@@ -263,10 +263,7 @@ class SceneOutcome:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The outcome of all scenes.
-
-    ``weights`` are the checksums of the models, by module.
-    """
+    """The outcome of all scenes. ``weights`` are the checksums of the models, by module."""
 
     settings: IndexingSettings
     tasks: TaskSet

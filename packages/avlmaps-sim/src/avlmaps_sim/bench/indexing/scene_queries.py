@@ -38,6 +38,7 @@ from avlmaps_sim.bench.harness.factors import (
     true_regions,
     true_things,
 )
+from avlmaps_sim.bench.harness.workplace import packed
 from avlmaps_sim.bench.indexing.tasks import Task
 from avlmaps_sim.truth import Truth
 
@@ -131,7 +132,7 @@ def mixed(whole: Float32[np.ndarray, " d"], regions: Float32[np.ndarray, "r d"])
 def _spread(avlmap: AVLMap, recording: Recording, rows_of: _Rows) -> Float32[np.ndarray, "n d"]:
     """Add up rows over the voxels that their pixels lie in: each row counts once a voxel and keyframe."""
     stored = avlmap.data
-    key = _packed(np.asarray(stored.voxels.index, np.int64))
+    key = packed(np.asarray(stored.voxels.index, np.int64))
     total = np.zeros((len(key), stored.keyframes.view.shape[1]), np.float32)
     frame_of = np.searchsorted(recording.stamps_s, np.asarray(stored.keyframes.stamp_s) - 1e-6)
     for keyframe in progress(range(len(frame_of)), "views by voxel", unit="keyframe"):
@@ -144,7 +145,7 @@ def _spread(avlmap: AVLMap, recording: Recording, rows_of: _Rows) -> Float32[np.
         y = (row * _STRIDE_PX + 0.5 - camera.cy) / camera.fy * z
         points = apply(frame.world_from_camera, np.stack([x, y, z], axis=1))
         which = label[::_STRIDE_PX, ::_STRIDE_PX][row, column]
-        seen, numbers = _once_each(_packed(stored.grid.index_of(points)), which)
+        seen, numbers = _once_each(packed(stored.grid.index_of(points)), which)
         at = np.minimum(np.searchsorted(key, seen), max(len(key) - 1, 0))
         known = key[at] == seen
         np.add.at(total, at[known], rows[numbers[known]])
@@ -156,11 +157,6 @@ def _once_each(
 ) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
     pairs = np.unique(np.stack([key, which], axis=1), axis=0)
     return pairs[:, 0], pairs[:, 1]
-
-
-def _packed(index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
-    shifted = np.asarray(index, np.int64) + (1 << 20)
-    return (shifted[:, 0] << 42) | (shifted[:, 1] << 21) | shifted[:, 2]
 
 
 @dataclass(eq=False)

@@ -114,11 +114,7 @@ def save_tasks(tasks: TaskSet, path: Path) -> None:
 
 
 def load_tasks(path: Path) -> TaskSet:
-    """Read tasks that ``save_tasks`` wrote.
-
-    Raises:
-        TaskError: there are none, they are of another schema, or damaged.
-    """
+    """Read tasks that ``save_tasks`` wrote. ``TaskError``: there are none, they are of another schema, or damaged."""
     return load_versioned(path, TaskSet, SCHEMA_VERSION)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose, wrap_angle
-from avlmaps_sim.bench.harness.evidence import Box
+from avlmaps_sim.bench.harness.evidence import Box, room_distance_m
 from avlmaps_sim.bench.harness.settings import Recorded, SceneSettings, TaskError, load_versioned, save_versioned
 from avlmaps_sim.mesh import Triple
 
@@ -106,22 +106,6 @@ def _off_box_rad(box: Box, pose: GroundPose) -> float:
     if max(angles) - min(angles) > pi:  # seen over the shoulder: the span goes the other way round
         return min(abs(angle) for angle in angles)
     return max(0.0, min(angles), -max(angles))
-
-
-def room_distance_m(corners: Float[np.ndarray, "k 2"], xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
-    """Return how far places are from a polygon; 0 inside."""
-    a, b = corners, np.roll(corners, -1, axis=0)
-    off = np.full(len(xy), np.inf)
-    inside = np.zeros(len(xy), bool)
-    for start, end in zip(a, b, strict=True):
-        along = end - start
-        share = np.clip((xy - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
-        off = np.minimum(off, np.linalg.norm(xy - start - share[:, None] * along, axis=1))
-        crosses = (start[1] > xy[:, 1]) != (end[1] > xy[:, 1])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            at_x = (end[0] - start[0]) * (xy[:, 1] - start[1]) / (end[1] - start[1]) + start[0]
-        inside ^= crosses & (xy[:, 0] < at_x)
-    return np.where(inside, 0.0, off)
 
 
 # The true spots that relations mean, from boxes. The robot works them out from what its map shows.

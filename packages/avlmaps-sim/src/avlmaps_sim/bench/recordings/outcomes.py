@@ -160,10 +160,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One recording and its outcome.
-
-    The situation is empty for a right recording.
-    """
+    """One recording and its outcome. The situation is empty for a right recording."""
 
     source: str
     situation: str

@@ -170,10 +170,7 @@ class Matched:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """The rooms of a scene.
-
-    ``listed`` does not count those of true rooms that the map does not show.
-    """
+    """The rooms of a scene. ``listed`` does not count those of true rooms that the map does not show."""
 
     scene: str
     rooms: tuple[Matched, ...]

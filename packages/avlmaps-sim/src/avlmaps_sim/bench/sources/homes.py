@@ -33,7 +33,7 @@ from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import ChannelSound, read_channels, with_microphones, write_channels
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
-from avlmaps_sim.bench.harness.factors import outline_away_m
+from avlmaps_sim.bench.harness.evidence import room_distance_m
 from avlmaps_sim.bench.sources.calibrated import Wrong, calibrated
 from avlmaps_sim.hearing.acoustic import AcousticSettings
 from avlmaps_sim.hearing.directions import said_directions
@@ -81,10 +81,7 @@ _CODE = code_of()  # of the code as it was loaded
 
 @dataclass(frozen=True, slots=True)
 class HomeJob:
-    """One home to measure.
-
-    Sounds are made by rule where there is no folder of clips.
-    """
+    """One home to measure. Sounds are made by rule where there is no folder of clips."""
 
     spec: str
     work: Path
@@ -335,7 +332,7 @@ def area_of(areas: Sequence[Area], at: Sequence[float] | Float[np.ndarray, " k"]
     inside = [number for number, area in enumerate(areas) if bool(area.contains(xy))]
     if inside or not areas:
         return inside[0] if inside else -1
-    away = [float(outline_away_m(area, xy[None])[0]) for area in areas]
+    away = [float(room_distance_m(area.polygon, xy[None])[0]) for area in areas]
     return int(np.argmin(away)) if min(away) < 0.6 else -1
 
 

@@ -183,11 +183,7 @@ class SourcesBench:
 
 
 def run_sources(settings: SourcesBench, out: Path, seed: int) -> dict[str, Table]:
-    """Measure, and return the tables.
-
-    Raises:
-        AvlmapsError: the measured room is not there.
-    """
+    """Measure, and return the tables. ``AvlmapsError``: the measured room is not there."""
     room = None if settings.rooms is None else measured_room(settings.rooms, seed)
     todo = [HomeJob(spec, out / "work", seed, settings.sounds) for spec in settings.homes]
     each = side_by_side(
