@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from avlmaps.recordings.types import Recording
     from avlmaps_sim.demo.evidence import Evidence
     from avlmaps_sim.demo.questions import PhotoView
-    from avlmaps_sim.demo.report import DemoReport, Step
     from avlmaps_sim.scene import Scene
 
 

@@ -177,7 +177,6 @@ def run_demo(
     from avlmaps_sim.demo.drive import drive
     from avlmaps_sim.demo.evidence import Evidence
     from avlmaps_sim.demo.report import write_report
-    from avlmaps_sim.demo.run import choose_home
 
     _make_room(out)
     settings = settings or DemoSettings()
@@ -238,7 +237,6 @@ def _rooms(scene: "Scene") -> str:
 
 def record_settings(scene: "Scene", settings: DemoSettings) -> "RecordSettings":
     """Return how a home is recorded: a Kinect's faults, and sounds that reach the microphone through the rooms."""
-    from avlmaps_sim.demo.run import sounds_of
     from avlmaps_sim.recorder import RecordSettings
 
     return RecordSettings(
@@ -267,7 +265,6 @@ def _choose(
     import cv2
 
     from avlmaps_sim.demo.questions import choose_questions
-    from avlmaps_sim.demo.run import photo_views
     from avlmaps_sim.render import Renderer
 
     renderer, camera = Renderer(scene), recording.rig.rgb

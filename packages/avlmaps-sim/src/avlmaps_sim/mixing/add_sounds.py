@@ -361,7 +361,6 @@ def _there(track: AudioTrack | None, rate_hz: int) -> Iterator[Float32[np.ndarra
 
 
 def _write(recording: Recording, out: Path, seconds: Iterable[Sound], events: Sequence[Event]) -> None:
-    from avlmaps_sim.mixing.add_sounds import write_recording
 
     with TemporaryDirectory() as scratch:
         track = Path(scratch) / "audio.flac"
