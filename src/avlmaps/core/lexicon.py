@@ -281,20 +281,14 @@ class Lexicon:
             plural=said.get("plural") or (name if kind is EntryKind.SOUND else plural_of(name)),
             synonyms=(*same, *_listed(said.get("also", ""))),
             learnt=learnt,
-            wider=_listed(said.get("wider", "")),
             compounds=special,
             mount=said.get("mount", "floor"),
             size_m=_size(said["size"]) if "size" in said else None,
-            soft=said.get("soft", False),
             sounds=self._sounds_of.get(name, ()) if kind is EntryKind.THING else (),
-            makers=_listed(said.get("makers", "")),
-            rooms=_listed(said.get("rooms", "")),
-            like=_listed(said.get("like", "")),
-            generic=said.get("generic", False),
-            wet=said.get("wet", False),
-            tiled=said.get("tiled", False),
             spoken=said.get("spoken", ""),
             split="training" if said.get("trained", False) else "held out",
+            **{field: _listed(said.get(field, "")) for field in ("wider", "makers", "rooms", "like")},
+            **{field: said.get(field, False) for field in ("soft", "generic", "wet", "tiled")},
         )
 
     @cached_property

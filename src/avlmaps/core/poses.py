@@ -120,23 +120,14 @@ def from_quaternion(
     if np.any(norm == 0.0):
         raise ValueError("a quaternion has norm 0")
     unit = quaternion_xyzw / norm
-    x, y, z, w = unit[..., 0], unit[..., 1], unit[..., 2], unit[..., 3]
+    x, y, z, w = np.moveaxis(unit, -1, 0)
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+    )
     pose = np.zeros((*translation.shape[:-1], 4, 4))
-    pose[..., 0, 0], pose[..., 0, 1], pose[..., 0, 2] = (
-        1 - 2 * (y * y + z * z),
-        2 * (x * y - z * w),
-        2 * (x * z + y * w),
-    )
-    pose[..., 1, 0], pose[..., 1, 1], pose[..., 1, 2] = (
-        2 * (x * y + z * w),
-        1 - 2 * (x * x + z * z),
-        2 * (y * z - x * w),
-    )
-    pose[..., 2, 0], pose[..., 2, 1], pose[..., 2, 2] = (
-        2 * (x * z - y * w),
-        2 * (y * z + x * w),
-        1 - 2 * (x * x + y * y),
-    )
+    pose[..., :3, :3] = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
     pose[..., :3, 3] = translation
     pose[..., 3, 3] = 1.0
     return pose

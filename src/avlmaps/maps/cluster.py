@@ -234,9 +234,8 @@ class Models:
         """Return the encoders on a worker; it loads models as the build does from then on."""
         if self.settings != model_settings():
             use_models(self.settings)
-        return Encoders.of(
-            self.profile, Encoders.remembered(self.profile, self.names).sources, self.weight_variance_m2
-        )  # fmt: skip
+        sources = Encoders.remembered(self.profile, self.names).sources
+        return Encoders(self.profile, sources=sources, weight_variance_m2=self.weight_variance_m2)
 
 
 @dataclass(frozen=True, slots=True)

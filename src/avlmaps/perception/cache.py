@@ -170,7 +170,9 @@ def with_cache(used: Encoders, settings: CacheSettings) -> Encoders:
     for kind in kept | (slow & {Kind.PIXELS}):  # features of slow pixels are rounded as with the store
         encoder = cached(kind, used.load(kind), store if kind in kept else None, half=kind in slow)
         sources[kind] = replace(used.sources[kind], given=encoder)
-    return used if sources == used.sources else Encoders.of(used.name, sources, used.weight_variance_m2)
+    if sources == used.sources:
+        return used
+    return Encoders(used.name, sources=sources, weight_variance_m2=used.weight_variance_m2)
 
 
 def cache_note(used: Encoders, kind: Kind) -> str:

@@ -122,28 +122,19 @@ class Encoders:
         matcher: Matcher | object | None = None,
         about: str = "",
         weight_variance_m2: float = 0.6,
+        sources: Mapping[Kind, Source] | None = None,
     ) -> None:
         """Take objects, or names of the registry (``name``, ``name@model``); None and ``""`` perceive nothing.
+
+        With ``sources`` the modules come from these alone.
 
         Raises:
             BackendError: an object lacks a method of its protocol.
         """
         given = dict(zip(MODULES, (pixels, views, sounds, local, place, matcher), strict=True))
-        self._set(name, _sources(given), about, weight_variance_m2)
-
-    def _set(self, name: str, sources: Mapping[Kind, Source], about: str, weight_variance_m2: float) -> None:
-        values = {"name": name, "sources": sources, "about": about, "weight_variance_m2": weight_variance_m2}
-        for field, value in values.items():
+        values = {"name": name, "about": about, "weight_variance_m2": weight_variance_m2}
+        for field, value in (values | {"sources": _sources(given) if sources is None else dict(sources)}).items():
             object.__setattr__(self, field, value)
-
-    @classmethod
-    def of(
-        cls, name: str, sources: Mapping[Kind, Source], weight_variance_m2: float = 0.6, about: str = ""
-    ) -> "Encoders":
-        """Return the encoders of these sources."""
-        made = cls.__new__(cls)
-        made._set(name, dict(sources), about, weight_variance_m2)
-        return made
 
     @classmethod
     def named(cls, profile: "str | Encoders", /, **instead: object) -> "Encoders":
@@ -161,7 +152,7 @@ class Encoders:
     @classmethod
     def remembered(cls, name: str, backends: Mapping[str, str]) -> "Encoders":
         """Return encoders by the names that a map has for them; none of them need be known before it is used."""
-        return cls.of(name, _sources({kind: backends.get(kind.value) for kind in MODULES}))
+        return cls(name, sources=_sources({kind: backends.get(kind.value) for kind in MODULES}))
 
     def having(self, **instead: object) -> "Encoders":
         """Return these encoders with others for some modules; see ``named``."""
@@ -170,7 +161,8 @@ class Encoders:
             raise BackendError(f"There is no module called {unknown[0]!r}; an encoder is one of {', '.join(modules)}.")
         others = _sources({modules[word]: one for word, one in instead.items()})
         kept = {kind: source for kind, source in self.sources.items() if kind.value not in instead}
-        return Encoders.of(self.name, _known({**kept, **others}), self.weight_variance_m2, self.about)
+        known = _known({**kept, **others})
+        return Encoders(self.name, sources=known, weight_variance_m2=self.weight_variance_m2, about=self.about)
 
     def choosing(self, choices: Mapping[Kind, str]) -> "Encoders":
         """Return these encoders with other backends or models (``name``, ``name@model``) for some modules.
@@ -191,7 +183,8 @@ class Encoders:
 
     def over(self, others: "Encoders") -> "Encoders":
         """Return these encoders, and others for the modules that they leave out."""
-        return Encoders.of(others.name, {**others.sources, **self.sources}, self.weight_variance_m2)
+        sources = {**others.sources, **self.sources}
+        return Encoders(others.name, sources=sources, weight_variance_m2=self.weight_variance_m2)
 
     def __contains__(self, kind: object) -> bool:
         return kind in self.sources

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,18 +66,9 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
     Raises:
         BenchError: the folder or recording that the suite needs was not given, or the profile cannot be measured.
     """
-    if suite == "indexing":
-        from avlmaps_sim.bench.indexing.suite import run_indexing
-
-        return run_indexing(inputs.indexing, out)
-    if suite == "found":
-        from avlmaps_sim.bench.found.suite import run_found
-
-        return run_found(inputs.indexing, out)
-    if suite == "rooms":
-        from avlmaps_sim.bench.rooms.suite import run_rooms
-
-        return run_rooms(inputs.indexing, out)
+    if suite in _ON_SCENES:
+        module, _, function = _ON_SCENES[suite].partition(":")
+        return getattr(import_module(module), function)(inputs.indexing, out)
     if suite == "change":
         from avlmaps_sim.bench.change.suite import DEFAULTS, run_change
 
@@ -87,10 +79,6 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
         return run_navigation(inputs.navigation, out)
     used = models_of(inputs.profile, inputs.models)
     weights = _weights(suite, used)
-    if suite == "objects":
-        from avlmaps_sim.bench.objects import run_objects
-
-        return run_objects(inputs.indexing, out)
     if suite == "recordings":
         from avlmaps_sim.bench.recordings.suite import run
 
@@ -126,10 +114,15 @@ def _written(
         "weights": weights,
         "tables": tables,
     }
-    written = write_answer(answer, out, f"{in_words(answer)}\n\n{markdown(tables)}")
-    return written
+    return write_answer(answer, out, f"{in_words(answer)}\n\n{markdown(tables)}")
 
 
+_ON_SCENES = {
+    "indexing": "avlmaps_sim.bench.indexing.suite:run_indexing",
+    "found": "avlmaps_sim.bench.found.suite:run_found",
+    "rooms": "avlmaps_sim.bench.rooms.suite:run_rooms",
+    "objects": "avlmaps_sim.bench.objects:run_objects",
+}
 # The modules that each suite measures; a model that is missing is named before anything else happens.
 _MEASURED = {
     "sounds": (Kind.SOUNDS,),
