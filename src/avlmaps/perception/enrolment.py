@@ -82,14 +82,14 @@ def teach_sound(
         raise BackendError(f"The name has {len(name)} characters; choose one of at most {LONGEST_NAME}.")
     if not clips:
         raise AudioError(f"No clips were given to learn {name!r} from; give at least one sound file.")
-    encoder = load(Kind.SOUNDS, "embedded") if encoder is None else encoder
+    used: SoundEncoder = load(Kind.SOUNDS, "embedded") if encoder is None else encoder
     sounds = [_audible(clip) for clip in clips]
     taught = TaughtSound(
         name=name,
-        features=np.concatenate([encoder.encode(sound) for _, sound in sounds]).astype(np.float32),
+        features=np.concatenate([used.encode(sound) for _, sound in sounds]).astype(np.float32),
         clips=tuple(label for label, _ in sounds),
-        model=encoder.card.id,
-        checksum=encoder.card.checksum,
+        model=used.card.id,
+        checksum=used.card.checksum,
     )
     _keep(taught, sounds_folder(folder))
     return taught
