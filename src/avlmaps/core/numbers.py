@@ -12,15 +12,6 @@ import numpy as np
 
 P = ParamSpec("P")
 T = TypeVar("T")
-_OF: dict[Any, str] = {float: "a number", float | None: "a number", int: "a whole number", int | None: "a whole number"}
-_WORDS: tuple[Any, ...] = (Sequence[str], Sequence[str] | None, tuple[str, ...], tuple[str, ...] | None)
-_NULLABLE = (str | None, float | None, int | None, *_WORDS[1::2])
-_WANTED: dict[Any, str] = _OF | {
-    str: "text",
-    str | None: "text",
-    bool: "True or False",
-    **dict.fromkeys(_WORDS, "a list of words"),
-}
 
 
 def as_number(given: Any) -> float | None:
@@ -59,19 +50,36 @@ def as_words(given: Any) -> tuple[str, ...] | None:
     return words if all(isinstance(word, str) for word in words) else None
 
 
-def _as_kind(given: Any, kind: Any) -> Any:
-    if kind in _OF:
-        return as_number(given) if kind in (float, float | None) else as_whole(given)
-    if kind in _WORDS:
-        return as_words(given)
-    if kind is bool:
-        return bool(given) if type(given) in (bool, np.bool_) else None
+def _as_flag(given: Any) -> bool | None:
+    return bool(given) if type(given) in (bool, np.bool_) else None
+
+
+def _as_text(given: Any) -> str | None:
     return given if isinstance(given, str) else None
 
 
-def _came(given: Any) -> str:
-    said = repr(given)
-    return said if len(said) <= 60 and said.isprintable() else type(given).__name__
+# By what a parameter or a field is declared as: what it must be, and how that is read.
+_NUMBERS: dict[Any, tuple[str, Callable[[Any], Any]]] = {
+    float: ("a number", as_number),
+    int: ("a whole number", as_whole),
+    Sequence[str]: ("a list of words", as_words),
+    tuple[str, ...]: ("a list of words", as_words),
+}
+_NULLABLE: dict[Any, tuple[str, Callable[[Any], Any]]] = {kind | None: row for kind, row in _NUMBERS.items()}
+_NULLABLE[str | None] = ("text", _as_text)
+_KINDS = _NUMBERS | _NULLABLE | {str: _NULLABLE[str | None], bool: ("True or False", _as_flag)}
+
+
+def _held(given: Any, kind: Any, name: str, error: type[Exception]) -> Any:
+    wanted, read = _KINDS[kind]
+    if given is None and kind in _NULLABLE:
+        return None
+    if (held := read(given)) is None:
+        said = repr(given)
+        raise error(
+            f"{name} must be {wanted}, not {said if len(said) <= 60 and said.isprintable() else type(given).__name__}."
+        )
+    return held
 
 
 def checked(error: type[Exception]) -> Callable[[Callable[P, T]], Callable[P, T]]:
@@ -79,19 +87,14 @@ def checked(error: type[Exception]) -> Callable[[Callable[P, T]], Callable[P, T]
 
     def of(function: Callable[P, T]) -> Callable[P, T]:
         signature = inspect.signature(function)
-        kinds = {one.name: one.annotation for one in signature.parameters.values() if one.annotation in _WANTED}
+        kinds = {one.name: one.annotation for one in signature.parameters.values() if one.annotation in _KINDS}
 
         @wraps(function)
         def called(*args: P.args, **named: P.kwargs) -> T:
             bound = signature.bind(*args, **named)
             for name, kind in kinds.items():
-                given = bound.arguments.get(name)
-                if name not in bound.arguments or (given is None and kind in _NULLABLE):
-                    continue
-                held = _as_kind(given, kind)
-                if held is None:
-                    raise error(f"{name} must be {_WANTED[kind]}, not {_came(given)}.")
-                bound.arguments[name] = held
+                if name in bound.arguments:
+                    bound.arguments[name] = _held(bound.arguments[name], kind, name, error)
             return function(*bound.args, **bound.kwargs)
 
         return called
@@ -116,12 +119,8 @@ def hold_numbers(
         given, name = getattr(settings, field.name), f"{field.name} of {type(settings).__name__}"
         if isinstance(kind, type) and is_dataclass(kind) and not isinstance(given, kind):
             raise error(f"{name} must be of {kind.__name__}, not {given!r}.")
-        if kind not in (bool, *_OF, *_WORDS) or (given is None and kind in _NULLABLE):
-            continue
-        held = _as_kind(given, kind)
-        if held is None:
-            raise error(f"{name} must be {_WANTED[kind]}, not {_came(given)}.")
-        object.__setattr__(settings, field.name, held)
+        if kind in _KINDS and kind not in (str, str | None):
+            object.__setattr__(settings, field.name, _held(given, kind, name, error))
     bounds = (positive, 5e-324, "a positive number"), (least_0, 0, "0 or more"), (least_1, 1, "1 or more")
     for names, least, wanted in bounds:
         for name in names.split():
