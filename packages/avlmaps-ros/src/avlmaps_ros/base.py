@@ -87,8 +87,6 @@ class RosDriver:
         self._mute: set[str] = set()
         self._contact = Contact(opener, self.frames, self.settings, clock)
 
-    # The Driver protocol.
-
     @property
     def pose(self) -> GroundPose:
         """Where the robot is, level frame; where it was last known to be, when its pose is not reported any more."""
@@ -191,8 +189,6 @@ class RosDriver:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    # One movement.
 
     @property
     def _unfinished(self) -> SentGoal | None:
@@ -402,8 +398,6 @@ class RosDriver:
             return float("inf")
         # A server that listed a goal regularly and does so no more has lost it, also where it runs.
         return now_s - (goal.heard_s if goal.shown >= _REGULAR else served[0])
-
-    # Calling off.
 
     def _give_up(self, goal: SentGoal, why: str, absent: bool) -> None:
         was_lost = self._contact.session.lost is not None

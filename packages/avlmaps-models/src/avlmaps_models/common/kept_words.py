@@ -18,11 +18,7 @@ _LIMIT_BYTES = 2e8
 
 
 class KeptWords:
-    """The features of words by one model.
-
-    Args:
-        card: of the model.
-    """
+    """The features of words by the model of a card."""
 
     def __init__(self, card: ModelCard) -> None:
         self._card = card
