@@ -106,12 +106,6 @@ def test_a_room_ends_at_its_wall_where_a_window_is_set_into_it(window: float, at
     assert 12.0 - 0.1 <= area_m2 <= 12.0 + 0.1 * 14.0 + 0.05, "up to the faces of its walls"
 
 
-def test_two_doors_side_by_side_are_no_open_plan() -> None:
-    drawn = Drawn(8.15, 4.0).room(0, 0, 4.0, 4.0).room(4.15, 0, 4.0, 4.0)
-    label = rooms_of_storey(drawn.room(3.95, 0.6, 0.3, 1.1).room(3.95, 1.9, 0.3, 1.1).grid()).label
-    assert drawn.at(label, 2.0, 2.0) != drawn.at(label, 6.0, 2.0)
-
-
 @given(st.floats(0.5, 0.8), st.floats(0.7, 0.95))
 def test_a_piece_of_wall_between_two_doors_is_no_screen_though_a_leaf_stands_at_it(post: float, leaf: float) -> None:
     drawn = Drawn(8.15, 4.0).room(0, 0, 4.0, 4.0).room(4.15, 0, 4.0, 4.0)
@@ -207,7 +201,7 @@ def test_a_room_has_a_distribution_of_names_and_a_dead_end_is_seldom_a_hallway(s
     regions = two_room_regions(0.0)
     kinds = ("hallway", "kitchen", "bedroom")
     share = np.random.default_rng(seed).dirichlet(np.full(3, 30.0), len(regions.plan)).astype(np.float32)
-    field = RoomField(regions.plan, kinds, share, np.ones(len(share), np.float32))
+    field = RoomField(regions.plan, kinds, share)
     named = field.whole_rooms(regions)
     assert named.shape == (2, 3)
     np.testing.assert_allclose(named.sum(axis=1), 1.0)

@@ -21,7 +21,7 @@ from avlmaps.query.voxel_space import connected
 
 WIDEST_M = 2.2
 """A wider opening joins two parts of one room: an open plan."""
-_WIDTHS_M = (0.8, 1.0, 1.15, 1.3, 1.6, 1.9, WIDEST_M)
+_WIDTHS_M = (1.15, WIDEST_M)  # doors are closed first, then what is wider
 _NARROWEST_M = 0.55
 _WIDEST_WINDOW_M, _DEEPEST_M, _CLOSED_SHARE = 3.0, 0.6, 0.2  # of an opening that ends behind the wall
 _LEAST_WALL_M = 0.3  # length of a wall that ends at a doorway
@@ -33,7 +33,6 @@ _LEAF_M, _LEAF_THICKNESS_M = 1.2, 0.1  # longest and thickest leaf of a door
 _SCREEN_M = 1.8  # longest thin piece that touches no wall
 _SHADOW_M, _SHADOW_M2 = 0.22, 2.0  # least width and largest area of what a thing hides
 _POST_M = 0.6
-_DOOR_M = 1.3  # width of a doorway beside another, with a piece of wall between
 
 NONE = -1
 """The region of a place in no room."""
@@ -64,9 +63,7 @@ def _without_leaves(wall: Cells, free: Cells, cell_m: float) -> Cells:
     piece = pieces(thin, diagonally=True)
     out = wall & ~((_lengths(piece) <= _LEAF_M / cell_m)[piece] & thin)
     piece = pieces(out, diagonally=True)
-    out &= ~((_lengths(piece) <= _SCREEN_M / cell_m) & ~of_pieces(piece, thick))[piece]
-    aside = wall & ~out
-    return out | (_between_doors(wall, aside, cell_m) | _between_doors(wall.T, aside.T, cell_m).T) & wall
+    return out & ~((_lengths(piece) <= _SCREEN_M / cell_m) & ~of_pieces(piece, thick))[piece]
 
 
 def _lengths(piece: Labels) -> Float[np.ndarray, " n"]:
@@ -74,25 +71,10 @@ def _lengths(piece: Labels) -> Float[np.ndarray, " n"]:
     return np.hypot(rows, columns)
 
 
-def _between_doors(wall: Cells, screen: Cells, cell_m: float) -> Cells:
-    row, start, end = _runs(_as_rows(wall))
-    alone = _sums(dilated(screen, 3, 1))
-    is_wall = alone[row, end] - alone[row, start] < 0.5 * (end - start)
-    long = (end - start) * cell_m >= _LEAST_WALL_M - 1e-6
-    piece = ~is_wall & long & _pillars(row, start, end, is_wall, _DOOR_M / cell_m)
-    return _Gaps(row, start, end, piece).where(piece).filled(wall.shape)
-
-
 def _posts(wall: Cells, cell_m: float) -> Cells:
     # What stands alone and is small: a lamp, a plant, a person, a pillar.
     piece = pieces(wall, diagonally=True)
     return (storey_grid.extents(piece)[:, :2].max(axis=1) <= _POST_M / cell_m)[piece] & wall
-
-
-def _without_posts(wall: Cells, doorway: Cells, cell_m: float) -> Cells:
-    post = _posts(wall, cell_m)
-    piece = pieces(post, diagonally=True)
-    return wall & (~post | of_pieces(piece, dilated(doorway, 3, 3))[piece])  # pillars between doorways stay
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,7 +151,6 @@ def _gaps(wall: Cells, post: Cells, free: Cells, cell_m: float, widest_m: float 
     beam = max(3, 2 * (round(_LEAST_WALL_M / cell_m) // 2) - 1)
     ends_at = _sums(dilated(storey_grid.opened(wall & ~post, beam, 1), 3, 1))
     held = long | (ends_at[row, end] > ends_at[row, start])
-    held |= _pillars(row, start, end, held, _DOOR_M / cell_m)
     row, start, end, long = row[held], start[held], end[held], long[held]
     q = np.flatnonzero(row[1:] == row[:-1])
     row, a, b, before, after = row[q], end[q], start[q + 1], long[q], long[q + 1]
@@ -181,13 +162,6 @@ def _gaps(wall: Cells, post: Cells, free: Cells, cell_m: float, widest_m: float 
     wide = (width * cell_m >= _NARROWEST_M - 1e-6) & (width * cell_m <= widest_m + 1e-6)
     good = wide & (before | after) & (seen[row, b] - seen[row, a] >= _SEEN_SHARE * width)
     return _Gaps(row, a, b, before & after).where(good)
-
-
-def _pillars(row: Numbers, start: Numbers, end: Numbers, wall: Chosen, most: float) -> Chosen:
-    out = np.zeros(len(row), bool)
-    near = (row[1:] == row[:-1]) & (start[1:] - end[:-1] <= most)
-    out[1:-1] = near[:-1] & near[1:] & wall[:-2] & wall[2:]
-    return out
 
 
 def _leads_somewhere(gaps: _Gaps, solid: Cells, free: Cells, cell_m: float) -> Chosen:
@@ -247,8 +221,6 @@ def rooms_of_storey(grid: StoreyGrid) -> StoreyRooms:
     shut = _recesses(wall, free, cell_m)
     wall, free = wall | shut, free & ~shut
     doorway = _closed_doorways(wall, free, cell_m)
-    wall = _without_posts(wall, doorway, cell_m)
-    free = _whole(free & ~wall, wall, cell_m)
     inside = free & ~doorway
     half_m = np.where(inside, distance(~(wall | doorway)) * cell_m, 0.0).astype(np.float32)
     label = _parted(inside, half_m, cell_m)
