@@ -16,7 +16,7 @@ from avlmaps.days.together import build_together
 from avlmaps.perception.encoders import encoders_of
 from avlmaps.query.avlmap import AVLMap
 from helpers.pool_here import Here
-from maps.build_fakes import SETTINGS, content_of, open_walk, register_fakes
+from maps.build_fakes import SETTINGS, open_walk, register_fakes
 
 ENCODERS = encoders_of(register_fakes())
 WALKS = [partial(open_walk, seed=seed) for seed in range(4)]
@@ -115,24 +115,3 @@ def test_another_map_is_replaced_only_where_one_says_so(out: Path, monkeypatch: 
     with pytest.raises(MapError, match="is a finished map already"):
         build(out)
     assert len(build(out, overwrite=True).info.build_key) == 64
-
-
-def test_whole_recordings_and_their_parts_are_jobs_to_the_same_maps(
-    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Four recordings on two cores are four jobs; on eight cores their parts are jobs."""
-    monkeypatch.setattr(together, "merge_maps", Merges())
-    build(tmp_path / "all.avlmap", cores=8)
-    for number in range(1, 5):
-        name = f"{number:04d}.avlmap"
-        assert content_of(tmp_path / "all-recordings" / name) == content_of(built / name)
-
-
-def test_a_worker_that_does_not_see_the_folder_is_refused(tmp_path: Path) -> None:
-    def elsewhere(job: Any) -> Any:
-        return together.BuildJob(
-            **{name: getattr(job, name) for name in job.__slots__ if name != "token"}, token=tmp_path / "no" / "token"
-        )
-
-    with pytest.raises(MapError, match=rf"does not see {tmp_path}/no as this machine does"):
-        build_together(WALKS, tmp_path / "all.avlmap", ENCODERS, Here(1, change=elsewhere), SETTINGS)

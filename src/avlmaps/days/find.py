@@ -69,9 +69,9 @@ class Votes:
         return len(self.map_from_other)
 
 
-def require_alike(stored: AVLMap, other: AVLMap) -> None:
+def require_alike(avlmap: AVLMap, other: AVLMap) -> None:
     """Raise ``MapError`` where two maps cannot be one: other voxels or models, or nothing to find the place by."""
-    for one in (stored, other):
+    for one in (avlmap, other):
         if not len(one.data.keyframes):
             raise MapError(f"{one.path} has no keyframes, by which the place is found; build it from a recording.")
         if len(one.data.keyframes.clear_mm) != len(one.data.keyframes):
@@ -79,23 +79,23 @@ def require_alike(stored: AVLMap, other: AVLMap) -> None:
                 f"{one.path} does not know where its {len(one.data.keyframes)} keyframes saw freely (an older avlmaps "
                 "built it, or with every depth as it is), so that nobody would know what is gone; build it again."
             )
-    if not np.isclose(stored.data.grid.voxel_size_m, other.data.grid.voxel_size_m, rtol=1e-9):
+    if not np.isclose(avlmap.data.grid.voxel_size_m, other.data.grid.voxel_size_m, rtol=1e-9):
         raise MapError(
-            f"{stored.path} has voxels of {stored.data.grid.voxel_size_m:g} m and {other.path} of "
+            f"{avlmap.path} has voxels of {avlmap.data.grid.voxel_size_m:g} m and {other.path} of "
             f"{other.data.grid.voxel_size_m:g} m; build one of them again with the other's."
         )
     for kind in Kind:
-        one, two = (each.data.info.models.get(kind.value) for each in (stored, other))
+        one, two = (each.data.info.models.get(kind.value) for each in (avlmap, other))
         said = [
             ("none" if model is None else f"{model.id} ({model.checksum[:8] or 'unknown'})") for model in (one, two)
         ]
         if said[0] != said[1] and not (kind is Kind.SOUNDS and None in (one, two)):
             raise MapError(
-                f"{stored.path} was built with {said[0]} for {kind.value} and {other.path} with {said[1]}; build one "
+                f"{avlmap.path} was built with {said[0]} for {kind.value} and {other.path} with {said[1]}; build one "
                 "of them again with the other's profile."
             )
-    if missing := [kind.value for kind in NEEDED if kind.value not in stored.data.info.models]:
-        raise MapError(f"{stored.path} was built without a model for {missing[0]}, by which the place is found; "
+    if missing := [kind.value for kind in NEEDED if kind.value not in avlmap.data.info.models]:
+        raise MapError(f"{avlmap.path} was built without a model for {missing[0]}, by which the place is found; "
                        "build both maps with a profile that has one.")  # fmt: skip
 
 
@@ -106,11 +106,11 @@ def spread_out(count: int, most: int) -> Int[np.ndarray, " n"]:
     return chosen[np.argsort(turn)]
 
 
-def gather_votes(stored: AVLMap, other: AVLMap, rng: np.random.Generator) -> Votes:
+def gather_votes(avlmap: AVLMap, other: AVLMap, rng: np.random.Generator) -> Votes:
     """Locate keyframes of another map in this one, until enough agree."""
     for kind in NEEDED:
-        stored.require_model(kind)
-    here, chosen = LocatableMap.of(stored), LocateSettings(refine_focal=False)
+        avlmap.require_model(kind)
+    here, chosen = LocatableMap.of(avlmap), LocateSettings(refine_focal=False)
     votes: list[np.ndarray] = []
     cameras: list[np.ndarray] = []
     tried = 0
@@ -118,7 +118,7 @@ def gather_votes(stored: AVLMap, other: AVLMap, rng: np.random.Generator) -> Vot
     for row in progress(rows.tolist(), "locating", total=len(rows), unit="keyframe"):
         tried += 1
         local, rgb = features_of(other, row), thumbnail(other, row)
-        place = stored.encoders.place.encode(rgb, local, stored.data.place_state)
+        place = avlmap.encoders.place.encode(rgb, local, avlmap.data.place_state)
         found = locate_features(here, local, place, other.data.rig.rgb, rng, chosen)
         if found.world_from_camera is None:
             continue
@@ -134,17 +134,17 @@ def gather_votes(stored: AVLMap, other: AVLMap, rng: np.random.Generator) -> Vot
     return Votes(np.stack(votes) if votes else none, np.stack(cameras) if cameras else none, tried)
 
 
-def features_of(stored: AVLMap, row: int) -> LocalFeatures:
+def features_of(avlmap: AVLMap, row: int) -> LocalFeatures:
     """Return the keypoints of a keyframe as they were found."""
-    camera = stored.data.rig.rgb
-    return local_features(stored.data.keyframes, row, (camera.width, camera.height))
+    camera = avlmap.data.rig.rgb
+    return local_features(avlmap.data.keyframes, row, (camera.width, camera.height))
 
 
-def thumbnail(stored: AVLMap, row: int) -> np.ndarray:
+def thumbnail(avlmap: AVLMap, row: int) -> np.ndarray:
     """Return the picture of a keyframe, (h, w, 3) RGB, as small as the map stores it."""
     import cv2
 
-    code = stored.data.keyframes.jpeg(row)
+    code = avlmap.data.keyframes.jpeg(row)
     if not len(code):
         return np.zeros((1, 1, 3), np.uint8)
     picture = cv2.imdecode(code, cv2.IMREAD_COLOR)
@@ -233,7 +233,7 @@ _IDENTITY = tuple(tuple(float(value) for value in row) for row in np.eye(4))
 
 
 def find_other(
-    stored: AVLMap, other: AVLMap, known: Occupied | None = None
+    avlmap: AVLMap, other: AVLMap, known: Occupied | None = None
 ) -> tuple[Float[np.ndarray, "4 4"], dict[str, float]]:
     """Return where another map lies in this one, without a guess; ``known`` are this one's voxels, where they are had.
 
@@ -241,54 +241,54 @@ def find_other(
         MapError: the maps have other voxels or models, or no keyframes.
         NotTheSamePlaceError: the pictures do not agree, or the surfaces contradict each other.
     """
-    require_alike(stored, other)
+    require_alike(avlmap, other)
     rng = np.random.default_rng(0)
-    votes = gather_votes(stored, other, rng)
-    first, checks = consensus(votes, (stored.path, other.path))
-    require_upright(first, stored.data.up_in_world, other.data.up_in_world)
-    grid = stored.data.grid
-    points, others = (grid.centre_of(np.asarray(one.data.voxels.index)) for one in (stored, other))
+    votes = gather_votes(avlmap, other, rng)
+    first, checks = consensus(votes, (avlmap.path, other.path))
+    require_upright(first, avlmap.data.up_in_world, other.data.up_in_world)
+    grid = avlmap.data.grid
+    points, others = (grid.centre_of(np.asarray(one.data.voxels.index)) for one in (avlmap, other))
     fine = first
     if checks["votes_off_m"] > REFINE_FROM * grid.voxel_size_m:
         fine, off_m = refine(points, others, first, rng)
         checks["surface_off_m"] = round(off_m, 4)
-    known = known or Occupied.of(np.asarray(stored.data.voxels.index), grid)
-    checks |= _agreement(stored, other.path, apply(fine, others), known)
+    known = known or Occupied.of(np.asarray(avlmap.data.voxels.index), grid)
+    checks |= _agreement(avlmap, other.path, apply(fine, others), known)
     return fine, checks
 
 
-def _agreement(stored: AVLMap, other: Path, points: Float[np.ndarray, "n 3"], known: Occupied) -> dict[str, float]:
+def _agreement(avlmap: AVLMap, other: Path, points: Float[np.ndarray, "n 3"], known: Occupied) -> dict[str, float]:
     """Return how much of the other map's surface (``points``) lies on this one's, of what this one looked at.
 
     Raises:
         NotTheSamePlaceError: too little, or too little was looked at.
     """
-    grid = stored.data.grid
+    grid = avlmap.data.grid
     on_surface = known.near(points)
     index = grid.index_of(points)
     free = np.zeros(len(index), np.int64)
-    for views in views_of(stored):
+    for views in views_of(avlmap):
         free += views.through(index, grid)
     through = (free >= THROUGH_VIEWS) & ~on_surface
     looked = int(on_surface.sum() + through.sum())
     share = float(on_surface.sum() / max(looked, 1))
     if looked < LEAST_LOOKED or share < LEAST_AGREEMENT:
         raise NotTheSamePlaceError(
-            f"This is not seen to be the same place: of {looked} voxels of {other} where {stored.path} looked, "
+            f"This is not seen to be the same place: of {looked} voxels of {other} where {avlmap.path} looked, "
             f"{share:.0%} lie on its surface and the others where it saw through; {LEAST_AGREEMENT:.0%} of at "
             f"least {LEAST_LOOKED} must. Merge maps of one building that saw some of the same rooms."
         )
     return {"looked": looked, "agreement": round(share, 4)}
 
 
-def visits_of(stored: AVLMap) -> tuple[Visit, ...]:
+def visits_of(avlmap: AVLMap) -> tuple[Visit, ...]:
     """Return the days of a map: the one of its recording, where it was not merged."""
-    info = stored.data.info
+    info = avlmap.data.info
     if info.visits:
         return info.visits
-    stamps = np.asarray(stored.data.keyframes.stamp_s)
+    stamps = np.asarray(avlmap.data.keyframes.stamp_s)
     begin = float(stamps.min(initial=np.inf)) if len(stamps) else 0.0
-    seen = np.asarray(stored.data.voxels.last_seen_s)
+    seen = np.asarray(avlmap.data.voxels.last_seen_s)
     begin = min(begin, float(seen.min(initial=begin)))
     end = max(float(stamps.max(initial=begin)), float(seen.max(initial=begin)))
     day = day_of(clock_s(info.recording, begin))
@@ -311,13 +311,13 @@ def clock_s(recording: RecordingInfo | Recording, stamp_s: float) -> float | Non
     return at_s if at_s > _CLOCK_S and not is_in_future(at_s) else None
 
 
-def require_another_drive(stored: AVLMap, other: AVLMap, visits: Sequence[Visit]) -> None:
+def require_another_drive(avlmap: AVLMap, other: AVLMap, visits: Sequence[Visit]) -> None:
     """Raise ``MapError`` where the other map is of a drive that is one of the visits.
 
     Its recording says so, or, where it was read in another way or while it was driven, its keyframes: no two drives
     have the same pictures at the same stamps.
     """
-    keyframes, others = stored.data.keyframes, other.data.keyframes
+    keyframes, others = avlmap.data.keyframes, other.data.keyframes
     number = visit_of_stamps(visits, np.asarray(keyframes.stamp_s))
     for count, visit in enumerate(visits):
         rows = np.flatnonzero(number == count)
@@ -328,15 +328,15 @@ def require_another_drive(stored: AVLMap, other: AVLMap, visits: Sequence[Visit]
         )
         if same or visit.recording.fingerprint == other.data.info.recording.fingerprint:
             raise MapError(
-                f"{other.path} is of the same drive as visit {count + 1} of {stored.path} "
+                f"{other.path} is of the same drive as visit {count + 1} of {avlmap.path} "
                 f"({visit.recording.name}{', ' + visit.day if visit.day else ''}), and one drive counts once; "
                 "merge the map of another drive."
             )
 
 
-def views_of(stored: AVLMap) -> list[DayViews]:
+def views_of(avlmap: AVLMap) -> list[DayViews]:
     """Return what the keyframes of each visit saw freely, in the map's world."""
-    keyframes, visits, out = stored.data.keyframes, visits_of(stored), list[DayViews]()
+    keyframes, visits, out = avlmap.data.keyframes, visits_of(avlmap), list[DayViews]()
     number = visit_of_stamps(visits, np.asarray(keyframes.stamp_s))
     for visit, one in enumerate(visits):
         own = np.flatnonzero(number == visit)

@@ -278,7 +278,7 @@ _BESIDE = 2  # voxels: so near to each other two are of one thing
 
 
 def changed_things(
-    stored: AVLMap,
+    avlmap: AVLMap,
     loose: Bool[np.ndarray, " n"],
     through: Bool[np.ndarray, " n"],
     owned: Sequence[Int[np.ndarray, " r"]],
@@ -289,18 +289,18 @@ def changed_things(
     for a thing, or hardly looked at, those alone that rays pass through are. What lies beside a thing that changed
     itself is a part of it.
     """
-    index = np.asarray(stored.data.voxels.index)
+    index = np.asarray(avlmap.data.voxels.index)
     changed = [rows for rows in owned if loose[rows].sum() > _MOSTLY * len(rows)]
     parts_of = Occupied.of(
-        np.concatenate([np.zeros((0, 3), np.int32), *(index[rows] for rows in changed)]), stored.data.grid
+        np.concatenate([np.zeros((0, 3), np.int32), *(index[rows] for rows in changed)]), avlmap.data.grid
     )
     loose = loose.copy()
     for rows in owned:
         loose[rows] = False
-    if "pixels" not in stored.data.info.models or not (loose & through).any():
+    if "pixels" not in avlmap.data.info.models or not (loose & through).any():
         return []
-    space, namer = stored.space, VoxelNamer(stored)
-    voxel_m = stored.data.grid.voxel_size_m
+    space, namer = avlmap.space, VoxelNamer(avlmap)
+    voxel_m = avlmap.data.grid.voxel_size_m
     named = np.array([name not in (*STRUCTURE, "other") for name in namer.names])
 
     def size_m(own: Int[np.ndarray, " k"]) -> Float[np.ndarray, "3"]:
@@ -323,5 +323,5 @@ def changed_things(
             share = np.where(named, namer.confidences(own).mean(axis=0), -1.0)
             best = int(share.argmax())
             likely = min(float(share[best]), CONFIDENT_AT - 0.01)
-            found.append(thing_of(stored, namer.names[best], likely, own))
+            found.append(thing_of(avlmap, namer.names[best], likely, own))
     return found

@@ -175,28 +175,28 @@ class Loops:
         return {name: round(getattr(self, name), 4) for name in names}
 
 
-def close_loops(stored: AVLMap, recording: Recording | None = None) -> tuple[Corrected, Loops]:
+def close_loops(avlmap: AVLMap, recording: Recording | None = None) -> tuple[Corrected, Loops]:
     """Find where the drive came back, correct the poses by it, and make the map follow them, in its folder.
 
     Raises:
         MapError: the map has no submaps, or no models to find places by; too few closures were found, or they
             contradict each other. It stays as it was.
     """
-    require_submaps(stored.path, stored.data)  # before the long search
-    found = find_loops(stored)
-    return correct_map(stored.path, found.stamps_s, found.poses, recording, with_findings), found
+    require_submaps(avlmap.path, avlmap.data)  # before the long search
+    found = find_loops(avlmap)
+    return correct_map(avlmap.path, found.stamps_s, found.poses, recording, with_findings), found
 
 
-def find_loops(stored: AVLMap) -> Loops:
+def find_loops(avlmap: AVLMap) -> Loops:
     """Return corrected poses of the keyframes of a map; see ``close_loops``. The map is not touched."""
     for kind in NEEDED:
-        stored.require_model(kind)
-    keyframes = stored.data.keyframes
+        avlmap.require_model(kind)
+    keyframes = avlmap.data.keyframes
     poses = np.asarray(keyframes.world_from_camera, np.float64)
-    closures, tried = _closures(stored, poses)
+    closures, tried = _closures(avlmap, poses)
     if len(closures) < LEAST_CLOSURES:
         raise MapError(
-            f"The drive of {stored.path} is not seen to come back: of {tried} keyframes {len(closures)} were located "
+            f"The drive of {avlmap.path} is not seen to come back: of {tried} keyframes {len(closures)} were located "
             f"in earlier ones (at least {LATER_S:g} s and {WAY_M:g} m before); {LEAST_CLOSURES} are "
             "needed. The map stays as it was."
         )
@@ -206,7 +206,7 @@ def find_loops(stored: AVLMap) -> Loops:
     if 0 < agree.sum() < len(agree):
         found = optimise(poses, concat([odometry, closures.only(agree)]))
         agree = _agreeing(closures, found)
-    found = _upright(found, poses, stored.data.up_in_world)
+    found = _upright(found, poses, avlmap.data.up_in_world)
     strain = odometry.errors(found) / np.repeat(np.stack([odometry.sigma_m, odometry.sigma_rad], axis=1), 3, axis=1)
     bent = float(np.sqrt(np.mean(strain**2))) if len(odometry) else 0.0
     before, after = (np.linalg.norm(closures.errors(of)[:, :3], axis=1) for of in (poses, found))
@@ -216,13 +216,13 @@ def find_loops(stored: AVLMap) -> Loops:
     )
     if agree.sum() < max(LEAST_CLOSURES, LEAST_SHARE * len(agree)):
         raise MapError(
-            f"The loops of {stored.path} contradict each other: {said}, and "
+            f"The loops of {avlmap.path} contradict each other: {said}, and "
             f"{int(np.ceil(max(LEAST_CLOSURES, LEAST_SHARE * len(agree))))} must. Rooms that look alike do "
             "that; the map stays as it was."
         )
     if bent > MOST_STRAIN:
         raise MapError(
-            f"The loops of {stored.path} contradict its odometry: {said}, but the drive would be bent by {bent:.1f} "
+            f"The loops of {avlmap.path} contradict its odometry: {said}, but the drive would be bent by {bent:.1f} "
             f"standard deviations ({MOST_STRAIN:g} at most). The map stays as it was."
         )
     return Loops(
@@ -231,9 +231,9 @@ def find_loops(stored: AVLMap) -> Loops:
     )  # fmt: skip
 
 
-def _closures(stored: AVLMap, poses: Float[np.ndarray, "k 4 4"]) -> tuple[Edges, int]:
+def _closures(avlmap: AVLMap, poses: Float[np.ndarray, "k 4 4"]) -> tuple[Edges, int]:
     """Return what was seen again, and how many keyframes were looked for."""
-    keyframes, rng, every = stored.data.keyframes, np.random.default_rng(0), LocatableMap.of(stored)
+    keyframes, rng, every = avlmap.data.keyframes, np.random.default_rng(0), LocatableMap.of(avlmap)
     stamps_s, place = np.asarray(keyframes.stamp_s), np.asarray(keyframes.place)
     way_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1))])
     first: list[int] = []
@@ -247,16 +247,16 @@ def _closures(stored: AVLMap, poses: Float[np.ndarray, "k 4 4"]) -> tuple[Edges,
             continue
         tried += 1
         alike = earlier[np.argsort(-(place[earlier] @ place[row]), kind="stable")[:CANDIDATES]]
-        local = features_of(stored, row)
+        local = features_of(avlmap, row)
         for other in alike.tolist():
             there = replace(every, keyframes=keyframes.take(np.array([other])))
             chosen = LocateSettings(refine_focal=False)
-            located = locate_features(there, local, place[row], stored.data.rig.rgb, rng, chosen)
+            located = locate_features(there, local, place[row], avlmap.data.rig.rgb, rng, chosen)
             found = located.world_from_camera
             if found is not None and located.score >= LEAST_SCORE:
                 first.append(other)
                 second.append(row)
-                measured.append(inverse(poses[other]) @ found @ stored.data.rig.rgb_from_depth)
+                measured.append(inverse(poses[other]) @ found @ avlmap.data.rig.rgb_from_depth)
                 break
     count = len(first)
     edges = Edges(

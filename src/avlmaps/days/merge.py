@@ -65,7 +65,7 @@ def unedited(avlmap: AVLMap) -> AVLMap:
 
 
 def merge_maps(
-    stored: AVLMap,
+    avlmap: AVLMap,
     other: AVLMap,
     out: Path | str,
     *,
@@ -80,7 +80,7 @@ def merge_maps(
     stays as it was. Both maps are left alone.
 
     Args:
-        stored: the map, of one day or of several.
+        avlmap: the map, of one day or of several.
         other: of a later day, of one recording.
         out: folder of the new map.
         day: when the other was recorded, as ``2026-11-25``; where its stamps are of a clock it is known.
@@ -98,18 +98,18 @@ def merge_maps(
     if other.data.info.visits:
         raise MapError(
             f"{other.path} is a map of {len(other.data.info.visits)} days; merge its recordings' maps one after the "
-            f"other into {stored.path}, the earliest first."
+            f"other into {avlmap.path}, the earliest first."
         )
-    visits = _dated(visits_of(stored), first_day, stored)
-    require_another_drive(stored, other, visits)
+    visits = _dated(visits_of(avlmap), first_day, avlmap)
+    require_another_drive(avlmap, other, visits)
     visit = _visit(other, visits[-1], day)  # before the search, which takes long
-    known = Occupied.of(np.asarray(stored.data.voxels.index), stored.data.grid)
-    (moved, checks), number = find_other(stored, other, known), len(visits)
+    known = Occupied.of(np.asarray(avlmap.data.voxels.index), avlmap.data.grid)
+    (moved, checks), number = find_other(avlmap, other, known), len(visits)
     visit = msgspec.structs.replace(visit, map_from_recording=_rows(moved), checks=checks)
     visits = (*visits, visit)
     listed = things_of or default_things
-    grid = stored.data.grid
-    before = views_of(stored)
+    grid = avlmap.data.grid
+    before = views_of(avlmap)
     laid, *_ = resampled(np.asarray(other.data.voxels.index), grid, moved)
     now = Day(
         views_of(other)[0].moved(moved),
@@ -117,40 +117,40 @@ def merge_maps(
         inverse(moved),
         Occupied.of(laid, grid),
     )
-    life = stored.data.life or lives.begun([_seen(one, stored, np.eye(4), 0.0) for one in listed(unedited(stored))])
-    things, index = list(listed(unedited(other))), np.asarray(stored.data.voxels.index)
+    life = avlmap.data.life or lives.begun([_seen(one, avlmap, np.eye(4), 0.0) for one in listed(unedited(avlmap))])
+    things, index = list(listed(unedited(other))), np.asarray(avlmap.data.voxels.index)
     surface, through = now.has_surface(grid.centre_of(index)), now.views.through(index, grid) >= THROUGH_VIEWS
     if things_of is None:  # a list of names misses small things, whose surface changes nevertheless
-        life = _with_vanished(life, stored, known, surface, through, visits)
+        life = _with_vanished(life, avlmap, known, surface, through, visits)
         things += _unnamed_new(other, things, before, known, moved)
     new = [_seen(one, other, moved, visit.shift_s) for one in things]
     at_s = [one.end_s for one in visits]
-    looks = _looks(life, stored, known)
+    looks = _looks(life, avlmap, known)
     life = lives.lived_on(life, new, now, before, known, number, at_s, grid, same_thing, looks)
     kept = _still_there(known, life, surface, through, number)
-    voxels = joined_voxels(stored, kept, other, moved, visit.shift_s, life)
-    keyframes = joined_keyframes(stored, other, moved, visit.shift_s)
-    sounds = joined_sounds(stored, other, moved, visit.shift_s)
-    sources, why_not = joined_sources(stored, other, moved, voxels, keyframes)
-    data = MapData(stored.data.info, voxels, keyframes, sounds, stored.data.place_state, sources, life=life)
-    info = _manifest(stored, other, data, visits, perf_counter() - begin_s, why_not)
+    voxels = joined_voxels(avlmap, kept, other, moved, visit.shift_s, life)
+    keyframes = joined_keyframes(avlmap, other, moved, visit.shift_s)
+    sounds = joined_sounds(avlmap, other, moved, visit.shift_s)
+    sources, why_not = joined_sources(avlmap, other, moved, voxels, keyframes)
+    data = MapData(avlmap.data.info, voxels, keyframes, sounds, avlmap.data.place_state, sources, life=life)
+    info = _manifest(avlmap, other, data, visits, perf_counter() - begin_s, why_not)
     with lock_folder(out), lock_folder(out, EDITING):
-        edits = _edits(stored, other, read_edits(out), keyframes, moved)
-        write(out, with_findings(replace(data, info=info), stored.encoders))
+        edits = _edits(avlmap, other, read_edits(out), keyframes, moved)
+        write(out, with_findings(replace(data, info=info), avlmap.encoders))
         if edits:
             write_edits(out, edits)
-    return AVLMap(read(out), stored.encoders, path=out)
+    return AVLMap(read(out), avlmap.encoders, path=out)
 
 
 def _edits(
-    stored: AVLMap, other: AVLMap, replaced: Sequence[Edit], onto: Keyframes, moved: Float[np.ndarray, "4 4"]
+    avlmap: AVLMap, other: AVLMap, replaced: Sequence[Edit], onto: Keyframes, moved: Float[np.ndarray, "4 4"]
 ) -> tuple[Edit, ...]:
     """Return what people corrected in both maps, in the world of this one, in the order of time.
 
     What they corrected in the map that is replaced stays as well.
     """
-    world = World.of(stored.data.info)
-    own = carried_edits(read_edits(stored.path), stored.data.keyframes, world, world, onto, np.eye(4))
+    world = World.of(avlmap.data.info)
+    own = carried_edits(read_edits(avlmap.path), avlmap.data.keyframes, world, world, onto, np.eye(4))
     others = carried_edits(read_edits(other.path), other.data.keyframes, World.of(other.data.info), world, onto, moved)
     known = {edit.id: edit for edit in (*replaced, *others, *own)}
     return tuple(sorted(known.values(), key=lambda edit: edit.made))
@@ -161,12 +161,12 @@ def merged_key(first: str, other: str) -> str:
     return key_of("days", first, other, _REVISION)
 
 
-def _dated(visits: tuple[Visit, ...], first_day: str, stored: AVLMap) -> tuple[Visit, ...]:
+def _dated(visits: tuple[Visit, ...], first_day: str, avlmap: AVLMap) -> tuple[Visit, ...]:
     if not first_day:
         return visits
     if len(visits) > 1:
         raise MapError(
-            f"{stored.path} is a map of {len(visits)} visits, whose days are known; leave out "
+            f"{avlmap.path} is a map of {len(visits)} visits, whose days are known; leave out "
             f"{option('first-day', 'DAY')}."
         )
     return tuple(msgspec.structs.replace(visit, day=_date(first_day).isoformat()) for visit in visits)
@@ -212,24 +212,24 @@ def _when(stamp_s: float) -> str:
     return datetime.fromtimestamp(stamp_s, UTC).strftime("%Y-%m-%d %H:%M UTC")
 
 
-def _seen(thing: Thing, stored: AVLMap, map_from_own: Float[np.ndarray, "4 4"], shift_s: float) -> lives.SeenThing:
-    index = np.asarray(stored.data.voxels.index)[thing.rows]
+def _seen(thing: Thing, avlmap: AVLMap, map_from_own: Float[np.ndarray, "4 4"], shift_s: float) -> lives.SeenThing:
+    index = np.asarray(avlmap.data.voxels.index)[thing.rows]
     if not np.array_equal(map_from_own, np.eye(4)):
-        index, *_ = resampled(index, stored.data.grid, map_from_own)
-    seen_s = float(np.max(np.asarray(stored.data.voxels.last_seen_s)[thing.rows])) + shift_s
+        index, *_ = resampled(index, avlmap.data.grid, map_from_own)
+    seen_s = float(np.max(np.asarray(avlmap.data.voxels.last_seen_s)[thing.rows])) + shift_s
     position = plain_point(apply(map_from_own, np.array(thing.position)))
-    look = _look(stored, thing.rows)
+    look = _look(avlmap, thing.rows)
     return lives.SeenThing(thing.name, thing.confidence, position, thing.size, thing.color, index, seen_s, look)
 
 
-def _look(stored: AVLMap, rows: Int[np.ndarray, " r"]) -> Float[np.ndarray, " d"] | None:
-    total = np.asarray(stored.data.voxels.feature)[rows].astype(np.float64).sum(axis=0)
+def _look(avlmap: AVLMap, rows: Int[np.ndarray, " r"]) -> Float[np.ndarray, " d"] | None:
+    total = np.asarray(avlmap.data.voxels.feature)[rows].astype(np.float64).sum(axis=0)
     length = float(np.linalg.norm(total))
     return total / length if length > 0.0 else None
 
 
-def _looks(life: Life, stored: AVLMap, known: Occupied) -> dict[int, Float[np.ndarray, " d"]]:
-    looks = {number: _look(stored, rows) for number, rows in _rows_there(life, known).items()}
+def _looks(life: Life, avlmap: AVLMap, known: Occupied) -> dict[int, Float[np.ndarray, " d"]]:
+    looks = {number: _look(avlmap, rows) for number, rows in _rows_there(life, known).items()}
     return {number: look for number, look in looks.items() if look is not None}
 
 
@@ -250,16 +250,16 @@ def same_thing(one: str, other: str) -> bool:
 
 def _with_vanished(
     life: Life,
-    stored: AVLMap,
+    avlmap: AVLMap,
     known: Occupied,
     surface: Bool[np.ndarray, " n"],
     through: Bool[np.ndarray, " n"],
     visits: Sequence[Visit],
 ) -> Life:
-    things = changed_things(stored, ~surface, through, [*_rows_there(life, known).values()])
-    stamps = np.array([float(np.max(np.asarray(stored.data.voxels.last_seen_s)[one.rows])) for one in things])
+    things = changed_things(avlmap, ~surface, through, [*_rows_there(life, known).values()])
+    stamps = np.array([float(np.max(np.asarray(avlmap.data.voxels.last_seen_s)[one.rows])) for one in things])
     seen_on = visit_of_stamps(visits[:-1], stamps).tolist()
-    begun = [lives.begun([_seen(one, stored, np.eye(4), 0.0)], on) for one, on in zip(things, seen_on, strict=True)]
+    begun = [lives.begun([_seen(one, avlmap, np.eye(4), 0.0)], on) for one, on in zip(things, seen_on, strict=True)]
     stays = [*life.stays, *(one.stays[0] for one in begun)]
     return Life.of(stays, [*(life.voxels(number) for number in range(len(life))), *(one.voxels(0) for one in begun)])
 
@@ -297,14 +297,14 @@ def _still_there(
 
 
 def _manifest(
-    stored: AVLMap,
+    avlmap: AVLMap,
     other: AVLMap,
     content: MapData,
     visits: tuple[Visit, ...],
     elapsed_s: float,
     notice: str,
 ) -> MapInfo:
-    info, grid = stored.data.info, stored.data.grid
+    info, grid = avlmap.data.info, avlmap.data.grid
     recording = RecordingInfo(
         name=info.recording.name,
         format=info.recording.format,
@@ -320,7 +320,7 @@ def _manifest(
         build_key=merged_key(info.build_key, other.data.info.build_key),
         recording=recording,
         counts=Counts.of(frames, content.keyframes, content.voxels, content.sounds),
-        rig=RigInfo.of(stored.data.rig),
+        rig=RigInfo.of(avlmap.data.rig),
         bounding_box_m=MapBounds.of(content.voxels.index, grid.voxel_size_m),
         notices=(
             *dict.fromkeys(one for one in (*info.notices, *other.data.info.notices) if not one.startswith(NO_SOURCES)),
@@ -333,7 +333,7 @@ def _manifest(
 
 
 def joined_voxels(
-    stored: AVLMap,
+    avlmap: AVLMap,
     kept: Bool[np.ndarray, " n"],
     other: AVLMap,
     moved: Float[np.ndarray, "4 4"],
@@ -341,15 +341,15 @@ def joined_voxels(
     life: Life,
 ) -> Voxels:
     """Return what is left of the map's voxels, and the other's laid on its grid; where both are, their means."""
-    table = VoxelTable(stored.data.voxels.feature.shape[1])
-    table.merge(_sums(stored.data.voxels, np.flatnonzero(kept)))
+    table = VoxelTable(avlmap.data.voxels.feature.shape[1])
+    table.merge(_sums(avlmap.data.voxels, np.flatnonzero(kept)))
     index, cell, source, part = resampled(np.asarray(other.data.voxels.index), other.data.grid, moved)
     table.merge(_spread(other.data.voxels, index, cell, source, part, shift_s))
     people = [life.voxels(number) for number, stay in enumerate(life.stays) if stay.name in PEOPLE]
     if not people:
         return table.voxels()
     sums = table.evidence().index
-    crowd = Occupied.of(np.concatenate(people), stored.data.grid)
+    crowd = Occupied.of(np.concatenate(people), avlmap.data.grid)
     return table.voxels(kept=crowd.row_of(sums) < 0)
 
 
@@ -388,14 +388,14 @@ def _spread(
     )  # fmt: skip
 
 
-def joined_keyframes(stored: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 4"], shift_s: float) -> Keyframes:
+def joined_keyframes(avlmap: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 4"], shift_s: float) -> Keyframes:
     """Return the keyframes of all days; one of the new day takes the place of older ones from about where it is.
 
     Their places are described again, in the words that this map's place encoder learned.
     """
     from scipy.spatial import KDTree
 
-    old, new = stored.data.keyframes, other.data.keyframes
+    old, new = avlmap.data.keyframes, other.data.keyframes
     pose = moved @ np.asarray(new.world_from_camera, np.float64)
     before = np.asarray(old.world_from_camera, np.float64)
     near = KDTree(pose[:, :3, 3]).query_ball_point(before[:, :3, 3], _NEAR_M)
@@ -404,8 +404,8 @@ def joined_keyframes(stored: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 
         for row, rivals in enumerate(near)
         if not any(rotation_angle_rad(before[row], pose[rival]) <= _NEAR_RAD for rival in rivals)
     ]
-    encoder = stored.encoders.place
-    state = stored.data.place_state
+    encoder = avlmap.encoders.place
+    state = avlmap.data.place_state
     place = [encoder.encode(thumbnail(other, row), features_of(other, row), state) for row in range(len(new))]
     turned = replace(
         new,
@@ -436,15 +436,15 @@ def _padded(clear_mm: np.ndarray, rows: int, columns: int) -> np.ndarray:
 
 
 def joined_sources(
-    stored: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 4"], voxels: Voxels, keyframes: Keyframes
+    avlmap: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 4"], voxels: Voxels, keyframes: Keyframes
 ) -> tuple[SourceEvidence | None, str]:
     """Return the evidence of where the sounds of all days came from; or why there is none, in a sentence."""
-    parts = [(of.data.sources, where) for of, where in ((stored, np.eye(4)), (other, moved)) if len(of.data.sounds)]
+    parts = [(of.data.sources, where) for of, where in ((avlmap, np.eye(4)), (other, moved)) if len(of.data.sounds)]
     known = [(evidence, where) for evidence, where in parts if evidence is not None]
     if not known:
         return None, ""
     if len(known) < len(parts):
-        of = next(of for of in (stored, other) if len(of.data.sounds) and of.data.sources is None)
+        of = next(of for of in (avlmap, other) if len(of.data.sounds) and of.data.sources is None)
         return None, (
             f"{NO_SOURCES}: {of.path.name} was built without the places of its microphones; build it again with "
             f"them ({option('microphones', 'FILE')}) and merge again."
@@ -452,17 +452,17 @@ def joined_sources(
     counts = [int(evidence.channels[0]) for evidence, _ in known]
     if len(set(counts)) > 1:
         return None, (
-            f"{NO_SOURCES}: {stored.path.name} was heard with {counts[0]} microphones and {other.path.name} with "
+            f"{NO_SOURCES}: {avlmap.path.name} was heard with {counts[0]} microphones and {other.path.name} with "
             f"{counts[1]}; query where sounds came from in each day's own map, or record with the same array."
         )
-    voxel_m = stored.data.grid.centre_of(np.asarray(voxels.index))
+    voxel_m = avlmap.data.grid.centre_of(np.asarray(voxels.index))
     robot_m = np.asarray(keyframes.world_from_camera, np.float64)[:, :3, 3]
-    return carry_evidence(known, voxel_m, robot_m, stored.data.up_in_world), ""
+    return carry_evidence(known, voxel_m, robot_m, avlmap.data.up_in_world), ""
 
 
-def joined_sounds(stored: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 4"], shift_s: float) -> HeardSounds:
+def joined_sounds(avlmap: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 4"], shift_s: float) -> HeardSounds:
     """Return the sounds of all days."""
-    old, new = stored.data.sounds, other.data.sounds
+    old, new = avlmap.data.sounds, other.data.sounds
     width = max(old.feature.shape[1], new.feature.shape[1])
     laid = replace(
         new,

@@ -1,52 +1,21 @@
 """Several recordings of one place become one map: each is built by itself, then found in the first and merged."""
 
-import secrets
 import shutil
-import socket
 from collections.abc import Sequence
-from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import user_path
-from avlmaps.core.progress import progress, say, silence_progress
+from avlmaps.core.progress import say
 from avlmaps.days.merge import merge_maps, merged_key
 from avlmaps.maps.build import build_map
-from avlmaps.maps.cluster import (
-    ClusterWorkers,
-    Models,
-    Pool,
-    Reopen,
-    reopened,
-    require_same_software,
-    software,
-    unseen,
-)
+from avlmaps.maps.cluster import ClusterWorkers, Pool, Reopen
 from avlmaps.maps.plan import require_place
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.folder import MANIFEST
-from avlmaps.maps.store.tables import explain_write_errors
 from avlmaps.perception.cache import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query.avlmap import AVLMap, with_findings
-
-
-@dataclass(frozen=True, slots=True)
-class BuildJob:
-    """A whole recording that one worker is to build a map of; the fields are the arguments of ``build_map``.
-
-    A worker that sees the file ``token`` sees the folder that this machine made, and not another at the same path.
-    """
-
-    reopen: Reopen
-    path: Path
-    models: Models
-    settings: BuildSettings
-    allow: tuple[str, ...]
-    overwrite: bool
-    software: str
-    token: Path
 
 
 def build_together(
@@ -63,7 +32,7 @@ def build_together(
     """Build the map of several recordings of one place with the workers of a pool, or finish one that was begun.
 
     The maps of the single recordings lie beside it, in ``NAME-recordings``: a recording more costs its own work alone.
-    Where there are as many recordings as cores each is one job; else their parts are jobs.
+    Their parts are the jobs.
 
     Raises:
         AvlmapsError: as ``build_map`` and ``merge_maps``; a recording of another place is refused with the numbers.
@@ -71,52 +40,10 @@ def build_together(
     out = user_path(out)
     folder = out.with_name(f"{out.name.removesuffix('.avlmap')}-recordings")
     paths = [folder / f"{number:04d}.avlmap" for number in range(1, len(recordings) + 1)]
-    if len(recordings) >= pool.cores:
-        _build_each(recordings, paths, encoders, pool, settings, cache, tuple(allow), overwrite)
-    else:
-        for reopen, path in zip(recordings, paths, strict=True):
-            build_map(reopen(), path, encoders, settings, cache=cache, workers=ClusterWorkers(pool, reopen, cache),
-                      allow=allow, overwrite=overwrite, finds=with_findings)  # fmt: skip
+    for reopen, path in zip(recordings, paths, strict=True):
+        build_map(reopen(), path, encoders, settings, cache=cache, workers=ClusterWorkers(pool, reopen, cache),
+                  allow=allow, overwrite=overwrite, finds=with_findings)  # fmt: skip
     return merge_in_turn([AVLMap.open(path) for path in paths], folder, out, overwrite=overwrite)
-
-
-def build_job(job: BuildJob) -> None:
-    """Build the map of one recording on a worker."""
-    host = socket.gethostname()
-    with silence_progress():
-        require_same_software(job.software, host)
-        if not job.token.is_file():
-            raise unseen(f"The worker on {host}", job.token.parent)
-        recording = reopened(job.reopen, host)
-        build_map(recording, job.path, job.models.encoders(), job.settings, cache=job.models.cache, allow=job.allow,
-                  overwrite=job.overwrite, finds=with_findings)  # fmt: skip
-
-
-def _build_each(
-    recordings: Sequence[Reopen],
-    paths: Sequence[Path],
-    encoders: Encoders,
-    pool: Pool,
-    settings: BuildSettings,
-    cache: CacheSettings,
-    allow: tuple[str, ...],
-    overwrite: bool,
-) -> None:
-    token = paths[0].parent.absolute() / f".cluster-{secrets.token_hex(8)}"
-    with explain_write_errors(token.parent):
-        token.parent.mkdir(parents=True, exist_ok=True)
-        token.touch()
-    try:
-        models, known = Models.of(encoders, cache), software()
-        jobs = [
-            BuildJob(reopen, path.absolute(), models, settings, allow, overwrite, known, token)
-            for reopen, path in zip(recordings, paths, strict=True)
-        ]
-        with closing(pool.run(build_job, jobs)) as results:
-            for _ in progress(results, "building", total=len(jobs), unit="recording"):
-                pass
-    finally:
-        token.unlink(missing_ok=True)
 
 
 def merge_in_turn(days: Sequence[AVLMap], scratch: Path, out: Path, *, overwrite: bool = False) -> AVLMap:
