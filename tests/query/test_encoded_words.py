@@ -17,12 +17,12 @@ def refuse(words: list[str]) -> Any:
 @pytest.mark.parametrize(
     ("gives", "said"),
     [
-        (lambda words: np.ones((1, 3)), r"gave \(1, 3\) for 2 words"),
+        (lambda words: np.ones((1, 3)), r"gave \(1, 3\), .* for 2 words"),
         (lambda words: np.ones(3), r"gave \(3,\)"),
-        (lambda words: np.full((len(words), 3), np.nan), "NaN or infinity"),
+        (lambda words: np.full((len(words), 3), np.nan), "lengths nan"),
         (refuse, "RuntimeError: out of memory"),
-        (lambda words: np.ones((len(words), 4)) / 2.0, r"gave \(2, 4\) for 2 words; its features have 3 numbers"),
-        (lambda words: 10.0 * np.eye(len(words), 3), "length 10 to 10; each has unit length"),
+        (lambda words: np.ones((len(words), 4)) / 2.0, r"gave \(2, 4\), .* a row of 3 numbers"),
+        (lambda words: 10.0 * np.eye(len(words), 3), "lengths 10 to 10"),
     ],
     ids=["one row", "no rows", "NaN", "fails", "other features", "long"],
 )

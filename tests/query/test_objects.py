@@ -91,7 +91,7 @@ def test_a_voxel_without_a_feature_is_nothing() -> None:
         found = asked_of(encoder, box((0, 0, 0), (3, 3, 3)), np.zeros((27, 2), np.float32), "chair")
         assert not found.mask.any()
         assert not found.found
-        assert found.note == "no voxel is closer to 'chair' than to other things"
+        assert found.note == "nothing that the map shows is like 'chair'"
 
 
 def test_what_is_other_is_not_the_object() -> None:
@@ -112,7 +112,7 @@ def test_a_speck_is_not_found() -> None:
     found = asked_of(encoder, box((0, 0, 0), (1, 1, 1)), encoder.encode_words(["chair"]), "chair")
     assert not found.found
     assert not found.mask.any()
-    assert found.note.startswith("the best of the 1 voxels closest to 'chair' make an instance of confidence 0.2")
+    assert found.note == "nothing that the map shows is like 'chair'"
 
 
 def test_specks_give_no_heat_beside_a_thing() -> None:

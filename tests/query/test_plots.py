@@ -15,7 +15,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.query.factors import NearThings
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.image import image_factor
-from avlmaps.query.plots import HEAT_LABEL, TopDown, aside, plot_map
+from avlmaps.query.plots import HEAT_LABEL, TopDown, aside, draw_map, save
 from avlmaps.query.settings import HeatSettings
 from avlmaps.query.voxel_space import Space
 
@@ -39,19 +39,19 @@ def test_a_product_has_a_panel_for_each_part_and_one_for_all(tmp_path: Path) -> 
 @pytest.mark.nightly
 def test_a_map_is_drawn_with_its_sounds(tmp_path: Path) -> None:
     stored = furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK))
-    assert colours_in(plot_map(stored, tmp_path / "map.png")) > 20
+    assert colours_in(save(draw_map(stored), tmp_path / "map.png")) > 20
 
 
 @pytest.mark.nightly
 def test_an_empty_map_can_be_drawn(tmp_path: Path) -> None:
     stored = fake_map(voxels_of(np.zeros((0, 3)), np.zeros((0, 4))), encoders=furnished_map().encoders)
-    assert plot_map(stored, tmp_path / "map.png").is_file()
+    assert save(draw_map(stored), tmp_path / "map.png").is_file()
     assert asked(stored).sound("dog").plot(tmp_path / "dog.png").is_file()
 
 
 def test_a_picture_of_an_unknown_kind_is_refused(tmp_path: Path) -> None:
     with pytest.raises(QueryError, match=r"^A picture cannot be written as 'x\.doc'; give it the suffix \.png, "):
-        plot_map(furnished_map(), tmp_path / "x.doc")
+        save(draw_map(furnished_map()), tmp_path / "x.doc")
 
 
 def test_the_colour_from_above_is_that_of_the_highest_voxels_under_the_ceiling() -> None:
@@ -131,9 +131,9 @@ def test_a_photo_that_is_only_guessed_is_no_certainty() -> None:
 def test_names_of_things_are_drawn_over_the_map(tmp_path: Path) -> None:
 
     opened = furnished_map()
-    plain = cv2.imread(str(plot_map(opened, tmp_path / "plain.png")))
-    again = cv2.imread(str(plot_map(opened, tmp_path / "again.png")))
-    named = cv2.imread(str(plot_map(opened, tmp_path / "named.png", opened.things(least_confidence=0.0))))
+    plain = cv2.imread(str(save(draw_map(opened), tmp_path / "plain.png")))
+    again = cv2.imread(str(save(draw_map(opened), tmp_path / "again.png")))
+    named = cv2.imread(str(save(draw_map(opened, opened.things(least_confidence=0.0)), tmp_path / "named.png")))
     assert (plain == again).all()
     assert 100 < (plain != named).any(axis=2).sum() < 0.05 * plain.shape[0] * plain.shape[1]
 

@@ -89,7 +89,7 @@ def test_ply_and_csv_say_their_frame(tmp_path: Path) -> None:
         np.testing.assert_allclose([[float(row[f"{axis}_m"]) for axis in "xyz"] for row in rows], expected, atol=6e-4)
 
 
-@pytest.mark.parametrize(("up", "frame"), [((0, 0, 1), "recording"), ((0, -1, 0), "recording"), ((1, 1, 1), "level")])
+@pytest.mark.parametrize(("up", "frame"), [((0, 0, 1), "recording"), ((0, -1, 0), "level"), ((1, 1, 1), "level")])
 def test_a_picture_has_one_frame_and_names_it(up: tuple[int, ...], frame: str) -> None:
     avlmap = tilted(up)
     assert picture_frame(avlmap.space) == frame

@@ -9,7 +9,8 @@ from walled_rooms import storeys_at, two_rooms
 from avlmaps.core.arrays import Float
 from avlmaps.perception.protocols import RoomContents, read_room_contents
 from avlmaps.query.floor_plan import FloorPlan
-from avlmaps.query.rooms import RoomField, ThingsInRooms, commonness, with_rooms
+from avlmaps.query.instances import with_rooms
+from avlmaps.query.rooms import RoomField, ThingsInRooms, commonness
 from avlmaps.query.settings import ObjectSettings, query_settings
 
 FURNISHED = read_room_contents()
@@ -25,7 +26,7 @@ def kitchen_and_bedroom(sure: float = 0.95) -> RoomField:
     left = np.zeros(len(plan), bool)
     left[plan.voxel_cells[middles[:, 0] < 3.0]] = True
     share = np.where(left[:, None], [[sure, 1.0 - sure]], [[1.0 - sure, sure]]).astype(np.float32)
-    return RoomField(plan, KINDS, share, np.ones(len(plan), np.float32))
+    return RoomField(plan, KINDS, share)
 
 
 def nats_left_and_right(name: str, field: RoomField) -> Float[np.ndarray, "2"]:

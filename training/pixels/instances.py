@@ -104,7 +104,7 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
     for name in encoder.vocabulary:
         if name in STRUCTURE:
             continue
-        found = confident_instances(voxels, EncodedWord.of_name(encoder, name)).instances
+        found = confident_instances(voxels, EncodedWord.of_name(encoder, name))
         count = found.voxel_count
         held = np.zeros(len(space.centres), bool)
         for thing in things:

@@ -144,7 +144,7 @@ def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]
 
 def plot_named(avlmap: "AVLMap", plot: Path) -> Path:
     """Draw a map with the names of its things and rooms, as far as its models are here."""
-    from avlmaps.query.plots import plot_map
+    from avlmaps.query.plots import draw_map, save
 
     models = avlmap.data.info.models
     things, rooms = [], []
@@ -153,7 +153,7 @@ def plot_named(avlmap: "AVLMap", plot: Path) -> Path:
         rooms = avlmap.rooms() if "views" in models else []
     except AvlmapsError as error:  # a map can be looked at without the models that made it
         say(f"note: the picture has no names: {error}")
-    return plot_map(avlmap, plot, things, rooms)
+    return save(draw_map(avlmap, things, rooms), plot)
 
 
 def describe_map(avlmap: "AVLMap") -> dict[str, Any]:

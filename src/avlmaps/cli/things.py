@@ -105,7 +105,7 @@ class Rooms(InFrame, MapVerb):
     """Draw a top-down view with the outline, name and area of each room into this picture."""
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
-        from avlmaps.query.plots import plot_map
+        from avlmaps.query.plots import draw_map, save
         from avlmaps.query.selection import MapLists
 
         doubts, rooms = avlmap.data.info.doubts, MapLists(avlmap).rooms(self.least)
@@ -113,7 +113,7 @@ class Rooms(InFrame, MapVerb):
         answer = shown_in(listed, self.frame, avlmap)
         if self.plot is not None:
             held = avlmap.rooms(self.least) if rooms else []
-            answer["plot"] = str(plot_map(avlmap, self.plot, rooms=held))
+            answer["plot"] = str(save(draw_map(avlmap, rooms=held), self.plot))
         return answer
 
     def lines(self, answer: Mapping[str, Any]) -> list[str]:

@@ -18,13 +18,14 @@ from avlmaps.core.wording import place_text, the_room
 from avlmaps.core.words import singulars_of
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.schema import AlternativeAnswer, PartOutcome, QueryAnswer, row_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from avlmaps.maps.storeys import Storeys
-    from avlmaps.query.schema import AlternativeAnswer, DayAnswer, PartOutcome, QueryAnswer, UsualAnswer
+    from avlmaps.query.schema import DayAnswer, UsualAnswer
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,19 +41,9 @@ class PartAnswer:
 
     def to_dict(self) -> "PartOutcome":
         """Return the part as the command line prints it."""
-        outcome: PartOutcome = {
-            "modality": str(self.part.modality),
-            "query": self.part.query,
-            "role": str(self.part.role),
-            "peak": self.peak,
-            "found": self.found,
-            "understood": self.understood,
-            "note": self.note,
-            "probability": self.probability,
-        }
-        if self.part.at == "source":
-            outcome["at"] = "source"
-        return outcome
+        part = self.part
+        at = part.at if part.at == "source" else None
+        return row_of(self, PartOutcome, modality=str(part.modality), query=part.query, role=str(part.role), at=at)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +58,7 @@ class Alternative:
     def to_dict(self) -> "AlternativeAnswer":
         """Return it as the command line prints it."""
         parts = ", ".join(part.query for part in self.question.parts)
-        goals = [goal.to_json() for goal in self.goals]
-        return {"query": parts, "probability": self.probability, "found": self.found, "goals": goals}
+        return row_of(self, AlternativeAnswer, query=parts, goals=[goal.to_json() for goal in self.goals])
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -121,36 +111,20 @@ class Answer:
 
     def to_dict(self) -> "QueryAnswer":
         """Return the answer with the keys of the contract; positions are in the frame that ``frame`` names."""
-        answer: QueryAnswer = {
-            "goals": [goal.to_json() for goal in self.goals],
-            "found": self.found,
-            "probability": self.probability,
-            "text": self.text,
-            "parts": [part.to_dict() for part in self.parts],
-            "elapsed_ms": self.elapsed_ms,
-            "frame": FRAME,
-            "level_from_recording": None if self.heat is None else self.heat.space.level_from_recording.tolist(),
-        }
+        goals = [goal.to_json() for goal in self.goals]
         if self.storeys is not None:
-            for goal in answer["goals"]:
+            for goal in goals:
                 goal["storey"] = int(self.storeys.of_places(np.array(goal["position"]))[0])
-        for goal, day in zip(answer["goals"], self.when, strict=False):
+        for goal, day in zip(goals, self.when, strict=False):
             goal["when"] = day
-        for goal, usual in zip(answer["goals"], self.usual, strict=False):
+        for goal, usual in zip(goals, self.usual, strict=False):
             goal["usual"] = usual
-        if self.count is not None:
-            answer["count"] = self.count
-        if self.alike > 1:
-            answer["alike"] = self.alike
-        if self.notes:
-            answer["notes"] = list(self.notes)
-        if self.alternatives:
-            answer["alternatives"] = [one.to_dict() for one in self.alternatives]
-        return answer
-
-    def to_json(self) -> "QueryAnswer":
-        """Return ``to_dict()``: the name that it had before."""
-        return self.to_dict()
+        return row_of(
+            self, QueryAnswer, goals=goals, parts=[part.to_dict() for part in self.parts], frame=FRAME,
+            level_from_recording=None if self.heat is None else self.heat.space.level_from_recording.tolist(),
+            plot=None, alike=self.alike if self.alike > 1 else None,
+            alternatives=[one.to_dict() for one in self.alternatives],
+        )  # fmt: skip
 
 
 WHICH = "Say which is meant, such as by what it is near."
@@ -173,16 +147,16 @@ def found_text(parts: Sequence[PartAnswer], goal: Goal, count: int | None = None
     if count is not None:
         text = f"Counted: {count}. The most likely is at {_likely(goal)}."
     elif len(alike) > 1:
-        places = " and ".join(f"at {place_of(one)}" for one in alike[:_MOST_NAMED])
+        places = " and ".join(f"at {place_text(one.position)}" for one in alike[:_MOST_NAMED])
         more = f" and {len(alike) - _MOST_NAMED} more" if len(alike) > _MOST_NAMED else ""
         known = f"{places}{more}, probability {alike[0].probability:.2f}"
         text = f"{len(alike)} places fit {in_words(spelt)} equally: {known}. {WHICH}"
     else:
         lead, sought = next(part for part in spelt if part.role is Role.PRIMARY), in_words(spelt)
         text = f"the most likely of {sought} is" if _is(lead) == "are" else f"{sought} is most likely"
-        text = _sentence(f"{text} at {_likely(goal)}")
+        text = sentence_of(f"{text} at {_likely(goal)}")
     halves = (one.note.split("; ")[0] for one in parts if one.note.startswith(UNDERSTOOD_ONLY))
-    return " ".join([text, *map(_sentence, halves)])
+    return " ".join([text, *map(sentence_of, halves)])
 
 
 def _spelt(one: PartAnswer) -> str:
@@ -192,7 +166,7 @@ def _spelt(one: PartAnswer) -> str:
 
 def placed(text: str, goal: Goal) -> str:
     """Return a sentence about a goal, with its place and probability."""
-    return _sentence(f"{text} at {_likely(goal)}")
+    return sentence_of(f"{text} at {_likely(goal)}")
 
 
 def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alternative | None) -> str:
@@ -212,7 +186,7 @@ def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alter
         what = "guess" if lead.part.at == "source" else _bare(lead.part)
         what = f"the best {what}" if _is(lead.part) == "is" else "the best of them"
         told.append(f"{what}{' anywhere' if told else ''} is at {_likely(best)}")
-    return _sentence("; ".join([why, ", and ".join(told)] if told else [why]))
+    return sentence_of("; ".join([why, ", and ".join(told)] if told else [why]))
 
 
 def _not_found(part: Part) -> str:
@@ -244,17 +218,13 @@ def _context_words(part: Part) -> str:
     return f"{part.relation or ('in' if part.modality is Modality.AREA else 'near')} {_named(part)}"
 
 
-def place_of(goal: Goal) -> str:
-    """Return the place of a goal in words, metres."""
-    return place_text(goal.position)
-
-
 def _likely(goal: Goal) -> str:
-    known = f"{place_of(goal)}, probability {goal.probability:.2f}"
+    known = f"{place_text(goal.position)}, probability {goal.probability:.2f}"
     if goal.spread is None:
         return known
     return f"{known}: it lies {goal.spread.around('there')}"
 
 
-def _sentence(text: str) -> str:
+def sentence_of(text: str) -> str:
+    """Return words as a sentence."""
     return f"{text[:1].upper()}{text[1:]}."

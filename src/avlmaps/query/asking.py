@@ -153,7 +153,9 @@ class _Asking:
     def but(self, **changes: object) -> "_Asking":
         return _Asking(self.avlmap, replace(self.asked, **changes))  # pyright: ignore[reportArgumentType]
 
-    def answer(self, kinds: "Sequence[_Kind]") -> Answer:
+    def answer(self, after: "_Kind | None" = None) -> Answer:
+        """Return the answer of the first kind of question that it is, of those after one."""
+        kinds = KINDS if after is None else KINDS[KINDS.index(after) + 1 :]
         return next(found for kind in kinds if (found := kind(self)) is not None)
 
 
@@ -168,13 +170,12 @@ def ask(avlmap: "AVLMap", asked: Asked) -> Answer:
     """
     begin, asking = time.perf_counter(), _Asking(avlmap, asked)
     place = None if asked.near is None else place_given(asked.near)
-    if place is None:
-        answer = asking.answer(KINDS)
-    elif asked.sentence.strip() and _read_list(asking) is not None:
-        answer = asking.answer(KINDS)
+    answer = asking.answer() if place is None else asking.but(top=MOST_GOALS).answer()
+    if place is not None and any(goal.name for goal in answer.goals):
+        answer = asking.answer()
         answer = replace(answer, notes=(*answer.notes, _OF_A_LIST))
-    else:
-        answer = nearest_first(avlmap, asking.but(top=MOST_GOALS).answer(KINDS), place, asked.top)
+    elif place is not None:
+        answer = nearest_first(avlmap, answer, place, asked.top)
     return on_storey(replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin)), avlmap.storeys)
 
 
@@ -231,7 +232,7 @@ def _of_storeys(asking: _Asking) -> Answer | None:
     if not said:
         return None
     return answer_on_storey(
-        asking.avlmap, said, asking.asked.top, lambda rest, top: asking.but(sentence=rest, top=top).answer(KINDS[1:])
+        asking.avlmap, said, asking.asked.top, lambda rest, top: asking.but(sentence=rest, top=top).answer(_of_storeys)
     )
 
 
@@ -241,7 +242,7 @@ def _of_both(asking: _Asking) -> Answer | None:
     from avlmaps.language.list_questions import said_both
 
     said = said_both(asking.asked.sentence)
-    return _together([asking.but(sentence=one).answer(KINDS[2:]) for one in said], asking.asked.top) if said else None
+    return _together([asking.but(sentence=one).answer(_of_both) for one in said], asking.asked.top) if said else None
 
 
 def _together(answers: Sequence[Answer], top: int) -> Answer:
@@ -273,7 +274,7 @@ def _of_sources(asking: _Asking) -> Answer | None:
     if (asking.asked.at or asking.avlmap.settings.sounds.at) is not None or not asks_for_source(asking.asked.sentence):
         return None
     why = no_sources(asking.avlmap)
-    answer = (asking if why else asking.but(at="source", at_by_words=True)).answer(KINDS[4:])
+    answer = (asking if why else asking.but(at="source", at_by_words=True)).answer(_of_sources)
     silent = answer.parts and not any(one.part.modality is Modality.SOUND for one in answer.parts)
     return answer if silent or not why else replace(answer, notes=(why, *answer.notes))
 

@@ -21,11 +21,8 @@ from avlmaps.perception.protocols import read_room_contents
 from avlmaps.query.findings import MapNames, MapRooms
 from avlmaps.query.heatmap import HeatCache, Heatmap
 from avlmaps.query.instances import Instances
-from avlmaps.query.modalities.area import area_factor
 from avlmaps.query.modalities.image import Attachment, Photo, image_factor, read_picture, require_fitting
 from avlmaps.query.modalities.sound import read_clip, require_audible, sound_factor, sound_features, source_factor
-from avlmaps.query.room_regions import RoomRegions
-from avlmaps.query.rooms import RoomField, Rooms, ThingsInRooms
 from avlmaps.query.settings import QuerySettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.whereabouts import Whereabouts, region_named
@@ -44,6 +41,8 @@ if TYPE_CHECKING:
     from avlmaps.query.editor import Editor
     from avlmaps.query.edits import Edited
     from avlmaps.query.locate import Located
+    from avlmaps.query.room_regions import RoomRegions
+    from avlmaps.query.rooms import RoomField, Rooms, ThingsInRooms
     from avlmaps.query.schema import ChangesAnswer, LastSeenAnswer
     from avlmaps.query.sound_sources import SoundSource, SourceMap
 
@@ -222,6 +221,8 @@ class AVLMap:
     @checked(QueryError)
     def area(self, word: str, primary: bool = False) -> Heatmap:
         """Return the heat of an area, such as a kitchen; or of one room by its number, such as bathroom 2."""
+        from avlmaps.query.modalities.area import area_factor
+
         part = Part(Modality.AREA, word, _role(primary))
         encoder = self.encoders.views
         self.require_model(Kind.VIEWS)
@@ -410,7 +411,7 @@ class AVLMap:
         With ``alone``, one of the encoder's names stands for itself, without the narrower ones that it takes in: then
         an armchair is no "chair".
         """
-        return self.edited.instances(self._names.search(word, alone).instances, word)
+        return self.edited.instances(self._names.search(word, alone), word)
 
     def closest_words(self) -> ClosestWords:
         """Return the two words of the encoder's vocabulary closest to each voxel; the first query works them out."""
@@ -446,12 +447,12 @@ class AVLMap:
             return [thing for thing, is_in in zip(found, inside, strict=True) if is_in]
         if at is not None:
             from avlmaps.query.changes import Days, things_at
-            from avlmaps.query.sound_sources import with_heard_then
+            from avlmaps.query.sound_sources import with_heard
 
             days = Days.of(self)
             found = things_at(self.space, days, at, names, least_confidence)
             every = found if names is None else things_at(self.space, days, at, None, least_confidence)
-            return with_heard_then(self, days.visit_of(at), found, every)
+            return with_heard(self, found, are_all=names is None, visit=days.visit_of(at), every=every)
         seen = names
         if names is not None and self.edited:
             seen = [name for name in names if self.sees(name)]
@@ -613,17 +614,17 @@ class AVLMap:
         return Whereabouts(self)
 
     @cached_property
-    def room_votes(self) -> Rooms | None:
+    def room_votes(self) -> "Rooms | None":
         """The votes on the kind of room of each place; None where the settings score keyframes instead."""
         return self._rooms.votes
 
     @cached_property
-    def room_regions(self) -> RoomRegions | None:
+    def room_regions(self) -> "RoomRegions | None":
         """The rooms that walls and doorways bound; None where there is no floor plan."""
         return self._rooms.regions
 
     @cached_property
-    def room_field(self) -> RoomField | None:
+    def room_field(self) -> "RoomField | None":
         """How likely each place is each kind of room that the view encoder knows or a person named.
 
         None where there are no votes.
@@ -634,18 +635,20 @@ class AVLMap:
         seen = self._rooms.field
         return None if seen is None else self._settled(seen)
 
-    def _settled(self, field: RoomField) -> RoomField:
+    def _settled(self, field: "RoomField") -> "RoomField":
         # A room is of one kind, and those that people named are so.
         assert self.room_regions is not None
         return self.edited.room_field(field.settled(self.room_regions, self._rooms.room_of_cells))
 
-    def _with_room(self, number: int, field: RoomField) -> RoomField:
+    def _with_room(self, number: int, field: "RoomField") -> "RoomField":
         # One room is a kind of its own behind all others.
         return self._settled(field).with_certain([("", self._rooms.room_of_cells == number)])
 
     @cached_property
-    def things_in_rooms(self) -> ThingsInRooms | None:
+    def things_in_rooms(self) -> "ThingsInRooms | None":
         """The evidence of rooms on the things in them; None for a map whose rooms are not known."""
+        from avlmaps.query.rooms import ThingsInRooms
+
         field = self._rooms.known_field
         return None if field is None else ThingsInRooms(field, read_room_contents())
 
@@ -671,12 +674,6 @@ class AVLMap:
     def __dir__(self) -> list[str]:
         """Return the names that a person uses; the others serve answers, lists and fronts."""
         return [name for name in super().__dir__() if not name.startswith("_") and name not in _INSIDE]
-
-    def to_open3d(self) -> Any:
-        """Return the voxels as an ``open3d.geometry.PointCloud``. ``BackendError``: open3d is not installed."""
-        from avlmaps.query.export import to_open3d
-
-        return to_open3d(self.points, self.colors)
 
     def to_trimesh(self) -> Any:
         """Return the voxels as a ``trimesh.PointCloud`` with colours."""

@@ -12,6 +12,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
 from avlmaps.core.wording import place_text, the_room
 from avlmaps.core.words import plural_of
+from avlmaps.query.schema import ChangeAnswer, LastSeenPlace, row_of
 from avlmaps.query.settings import FOUND_AT
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from avlmaps.maps.store.manifest import Visit
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Thing
-    from avlmaps.query.schema import ChangeAnswer, ChangesAnswer, DayAnswer, LastSeenAnswer, UsualAnswer
+    from avlmaps.query.schema import ChangesAnswer, DayAnswer, LastSeenAnswer, UsualAnswer
     from avlmaps.query.voxel_space import Space
 
 SOMETHING = "something"
@@ -142,20 +143,13 @@ def changes_answer(
         stay = one.stay(stays)
         before = None if one.before is None else stays[one.before]
         after = None if one.after is None else stays[one.after]
-        listed.append(
-            {
-                "kind": one.kind,
-                "name": stay.name if stay.confidence >= FOUND_AT else SOMETHING,
-                "confidence": stay.confidence,
-                "position": list(stay.position),
-                "from": None if before is None or after is None else list(before.position),
-                "room": room_of(stay.position),
-                "size": list(stay.size),
-                "noticed": when(days, one.visit),
-                "last_seen": when(days, stay.last, stay.last_seen_s),
-                "first_seen": when(days, stay.first if before is None else before.first),
-            }
-        )
+        listed.append(row_of(
+            stay, ChangeAnswer, kind=one.kind, name=stay.name if stay.confidence >= FOUND_AT else SOMETHING,
+            room=room_of(stay.position), noticed=when(days, one.visit),
+            last_seen=when(days, stay.last, stay.last_seen_s),
+            first_seen=when(days, stay.first if before is None else before.first),
+            **{"from": None if before is None or after is None else list(before.position)},
+        ))  # fmt: skip
     return {
         "map": name,
         "frame": FRAME,
@@ -176,15 +170,14 @@ def last_seen(days: Days, name: str, same: Callable[[str], bool], room_of: RoomO
         "frame": FRAME,
         "last_day": when(days, days.last),
         "seen": [
-            {
-                "name": stay.name,
-                "position": list(stay.position),
-                "room": room_of(stay.position),
-                "confidence": stay.confidence,
-                "last_seen": when(days, stay.last, stay.last_seen_s),
-                "gone": None if stay.gone is None else when(days, stay.gone),
-                "looked": when(days, stay.looked),
-            }
+            row_of(
+                stay,
+                LastSeenPlace,
+                room=room_of(stay.position),
+                last_seen=when(days, stay.last, stay.last_seen_s),
+                gone=None if stay.gone is None else when(days, stay.gone),
+                looked=when(days, stay.looked),
+            )
             for stay in own
         ],
     }
@@ -347,14 +340,9 @@ def usual_place_text(days: Days, name: str, found: Sequence[Usual], room_of: Roo
     if best.is_usual:
         text = f"The {name} is usually {at(best)}: on {best.counted} on which its place was looked at."
     elif all(one.there == 1 for one in found) and len(found) == 1:
-        day = _day_of(days, best.stay)
-        return f"The {name} was seen on 1 day only, {day}, {at(best)}; that says nothing of what is usual."
+        seen = f"The {name} was seen on 1 day only, {days.name(best.stay.first)}, {at(best)}"
+        return f"{seen}; that says nothing of what is usual."
     else:
         text = f"The {name} is nowhere usually; most often it was {at(best)}, on {best.counted}."
     others = [f"{at(one)} ({one.counted})" for one in found[1:4]]
     return text + (f" Also {'; '.join(others)}." if others else "")
-
-
-def _day_of(days: Days, stay: "Stay") -> str:
-    day: DayAnswer = when(days, stay.first)
-    return day["day"] or f"visit {day['visit']}"

@@ -18,10 +18,10 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME, plain_point
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
-from avlmaps.query.instances import Instances, Segmentation
+from avlmaps.query.instances import Instances
 from avlmaps.query.modalities.sound import sound_features
-from avlmaps.query.rooms import FEWEST_VIEWS, LEAST_PART
-from avlmaps.query.settings import FOUND_AT
+from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer, row_of
+from avlmaps.query.settings import FEWEST_VIEWS, FOUND_AT, LEAST_PART
 from avlmaps.query.voxel_space import middle_of
 
 if TYPE_CHECKING:
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.room_regions import RoomRegions
     from avlmaps.query.rooms import RoomField
-    from avlmaps.query.schema import ContentsAnswer, HeardFromAnswer, RoomAnswer, SoundAnswer, ThingAnswer
+    from avlmaps.query.schema import HeardFromAnswer
 
-Row = TypeVar("Row", "ThingAnswer", "SoundAnswer", "RoomAnswer")
+Row = TypeVar("Row", ThingAnswer, SoundAnswer, RoomAnswer)
 Watch = Callable[[str, int, int], object]
 """Is given a stage of work, the number of steps done, and of all."""
 
@@ -64,21 +64,7 @@ class Thing:
 
     def to_json(self) -> "ThingAnswer":
         """Return the thing as ``avlmaps things --json`` prints it."""
-        answer: ThingAnswer = {
-            "name": self.name,
-            "confidence": self.confidence,
-            "position": list(self.position),
-            "size": list(self.size),
-            "color": list(self.color),
-            "voxels": len(self.rows),
-        }
-        if self.edited:
-            answer["edited"] = self.edited
-        if self.heard:
-            answer["heard"] = list(self.heard)
-        if self.room is not None:
-            answer["room"] = self.room
-        return answer
+        return row_of(self, ThingAnswer, voxels=len(self.rows))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,14 +82,7 @@ class SoundEvent:
 
     def to_json(self) -> "SoundAnswer":
         """Return the sound as ``avlmaps things --json`` prints it."""
-        return {
-            "names": list(self.names),
-            "confidences": list(self.confidences),
-            "onset_s": self.onset_s,
-            "offset_s": self.offset_s,
-            "position": list(self.position),
-            "clip": self.clip.name,
-        }
+        return row_of(self, SoundAnswer, clip=self.clip.name)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,20 +105,9 @@ class Room:
 
     def to_json(self, own_name: str) -> "RoomAnswer":
         """Return the room as ``avlmaps rooms --json`` prints it, with a name that no other room of the map has."""
-        answer: RoomAnswer = {
-            "name": self.name,
-            "room": own_name,
-            "confidence": self.confidence,
-            "position": list(self.position),
-            "views": self.views,
-            "probability": self.confidence,
-            "names": [{"name": name, "probability": likely} for name, likely in self.names],
-            "area_m2": self.area_m2,
-            "outline": [[round(value, 3) for value in corner] for corner in self.outline.tolist()],
-        }
-        if self.edited:
-            answer["edited"] = self.edited
-        return answer
+        names = [{"name": name, "probability": likely} for name, likely in self.names]
+        outline = [[round(value, 3) for value in corner] for corner in self.outline.tolist()]
+        return row_of(self, RoomAnswer, room=own_name, probability=self.confidence, names=names, outline=outline)
 
     @property
     def polygon(self) -> Float[np.ndarray, "c 2"]:
@@ -164,18 +132,12 @@ class Contents:
 
     def to_json(self, name: str) -> "ContentsAnswer":
         """Return the contents as ``avlmaps things --json`` prints them, under a name for the map."""
-        answer: ContentsAnswer = {
-            "map": name,
-            "frame": FRAME,
-            "things": [thing.to_json() for thing in self.things],
-            "sounds": [sound.to_json() for sound in self.sounds],
-            "rooms": listed_rooms(self.rooms, self.storeys),
-        }
-        put_storeys(answer["things"], self.storeys)
-        put_storeys(answer["sounds"], self.storeys)
-        if self.doubts:
-            answer["notes"] = list(self.doubts)
-        return answer
+        return row_of(
+            self, ContentsAnswer, map=name, frame=FRAME, notes=self.doubts,
+            rooms=listed_rooms(self.rooms, self.storeys),
+            things=put_storeys([thing.to_json() for thing in self.things], self.storeys),
+            sounds=put_storeys([sound.to_json() for sound in self.sounds], self.storeys),
+        )  # fmt: skip
 
 
 def put_storeys(rows: list[Row], storeys: "Storeys | None") -> list[Row]:
@@ -217,7 +179,7 @@ def require_known(knows: Callable[[str], bool], names: Sequence[str]) -> None:
 
 def find_things(
     avlmap: "AVLMap",
-    search: Callable[[str, bool], Segmentation],
+    search: Callable[[str, bool], Instances],
     names: Sequence[str] | None = None,
     least_confidence: float = 0.5,
     structure: bool = False,
@@ -238,7 +200,7 @@ def find_things(
     claims: list[tuple[bool, float, int, str, Int[np.ndarray, " m"]]] = []
     for number, (name, alone) in enumerate(searches):
         watch("things", number, len(searches))
-        for confidence, rows in _confident(search(name, alone).instances, least_confidence):
+        for confidence, rows in _confident(search(name, alone), least_confidence):
             claims.append((not alone or confidence < FOUND_AT, -confidence, -len(rows), name, rows))
     owned = np.zeros(len(avlmap.space), bool)
     things: list[Thing] = []

@@ -21,11 +21,8 @@ from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import Edit, EditedSpot, World, in_force
 from avlmaps.query.factors import NearAnchors, NearThings
 from avlmaps.query.instances import Instances
-from avlmaps.query.modalities.area import same_place
 from avlmaps.query.modalities.object import colour_in, colour_share
-from avlmaps.query.rooms import RoomField
 from avlmaps.query.settings import FOUND_AT, HeatSettings
-from avlmaps.query.storey_grid import in_polygon
 from avlmaps.query.voxel_space import linked
 
 if TYPE_CHECKING:
@@ -33,6 +30,7 @@ if TYPE_CHECKING:
     from avlmaps.maps.store.life import Life
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Room, Thing
+    from avlmaps.query.rooms import RoomField
 
 _ALIKE_BOX = 0.2
 """Share of two boxes together that both hold: perhaps one thing. Chosen on maps of two simulated homes and four
@@ -177,6 +175,8 @@ class Edited:
         return [Claim(edit.name or first.name, rows, sure, bool(edit.name) or first.is_named, edit)]
 
     def _pieces(self, rows: Rows, edit: Edit) -> list[Rows]:
+        from avlmaps.query.storey_grid import in_polygon
+
         space, spot = self._map.space, edit.at[0]
         level = space.level(space.centres_of(rows))
         if edit.cut:
@@ -423,7 +423,7 @@ class Edited:
         share, name = max(named, default=(0.0, ""))
         return name if share >= _HALF else None
 
-    def room_field(self, field: RoomField) -> RoomField:
+    def room_field(self, field: "RoomField") -> "RoomField":
         """Return how likely each place is each kind of room, where people said so with certainty."""
         if not self.edits or not self.rooms:
             return field
@@ -462,6 +462,8 @@ class Edited:
         """Return who corrected what an answer is about, and when, in a sentence each."""
         if not self.edits:
             return ()
+        from avlmaps.query.modalities.area import same_place
+
         space, names, rooms = self._map.space, set(map(plain_name, named)), list(map(plain_name, areas))
         points = np.asarray(places, np.float64).reshape(-1, 1, 3)
 

@@ -9,14 +9,13 @@ import csv
 import io
 from collections.abc import Generator, Iterable, Sequence
 from contextlib import contextmanager, suppress
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int, UInt8
-from avlmaps.core.errors import BackendError, QueryError
+from avlmaps.core.errors import QueryError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.poses import FrameName
 from avlmaps.perception.embedded.colours import COLOURS, example_of
@@ -260,17 +259,6 @@ def write_table(
 
 def _millis(value: float) -> str:
     return f"{value:.3f}"
-
-
-def to_open3d(points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"]) -> Any:
-    """Return an ``open3d.geometry.PointCloud``. ``BackendError``: open3d is not installed."""
-    try:
-        open3d: Any = import_module("open3d")
-    except ImportError as fault:
-        raise BackendError("open3d is not installed; install it with: pip install open3d") from fault
-    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(np.asarray(points, np.float64)))
-    cloud.colors = open3d.utility.Vector3dVector(np.asarray(colors, np.float64) / 255.0)
-    return cloud
 
 
 @contextmanager

@@ -27,7 +27,6 @@ ROUNDING = 1e-6
 _FEW_PAIRS = 65_536
 # Pairs of a point and an anchor that are compared at once: some megabytes.
 _PAIRS = 1 << 18
-_SOME_POINTS = 16  # that are looked at together where there are more pairs than that
 
 
 class Factor(ABC):
@@ -98,8 +97,8 @@ class Factor(ABC):
         return self
 
     def for_product(self) -> "Factor":
-        """Return this factor as it counts in a product with others."""
-        return self
+        """Return this factor as it counts in a product: what is sought with its unsure instances."""
+        return self.include_uncertain() if self.part.role is Role.PRIMARY else self
 
     def include_uncertain(self) -> "Factor":
         """Return this factor with all that may be meant, however unsure."""
@@ -137,10 +136,6 @@ class NearThings(Factor):
     with_uncertain: "Callable[[], NearThings] | None" = None
     is_named: bool = True  # see ``Factor``
     flat: bool = field(default=False, init=False)
-
-    def for_product(self) -> "NearThings":
-        """Return the primary part with its uncertain instances; context stays with the confident ones."""
-        return self._with_uncertain if self.part.role is Role.PRIMARY else self
 
     def include_uncertain(self) -> "NearThings":
         """Return the same with its unsure instances."""
@@ -228,34 +223,12 @@ class NearAnchors(Factor):
         """Return the heat at any points."""
         heat = np.zeros(len(points_world))
         points, anchors = self.space.level(points_world)[:, :2], self.space.level(self.anchors)[:, :2]
-        if len(points) * len(anchors) > _PAIRS:
-            return _highest_cones(points, anchors, np.asarray(self.scores, np.float64), self.falloff_per_m)
         several = max(1, _PAIRS // max(len(anchors), 1))
         for a in range(0, len(points) if len(anchors) else 0, several):
             away = points[a : a + several, None] - anchors[None]
             cones = self.scores - self.falloff_per_m * np.hypot(away[..., 0], away[..., 1])
             heat[a : a + several] = np.maximum(cones.max(axis=1), 0.0)
         return heat
-
-
-def _highest_cones(
-    points: Float[np.ndarray, "m 2"],
-    anchors: Float[np.ndarray, "a 2"],
-    scores: Float[np.ndarray, " a"],
-    falloff_per_m: float,
-) -> Float[np.ndarray, " m"]:
-    from avlmaps.query.kernels import cone_heat, undominated
-
-    order = np.argsort(-scores, kind="stable")
-    order = order[undominated(np.ascontiguousarray(anchors[order]), scores[order], float(falloff_per_m))]
-    # Places that follow each other, as those of keyframes do, are one block.
-    starts = np.append(np.arange(0, len(points), _SOME_POINTS), len(points)).astype(np.int64)
-    heat, winner = np.zeros(len(points)), np.empty(len(points), np.int32)
-    cone_heat(
-        np.ascontiguousarray(points), starts, np.ascontiguousarray(anchors[order]), scores[order], float(falloff_per_m),
-        heat, winner, 0, len(starts) - 1,
-    )  # fmt: skip
-    return heat
 
 
 def product_of(factors: Sequence[Factor]) -> Float32[np.ndarray, " n"]:
@@ -341,18 +314,15 @@ def anchor_heat(
 ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
     """Return max over anchors of s − ε·d_xy, floored at 0, for every voxel, and which anchor was highest (−1: none).
 
-    Cones that lie under another everywhere are left out first; that changes nothing.
-
     ``anchors``: metres, world. ``scores``: s, in [0, 1]. ``among``: the voxels that are wanted; others have no heat.
     None: all.
     """
-    from avlmaps.query.kernels import cone_heat, undominated
+    from avlmaps.query.kernels import cone_heat
 
     order = np.argsort(-np.asarray(scores, np.float64), kind="stable")
-    ground = np.ascontiguousarray(space.level(np.asarray(anchors, np.float64).reshape(-1, 3))[:, :2])[order]
+    order = order[np.asarray(scores)[order] > 0.0]
+    ground = np.ascontiguousarray(space.level(np.asarray(anchors, np.float64).reshape(-1, 3))[order, :2])
     sorted_scores = np.asarray(scores, np.float64)[order]
-    keep = undominated(ground, sorted_scores, float(falloff_per_m))
-    ground, sorted_scores = ground[keep], sorted_scores[keep]
     blocks = space.blocks if among is None else space.blocks.chosen(among)
     horizontal = space.horizontal if among is None else space.horizontal_of(blocks)
     values, anchor = np.zeros(len(space), np.float32), np.full(len(space), -1, np.int32)
@@ -367,5 +337,5 @@ def anchor_heat(
         least=64,
     )
     values[blocks.order] = heat
-    anchor[blocks.order] = np.append(order[keep], -1).astype(np.int32)[winner]
+    anchor[blocks.order] = np.append(order, -1).astype(np.int32)[winner]
     return values, anchor

@@ -20,18 +20,15 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder, read_room_contents
 from avlmaps.query.factors import NearThings
-from avlmaps.query.floor_plan import FloorPlan
-from avlmaps.query.instances import FeatureVoxels, Instances, Segmentation, confident_instances
-from avlmaps.query.modalities.area import area_anchors, area_names, name_shares
+from avlmaps.query.instances import FeatureVoxels, Instances, confident_instances
 from avlmaps.query.modalities.object import object_factor
-from avlmaps.query.room_regions import RoomRegions
-from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, rooms_of_cells, voting_rows
-from avlmaps.query.settings import AreaSettings
-from avlmaps.query.storey_grid import StoreyGrid
-from avlmaps.query.words import Closest, ClosestWords, EncodedWord, Vocabulary, competes_whole
+from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary, competes_whole
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.floor_plan import FloorPlan
+    from avlmaps.query.room_regions import RoomRegions
+    from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms
 
 Findings = Mapping[str, np.ndarray]
 Search = tuple[str, bool]
@@ -39,6 +36,8 @@ Search = tuple[str, bool]
 _OF_INSTANCES = {
     "rows": np.int32, "instance": np.int32, "margin": np.float32, "score": np.float32, "confidence": np.float32,
 }  # fmt: skip
+
+
 _CLOSEST = ("best", "best_word", "second", "second_word")
 
 
@@ -48,94 +47,59 @@ def key_of(*ingredients: Any) -> np.ndarray:
     return np.frombuffer(hashlib.sha256(said).digest(), np.uint8)
 
 
-def _plan_key(plan: FloorPlan) -> np.ndarray:
+def _plan_key(plan: "FloorPlan") -> np.ndarray:
     return key_of(plan.wall.shape, plan.origin_m.tolist())
 
 
-def _known(findings: Findings, name: str, key: np.ndarray) -> bool:
-    return name in findings and np.array_equal(findings[name], key)
+def _to_store(part: str, key: np.ndarray, arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {f"{part}.key": key, **{f"{part}.{name}": array for name, array in arrays.items()}}
 
 
-def names_to_arrays(closest: Closest, key: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the two words closest to each voxel as arrays."""
-    return {"names.key": key, **{f"names.{name}": array for name, array in zip(_CLOSEST, closest, strict=True)}}
-
-
-def names_from(findings: Findings, key: np.ndarray) -> Closest | None:
-    """Return the two words closest to each voxel; None where other words were compared."""
-    if not _known(findings, "names.key", key):
+def _stored(findings: Findings, part: str, key: np.ndarray) -> dict[str, np.ndarray] | None:
+    # The arrays of a part by their names; None where they were found with something else.
+    if not np.array_equal(findings.get(f"{part}.key", ()), key):
         return None
-    best, best_word, second, second_word = (findings[f"names.{name}"] for name in _CLOSEST)
-    return best, best_word, second, second_word
+    return {name.removeprefix(f"{part}."): findings[name] for name in findings if name.startswith(f"{part}.")}
 
 
-def searches_to_arrays(searches: Mapping[Search, Segmentation], key: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the instances of names as arrays, those of one name after those of another."""
+def _searches_to_arrays(searches: Mapping[Search, Instances]) -> dict[str, np.ndarray]:
+    # The instances of one name after those of another.
+    found = [(len(one.rows), len(one)) for one in searches.values()]
     names = np.frombuffer(msgspec.json.encode(list(searches)), np.uint8)
-    found = [(len(one.instances.rows), len(one.instances), one.won, one.best) for one in searches.values()]
-    arrays = {"things.key": key, "things.names": names, "things.counts": np.array(found, np.float64).reshape(-1, 4)}
+    arrays: dict[str, np.ndarray] = {"names": names, "counts": np.array(found, np.int64).reshape(-1, 2)}
     for name, kind in _OF_INSTANCES.items():
-        parts = [np.asarray(getattr(one.instances, name), kind) for one in searches.values()]
-        arrays[f"things.{name}"] = np.concatenate([np.zeros(0, kind), *parts])
+        parts = [np.asarray(getattr(one, name), kind) for one in searches.values()]
+        arrays[name] = np.concatenate([np.zeros(0, kind), *parts])
     return arrays
 
 
-def searches_from(findings: Findings, key: np.ndarray) -> dict[Search, Segmentation]:
-    """Return the instances of names; none where they were found otherwise."""
-    if not _known(findings, "things.key", key):
-        return {}
-    names = msgspec.json.decode(findings["things.names"].tobytes(), type=list[Search])
-    counts, columns = findings["things.counts"], [findings[f"things.{name}"] for name in _OF_INSTANCES]
-    ends = np.cumsum(counts[:, :2].astype(np.int64), axis=0)
-    begins = ends - counts[:, :2].astype(np.int64)
-    found = dict[Search, Segmentation]()
-    for name, (row, first), (stop, last), (_, _, won, best) in zip(names, begins, ends, counts.tolist(), strict=True):
+def _searches_from(stored: Mapping[str, np.ndarray]) -> dict[Search, Instances]:
+    names = msgspec.json.decode(stored["names"].tobytes(), type=list[Search])
+    columns, ends = [stored[name] for name in _OF_INSTANCES], np.cumsum(stored["counts"], axis=0)
+    found = dict[Search, Instances]()
+    for name, (row, first), (stop, last) in zip(names, ends - stored["counts"], ends, strict=True):
         rows, instance, margin, score = (column[row:stop] for column in columns[:-1])
-        instances = Instances(rows, instance, margin, score, columns[-1][first:last])
-        found[name] = Segmentation(instances, int(won), best)
+        found[name] = Instances(rows, instance, margin, score, columns[-1][first:last])
     return found
 
 
-def regions_to_arrays(regions: RoomRegions) -> dict[str, np.ndarray]:
-    """Return the rooms of all storeys as arrays."""
-    arrays = {
-        "rooms.key": _plan_key(regions.plan),
-        "rooms.count": np.array([regions.count]),
-        "rooms.beside": regions.beside,
-    }
+def _regions_to_arrays(regions: "RoomRegions") -> dict[str, np.ndarray]:
+    arrays = {"count": np.array([regions.count]), "beside": regions.beside}
     for number, (grid, label) in enumerate(zip(regions.grids, regions.labels, strict=True)):
-        arrays[f"rooms.{number}.frame"] = np.array([grid.heading_rad, *grid.origin_m, grid.cell_m])
-        arrays[f"rooms.{number}.cells"] = np.stack([grid.wall, grid.free, grid.stood])
-        arrays[f"rooms.{number}.label"] = label
+        arrays[f"{number}.frame"] = np.array([grid.heading_rad, *grid.origin_m, grid.cell_m])
+        arrays[f"{number}.cells"] = np.stack([grid.wall, grid.free, grid.stood])
+        arrays[f"{number}.label"] = label
     return arrays
 
 
-def regions_from(findings: Findings, plan: FloorPlan) -> RoomRegions | None:
-    """Return the rooms of all storeys; None where they were found otherwise."""
-    if not _known(findings, "rooms.key", _plan_key(plan)):
-        return None
-    grids: list[StoreyGrid] = []
-    labels: list[Int[np.ndarray, "nx ny"]] = []
-    for number in range(len(plan.storeys)):
-        frame, cells, label = (findings[f"rooms.{number}.{name}"] for name in ("frame", "cells", "label"))
-        grids.append(StoreyGrid(float(frame[0]), frame[1:3], float(frame[3]), *cells))
-        labels.append(label)
-    return RoomRegions(plan, tuple(grids), tuple(labels), int(findings["rooms.count"][0]), findings["rooms.beside"])
+def _regions_from(stored: Mapping[str, np.ndarray], plan: "FloorPlan") -> "RoomRegions":
+    from avlmaps.query.room_regions import RoomRegions
+    from avlmaps.query.storey_grid import StoreyGrid
 
-
-def field_to_arrays(field: RoomField, settings: "AreaSettings") -> dict[str, np.ndarray]:
-    """Return the kinds of rooms as arrays."""
-    key = key_of(_plan_key(field.plan).tolist(), field.kinds, asdict(settings))
-    return {"kinds.key": key, "kinds.share": field.share, "kinds.views": np.ascontiguousarray(field.views)}
-
-
-def field_from(
-    findings: Findings, plan: FloorPlan, kinds: tuple[str, ...], settings: "AreaSettings"
-) -> RoomField | None:
-    """Return how likely each cell is each kind of room; None where that was found otherwise."""
-    if not _known(findings, "kinds.key", key_of(_plan_key(plan).tolist(), kinds, asdict(settings))):
-        return None
-    return RoomField(plan, kinds, findings["kinds.share"], findings["kinds.views"])
+    storeys = range(len(plan.storeys))
+    frames, cells, labels = ([stored[f"{n}.{name}"] for n in storeys] for name in ("frame", "cells", "label"))
+    grids = tuple(StoreyGrid(float(f[0]), f[1:3], float(f[3]), *held) for f, held in zip(frames, cells, strict=True))
+    return RoomRegions(plan, grids, tuple(labels), int(stored["count"][0]), stored["beside"])
 
 
 class MapNames:
@@ -152,10 +116,11 @@ class MapNames:
         voxels = self._feature_voxels(encoder, rivals, self._map.data.voxels.rgb)
         found = None
         if vocabulary is None:
-            found = self._known_searches.get((part.query, False)) or self._known_searches.get((part.query, True))
+            known = self._known_searches
+            found = known.get((part.query, False), known.get((part.query, True)))
         return object_factor(voxels, part, self._map.settings.heat, found)
 
-    def search(self, word: str, alone: bool) -> Segmentation:
+    def search(self, word: str, alone: bool) -> Instances:
         """Return the instances of a word; ``alone`` leaves out the narrower names that one of the encoder takes in."""
         known = self._known_searches.get((word, alone))
         if known is not None:
@@ -193,8 +158,10 @@ class MapNames:
         encoder = self._map.encoders.pixels
         self._map.require_model(Kind.PIXELS)
         vocabulary = Vocabulary.encoded(encoder, encoder.vocabulary)
-        closest = names_from(self._map.data.findings, key_of(vocabulary.digest)) if self._is_closed else None
-        return vocabulary if closest is None else vocabulary.with_closest(closest)
+        closest = _stored(self._map.data.findings, "names", key_of(vocabulary.digest)) if self._is_closed else None
+        if closest is None:
+            return vocabulary
+        return vocabulary.with_closest(tuple(closest[name] for name in _CLOSEST))  # pyright: ignore[reportArgumentType]
 
     @property
     def _feature(self) -> Float16[np.ndarray, "n d"]:
@@ -213,10 +180,11 @@ class MapNames:
         if not self._is_closed:
             return {}
         words = self.closest_words()
-        closest = words.best, words.best_word, words.second, words.second_word
+        closest = {name: getattr(words, name) for name in _CLOSEST}
         searches = searches_for([name for name in encoder.vocabulary if name not in STRUCTURE], encoder)
         things = {one: self.search(*one) for one in searches}
-        return names_to_arrays(closest, key_of(words.digest)) | searches_to_arrays(things, self._key_of_searches)
+        found = _to_store("names", key_of(words.digest), closest)
+        return found | _to_store("searches", self._key_of_searches, _searches_to_arrays(things))
 
     @property
     def _key_of_searches(self) -> np.ndarray:
@@ -224,9 +192,10 @@ class MapNames:
         return key_of(digest, asdict(self._map.settings.objects), asdict(self._map.settings.areas))
 
     @cached_property
-    def _known_searches(self) -> Mapping[tuple[str, bool], Segmentation]:
-        stored = self._map.data.findings
-        return searches_from(stored, self._key_of_searches) if stored else {}
+    def _known_searches(self) -> Mapping[tuple[str, bool], Instances]:
+        findings = self._map.data.findings
+        stored = _stored(findings, "searches", self._key_of_searches) if findings else None
+        return {} if stored is None else _searches_from(stored)
 
 
 class MapRooms:
@@ -236,12 +205,15 @@ class MapRooms:
         self._map, self._settings = avlmap, avlmap.settings.areas
 
     @cached_property
-    def votes(self) -> Rooms | None:
+    def votes(self) -> "Rooms | None":
         """The votes on the kind of room of each place.
 
         None where there is no floor plan: of a map without voxels or keyframes, or with kilometres of extent.
         """
         from avlmaps.maps.storeys import one_storey
+        from avlmaps.query.floor_plan import FloorPlan
+        from avlmaps.query.modalities.area import area_anchors
+        from avlmaps.query.rooms import Rooms
 
         settings, avlmap = self._settings, self._map
         if not len(avlmap.data.keyframes):
@@ -254,43 +226,52 @@ class MapRooms:
         return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms)
 
     @cached_property
-    def regions(self) -> RoomRegions | None:
+    def regions(self) -> "RoomRegions | None":
         """The rooms that walls and doorways bound; None where there is no floor plan."""
         votes = self.votes
         if votes is None:
             return None
-        known = regions_from(self._map.data.findings, votes.plan)
-        return self._seen_regions(votes) if known is None else known
+        known = _stored(self._map.data.findings, "rooms", _plan_key(votes.plan))
+        return self._seen_regions(votes) if known is None else _regions_from(known, votes.plan)
 
-    def _seen_regions(self, votes: Rooms) -> RoomRegions:
+    def _seen_regions(self, votes: "Rooms") -> "RoomRegions":
+        from avlmaps.query.room_regions import RoomRegions
+
         camera = self._map.data.rig.depth
         width_rad = 2.0 * float(np.arctan2(camera.width, 2.0 * camera.fx))
         return RoomRegions.of(votes.plan, np.asarray(self._map.data.keyframes.world_from_camera), width_rad)
 
     @cached_property
-    def field(self) -> RoomField | None:
-        """The same as the view encoder sees it."""
+    def field(self) -> "RoomField | None":
+        """How likely each cell of the floor plan is each kind of room, as the view encoder sees it."""
+        from avlmaps.query.modalities.area import area_names, name_shares
+        from avlmaps.query.rooms import RoomField
+
         votes = self.votes
         if votes is None:
             return None
         encoder = self._map.encoders.views
         self._map.require_model(Kind.VIEWS)
         kinds = area_names(encoder)
-        known = field_from(self._map.data.findings, votes.plan, kinds, self._settings)
+        known = _stored(self._map.data.findings, "kinds", self._key_of_kinds(votes, kinds))
         if known is not None:
-            return known
+            return RoomField(votes.plan, kinds, known["share"])
         return votes.field(kinds, name_shares(np.asarray(self._map.data.keyframes.view), encoder, self._settings))
 
+    def _key_of_kinds(self, votes: "Rooms", kinds: tuple[str, ...]) -> np.ndarray:
+        return key_of(_plan_key(votes.plan).tolist(), kinds, asdict(self._settings))
+
     @property
-    def known_field(self) -> RoomField | None:
+    def known_field(self) -> "RoomField | None":
         """The field; None where the map has no features of views, or those of another encoder."""
         try:
             return self.field
         except (BackendError, MapError):
             return None
 
-    def _voting_voxels(self) -> NamedVoxels | None:
+    def _voting_voxels(self) -> "NamedVoxels | None":
         # The voxels whose names vote on kinds of room; None where the map holds no probabilities of names.
+        from avlmaps.query.rooms import NamedVoxels, voting_rows
         from avlmaps.query.words import VoxelNamer
 
         try:
@@ -310,6 +291,9 @@ class MapRooms:
     @cached_property
     def room_of_cells(self) -> Int[np.ndarray, " c"]:
         """The number of the room of each cell of the floor plan."""
+        from avlmaps.query.modalities.area import area_anchors
+        from avlmaps.query.rooms import rooms_of_cells
+
         assert self.regions is not None
         return rooms_of_cells(self.regions, area_anchors(self._map.data.keyframes, self._settings))
 
@@ -317,6 +301,8 @@ class MapRooms:
         """Return the rooms and their kinds, for ``findings``; none where there is no floor plan."""
         if self.votes is None:
             return {}
-        found = regions_to_arrays(self._seen_regions(self.votes))
-        field = self.known_field
-        return found if field is None else found | field_to_arrays(field, self._settings)
+        plan, field = self.votes.plan, self.known_field
+        found = _to_store("rooms", _plan_key(plan), _regions_to_arrays(self._seen_regions(self.votes)))
+        if field is None:
+            return found
+        return found | _to_store("kinds", self._key_of_kinds(self.votes, field.kinds), {"share": field.share})

@@ -12,7 +12,7 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.maps.grid import index_ends
 from avlmaps.maps.storeys import Storeys
-from avlmaps.query.voxel_space import Space, connected
+from avlmaps.query.voxel_space import Space
 
 CELL_M = 0.2
 # Heights over the floor between which a wall is seen: over tables and sofas, below the heads of doors.
@@ -22,7 +22,6 @@ _GAP_M = 1.2  # unseen floor up to this width lies between seen floor
 # Share of a cell's mass that one step of the walk moves to each neighbour; it adds 2 x 0.24 cells² of variance an axis.
 _TO_NEIGHBOUR = 0.24
 _MOST_CELLS = 4_000_000
-_RINGS_CELLS = 8  # how far about a cell an open one is sought cell by cell; a tree finds those farther away
 _CHUNK = 1 << 17  # voxels, or shares of cells, that are worked on at once: they stay in the processor's cache
 
 
@@ -87,7 +86,7 @@ class FloorPlan:
         storey = self.storeys.of(level[:, 2])
         cell = np.floor((level[:, :2] - self.origin_m) / CELL_M)
         i, j = (np.clip(cell, 0, np.array(self.wall.shape[1:]) - 1)).astype(np.int64).T
-        return self._nearest_open(np.ravel_multi_index((storey, i, j), self.wall.shape))
+        return self._nearest_open[np.ravel_multi_index((storey, i, j), self.wall.shape)]
 
     def storeys_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return the storey of each point, counted from 0, the lowest."""
@@ -96,11 +95,7 @@ class FloorPlan:
     @cached_property
     def voxel_cells(self) -> Int[np.ndarray, " n"]:
         """The open cell nearest to each voxel of the map; see ``cells_of``."""
-        nearest = np.zeros(len(self), np.int64)
-        nearest[self.voxel_cell] = 1
-        held = np.flatnonzero(nearest)
-        nearest[held] = self._nearest_open(held)
-        return nearest[self.voxel_cell]
+        return self._nearest_open[self.voxel_cell]
 
     def nearest(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " c"]:
         """Return for each cell the point nearest to it, those of its own storey first; −1 where there are none."""
@@ -123,49 +118,18 @@ class FloorPlan:
         middles = self.origin_m + (np.stack([i, j], axis=1) + 0.5) * CELL_M
         return np.asarray(KDTree(middles).query(self.space.level(points_world)[:, :2])[1], np.int64)
 
-    def _nearest_open(self, cells: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        # The open cells nearest to cells on their storeys: themselves where they are open, or where none is. Walls are
-        # thin: most of their cells lie beside an open one, so rings of growing radius find it at once, and a query
-        # needs no OpenCV, which takes longer to load.
-        out = cells.copy()
-        left = np.flatnonzero(~self.open.reshape(-1)[cells])
-        storey, i, j = np.unravel_index(cells[left], self.wall.shape)
-        edge = _RINGS_CELLS
-        ringed = np.pad(self.open, ((0, 0), (edge, edge), (edge, edge)))
-        for di, dj in _rings(edge):
-            if not len(left):
-                return out
-            hit = ringed[storey, i + (di + edge), j + (dj + edge)]
-            out[left[hit]] = np.ravel_multi_index((storey[hit], i[hit] + di, j[hit] + dj), self.wall.shape)
-            left, storey, i, j = (one[~hit] for one in (left, storey, i, j))
-        for one, free in enumerate(self.open):
-            mine = storey == one
-            if mine.any() and free.any():
-                from scipy.spatial import KDTree
-
-                at = np.argwhere(free)
-                near = at[KDTree(at).query(np.c_[i, j][mine])[1]]
-                out[left[mine]] = np.ravel_multi_index((np.full(len(near), one), *near.T), self.wall.shape)
-        return out
-
     @cached_property
-    def _neighbours(self) -> Int[np.ndarray, "2 e"]:
-        cells = np.arange(len(self)).reshape(self.wall.shape)
-        free = self.open
-        pairs: list[Int[np.ndarray, "2 e"]] = []
-        for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[:, :, 1:], np.s_[:, :, :-1])):
-            both = free[one] & free[other]
-            pairs.append(np.stack([cells[one][both], cells[other][both]]))
-        return np.concatenate(pairs, axis=1)
+    def _nearest_open(self) -> Int[np.ndarray, " c"]:
+        # The open cell nearest to each cell on its storey: itself where it is open, or where none is.
+        from scipy.ndimage import distance_transform_edt
 
-    def regions(self, label: Int[np.ndarray, " c"]) -> Int[np.ndarray, " c"]:
-        """Return the number of the region of each cell: open cells of one label, each beside another of them.
-
-        Every cell of a wall is a region by itself.
-        """
-        a, b = self._neighbours
-        same = label[a] == label[b]
-        return connected(len(self), a[same], b[same])
+        number = np.arange(len(self)).reshape(self.wall.shape)
+        nearest = number.copy()
+        for storey, free in enumerate(self.open):
+            if free.any():
+                i, j = distance_transform_edt(~free, return_distances=False, return_indices=True)
+                nearest[storey] = number[storey][i, j]
+        return nearest.reshape(-1)
 
     def spread(self, mass: Float[np.ndarray, "c k"], sigma_m: float) -> Float32[np.ndarray, "c k"]:
         """Return what lies in each cell once all mass has walked about its floor for a while; none is lost.
@@ -209,23 +173,10 @@ def _ends(space: Space, places: Float[np.ndarray, "k 3"] | None) -> tuple[Int[np
 
 
 def _without_gaps(seen: Bool[np.ndarray, "s nx ny"]) -> Bool[np.ndarray, "s nx ny"]:
+    from scipy.ndimage import binary_closing
+
     reach = int(_GAP_M / 2 / CELL_M + 1e-3)
-    edge = ((0, 0), (reach, reach), (reach, reach))
-    grown = _grown(np.pad(seen, edge), reach)
-    return ~_grown(~np.pad(grown, edge), reach)[:, 2 * reach : -2 * reach, 2 * reach : -2 * reach] | seen
-
-
-def _grown(cells: Bool[np.ndarray, "s nx ny"], reach: int) -> Bool[np.ndarray, "s nx ny"]:
-    out = cells.copy()
-    _, nx, ny = cells.shape
-    for di, dj in _rings(reach):
-        out[:, max(di, 0) : nx + min(di, 0), max(dj, 0) : ny + min(dj, 0)] |= cells[
-            :, max(-di, 0) : nx + min(-di, 0), max(-dj, 0) : ny + min(-dj, 0)
-        ]
-    return out
-
-
-def _rings(reach: int) -> list[tuple[int, int]]:
-    span = range(-reach, reach + 1)
-    steps = [(di, dj) for di in span for dj in span if 0 < di * di + dj * dj <= reach * reach]
-    return sorted(steps, key=lambda step: step[0] ** 2 + step[1] ** 2)
+    edge = 2 * reach  # beyond the grid nothing is seen
+    i, j = np.ogrid[-reach : reach + 1, -reach : reach + 1]
+    disc = (i * i + j * j <= reach * reach)[None]
+    return binary_closing(np.pad(seen, ((0, 0), (edge, edge), (edge, edge))), disc)[:, edge:-edge, edge:-edge] | seen

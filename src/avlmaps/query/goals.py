@@ -29,11 +29,11 @@ from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.poses import plain_point
 from avlmaps.core.question import Modality
 from avlmaps.query.factors import Factor, NearAnchors, NearThings, lead_of
+from avlmaps.query.schema import GoalAnswer, row_of
 from avlmaps.query.voxel_space import boxes
 
 if TYPE_CHECKING:
     from avlmaps.maps.sources.candidates import Spread
-    from avlmaps.query.schema import GoalAnswer
 
 # Log-odds beyond these are no better known: a confidence of 0.98 and one of 0.998 are alike.
 _MOST_LOGIT = 4.0
@@ -163,19 +163,10 @@ class Goal:
 
     def to_json(self) -> "GoalAnswer":
         """Return the goal as the command line prints it."""
-        goal: GoalAnswer = {
-            "position": list(self.position),
-            "score": self.score,
-            "size": list(self.size),
-            "parts": dict(self.parts),
-            "probability": self.probability,
-        }
-        if self.name:
-            goal["name"] = self.name
-        if self.spread is not None:
-            goal["within_50_m"] = round(self.spread.within_50_m, 2)
-            goal["within_90_m"] = round(self.spread.within_90_m, 2)
-        return goal
+        around = {} if self.spread is None else {
+            "within_50_m": round(self.spread.within_50_m, 2), "within_90_m": round(self.spread.within_90_m, 2)
+        }  # fmt: skip
+        return row_of(self, GoalAnswer, parts=dict(self.parts), **around)
 
 
 @runtime_checkable

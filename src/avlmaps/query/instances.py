@@ -9,16 +9,19 @@ m.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float16, Float32, Int, UInt8
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
-from avlmaps.query.rooms import ThingsInRooms, with_rooms
 from avlmaps.query.settings import ObjectSettings
 from avlmaps.query.voxel_space import Space, boxes, connected, distinct, linked
 from avlmaps.query.words import EncodedWord, Scored, Vocabulary, is_open, scorer_of
+
+if TYPE_CHECKING:
+    from avlmaps.query.rooms import ThingsInRooms
 
 # The log-odds fall by this times ln of how many times too long an instance is: twice what they rise by with its area.
 _COST = 1.6
@@ -212,37 +215,25 @@ class FeatureVoxels:
     rooms: "Callable[[], ThingsInRooms | None]" = lambda: None
 
 
-@dataclass(frozen=True, slots=True)
-class Segmentation:
-    """The instances of a word that are confident enough to count, and what is known of the others."""
-
-    instances: Instances  # those that count
-    won: int  # how many voxels the word won
-    best: float  # highest confidence of all instances
-
-
-def confident_instances(voxels: FeatureVoxels, word: EncodedWord) -> Segmentation:
+def confident_instances(voxels: FeatureVoxels, word: EncodedWord) -> Instances:
     """Return the instances of a word that are confident by themselves."""
     scored = scorer_of(voxels.feature, voxels.encoder, voxels.rivals, word, voxels.settings)
     return segment(voxels, word, scored(1.0))
 
 
-def segment(
-    voxels: FeatureVoxels, word: EncodedWord, scored: Scored, confident: Segmentation | None = None
-) -> Segmentation:
+def segment(voxels: FeatureVoxels, word: EncodedWord, scored: Scored, confident: Instances | None = None) -> Instances:
     """Return the instances that scored voxels make up.
 
     With ``confident`` instances, those stay as they are, and uncertain ones of the other voxels come after them: weak
     voxels round a confident thing make it neither larger nor less likely.
     """
     space, settings = voxels.space, voxels.settings
-    won = int((scored.margin > 0.0).sum())
     if confident is None:
         least, counting = settings.least_confidence, threshold(scored)
     else:
-        least, counting = settings.least_in_company, threshold_in_company(voxels, scored, confident.instances.rows)
-    linked = score(voxels, word, link(space, counting, settings.link_m))
-    found = linked.only(linked.confidence >= least)
+        least, counting = settings.least_in_company, threshold_in_company(voxels, scored, confident.rows)
+    found = score(voxels, word, link(space, counting, settings.link_m))
+    found = found.only(found.confidence >= least)
     joined = join(space, found, settings.link_m, settings.join_m)
     if joined is not found:
         found = score(voxels, word, joined)
@@ -251,10 +242,7 @@ def segment(
     if pieces is not found:
         found = score(voxels, word, pieces, length_m)
         found = found.only(found.confidence >= least)
-    best = max(linked.best, found.best)
-    if confident is None:
-        return Segmentation(found, won, best)
-    return Segmentation(confident.instances.with_others(found), max(won, confident.won), max(best, confident.best))
+    return found if confident is None else confident.with_others(found)
 
 
 def threshold(scored: Scored) -> Scored:
@@ -304,6 +292,17 @@ def score(
         if nats is not None:
             confidence = with_rooms(confidence, settings.room_weight * nats, settings.room_cost).astype(np.float32)
     return replace(found, confidence=confidence)
+
+
+def with_rooms(
+    confidence: Float[np.ndarray, " i"], nats: Float[np.ndarray, " i"], cost: float
+) -> Float[np.ndarray, " i"]:
+    """Return confidences after the evidence of rooms: their log-odds raised by it, less a cost.
+
+    ``confidence``: of each instance, in [0, 1]. ``nats``: evidence for each, times its weight.
+    """
+    odds = np.exp(nats - cost)
+    return confidence * odds / np.maximum(1.0 - confidence + confidence * odds, 1e-12)
 
 
 def join(space: Space, found: Instances, link_m: float, join_m: float) -> Instances:

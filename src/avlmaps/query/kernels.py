@@ -17,29 +17,6 @@ _WIDE_M = 1.6
 
 
 @njit(cache=True, nogil=True)
-def undominated(horizontal: Float64[np.ndarray, "n 2"], score: Float64[np.ndarray, " n"], falloff_per_m: Real):
-    """Mark the cones that stick out somewhere; rows must come in falling score.
-
-    Cone j lies under cone i everywhere if s_j <= s_i − ε·d(i, j). That relation carries over, so it is enough
-    to compare with the cones selected before.
-    """
-    keep, kept, count = np.zeros(len(score), np.bool_), np.empty(len(score), np.int64), 0
-    for j in range(len(score)):
-        hidden = score[j] <= 0.0
-        k = 0
-        while k < count and not hidden:
-            i = kept[k]
-            dx, dy = horizontal[j, 0] - horizontal[i, 0], horizontal[j, 1] - horizontal[i, 1]
-            hidden = falloff_per_m * falloff_per_m * (dx * dx + dy * dy) <= (score[i] - score[j]) ** 2
-            k += 1
-        if not hidden:
-            keep[j] = True
-            kept[count] = j
-            count += 1
-    return keep
-
-
-@njit(cache=True, nogil=True)
 def _cones_near(
     x: Real,
     y: Real,

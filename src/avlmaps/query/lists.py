@@ -16,14 +16,14 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Question
 from avlmaps.core.registry import Kind
-from avlmaps.core.wording import the_room
+from avlmaps.core.wording import place_text, the_room
 from avlmaps.core.words import stem_of
 from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.language.names import sounding_forms
 from avlmaps.language.said_places import SaidStorey
 from avlmaps.maps.storeys import Storeys, said_storeys
 from avlmaps.query import changes
-from avlmaps.query.answer import Alternative, Answer, in_words, place_of, placed
+from avlmaps.query.answer import Alternative, Answer, in_words, placed, sentence_of
 from avlmaps.query.changes import ChangeKind, Days
 from avlmaps.query.edits import means
 from avlmaps.query.goals import Goal
@@ -448,15 +448,15 @@ def answer_on_storey(
 
 def _no_such(storeys: Storeys | None, word: SaidStorey, notes: tuple[str, ...], whole: Answer | None) -> Answer:
     whole = whole or Answer((), False, (), 0.0)
-    holds = _sentence(said_storeys(storeys).replace("it", "the map", 1))
-    guess = f"; without that the best guess is at {place_of(whole.goals[0])}" if whole.goals else ""
-    text = f"{holds}, so that nothing is known to be {at_storey(word)}{guess}."
+    holds = said_storeys(storeys).replace("it", "the map", 1)
+    guess = f"; without that the best guess is at {place_text(whole.goals[0].position)}" if whole.goals else ""
+    text = sentence_of(f"{holds}, so that nothing is known to be {at_storey(word)}{guess}")
     count = None if whole.count is None else 0
     return replace(whole, found=False, probability=0.0, count=count, notes=(*notes, *whole.notes), text=text)
 
 
 def _list(word: SaidStorey, goals: Sequence[Goal]) -> str:
-    return f"{_sentence(at_storey(word))}: {counted([goal.name for goal in goals])}."
+    return sentence_of(f"{at_storey(word)}: {counted([goal.name for goal in goals])}")
 
 
 def _restricted(
@@ -488,10 +488,11 @@ def _absent(whole: Answer, word: SaidStorey, here: Sequence[Goal], storeys: Stor
     what = in_words([one.part for one in whole.parts]).removeprefix("the ")
     text = f"No {what} is found {at_storey(word)}"
     if here:
-        text += f"; the best guess there is at {place_of(here[0])}, probability {here[0].probability:.2f}"
+        text += f"; the best guess there is at {place_text(here[0].position)}, probability {here[0].probability:.2f}"
     if whole.found and storeys is not None:
         name = storeys[_storey(storeys, whole.goals[0])].name
-        text += f"; one is found on the {name} at {place_of(whole.goals[0])}, probability {whole.probability:.2f}"
+        at = place_text(whole.goals[0].position)
+        text += f"; one is found on the {name} at {at}, probability {whole.probability:.2f}"
     return f"{text}."
 
 
@@ -528,7 +529,3 @@ def at_storey(word: SaidStorey) -> str:
     """Return the words for being on a storey: "upstairs", "on the first floor", "not on the first floor"."""
     at = word.said if word.above is not None and "stairs" in word.said else f"on the {word.said}"
     return f"not {at}" if word.isnt else at
-
-
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}"

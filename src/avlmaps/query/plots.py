@@ -126,7 +126,6 @@ _COLOURMAP = "inferno"
 HEAT_LABEL = "heat × confidence"
 _PANEL_M = 4.6
 _DPI = 130
-_ALONG = 0.999999  # cosine: over 20 m such an axis is off by less than 3 cm
 
 
 def draw_heat(
@@ -175,24 +174,19 @@ def png_of(figure: "Figure") -> bytes:
     return written.getvalue()
 
 
-def plot_map(stored: "AVLMap", path: Path | str, things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = ()) -> Path:
-    """Write a top-down picture of a map, with the camera's path, the sounds, and the names of things and rooms.
-
-    ``things``: get their names; of more than ``MOST_NAMES`` those that cover most ground. ``QueryError``: the picture
-    cannot be written there.
-    """
-    return save(draw_map(stored, things, rooms), path)
-
-
 def draw_map(
-    stored: "AVLMap", things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = (), title: str | None = None
+    avlmap: "AVLMap", things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = (), title: str | None = None
 ) -> "Figure":
-    """Draw a map as ``plot_map`` does; by default its title is the folder's name."""
-    space = Space(stored.data.grid, stored.data.voxels.index, stored.data.up_in_world, stored.data)
+    """Draw a map top-down, with the camera's path, the sounds, and the names of things and rooms.
+
+    ``things``: get their names; of more than ``MOST_NAMES`` those that cover most ground. ``title``: by default the
+    folder's name.
+    """
+    space = Space(avlmap.data.grid, avlmap.data.voxels.index, avlmap.data.up_in_world, avlmap.data)
     view = TopDown.of(space)
     figure, axes = panels(view, 1)
     draw_ground(axes[0], view, space)
-    sounds = stored.data.sounds
+    sounds = avlmap.data.sounds
     for k in range(len(sounds)):
         track = space.level(sounds.track[sounds.track_offsets[k] : sounds.track_offsets[k + 1]])
         axes[0].plot(*track[:, :2].T, color=_SOUND, linewidth=5, alpha=0.45, solid_capstyle="round")
@@ -200,7 +194,7 @@ def draw_map(
     if len(sounds):
         axes[0].plot([], [], color=_SOUND, linewidth=5, alpha=0.45, label="sound position, with the time")
     _draw_names(axes[0], space, things, rooms)
-    name = plot_text(Path(stored.path).name) if title is None else title
+    name = plot_text(Path(avlmap.path).name) if title is None else title
     axes[0].set_title(
         f"{name}: {len(space):,} voxels, {len(sounds)} sounds", fontsize=10, color=INK, loc="left", fontweight="bold"
     )
@@ -263,45 +257,14 @@ def draw_ground(ax: "Axes", view: TopDown, space: Space, with_walk: bool = True)
 
 
 def _name_axes(ax: "Axes", space: Space) -> None:
-    # Name the axes so that their numbers are true. Where both axes of the picture are the recording's, they carry those
-    # names and numbers; else they are axes of the level frame, and arrows show where the recording's axes point.
-    names = [recording_axis(row) for row in space.level_from_world[:2]]
-    if picture_frame(space) is FrameName.LEVEL:
-        names = [None, None]  # the picture has one frame
-    for axis, name, level in zip((ax.xaxis, ax.yaxis), names, "xy", strict=True):
-        if name is None:
-            axis.set_label_text(f"{level} of the level frame (m)", fontsize=8, color=INK)
-            continue
-        letter, sign = name
-        axis.set_label_text(f"{letter} (m), frame: {FRAME}", fontsize=8, color=INK)
-        if sign < 0:
-            axis.set_major_formatter(lambda value, _: f"{-value:g}")
-    if None in names:
-        _draw_recording_axes(ax, space)
+    at = f"(m), frame: {FRAME}" if space.is_level else "of the level frame (m)"
+    ax.set_xlabel(f"x {at}", fontsize=8, color=INK)
+    ax.set_ylabel(f"y {at}", fontsize=8, color=INK)
 
 
 def picture_frame(space: Space) -> FrameName:
-    """Return the frame of a top-down picture: the recording's where its axes run along the picture's, else level."""
-    along = [recording_axis(row) for row in space.level_from_world[:2]]
-    return FrameName.LEVEL if None in along else FrameName.RECORDING
-
-
-def recording_axis(direction: Float[np.ndarray, "3"]) -> tuple[str, int] | None:
-    """Return the name and the sign of the recording's axis that a direction runs along; None for no such axis."""
-    largest = int(np.argmax(np.abs(direction)))
-    return None if abs(direction[largest]) < _ALONG else ("xyz"[largest], 1 if direction[largest] > 0 else -1)
-
-
-def _draw_recording_axes(ax: "Axes", space: Space) -> None:
-    for column, letter in enumerate("xyz"):
-        right, up = (float(value) for value in space.level_from_world[:2, column])
-        if np.hypot(right, up) < 0.3:
-            continue
-        start, end = (0.1, 0.1), (0.1 + 0.07 * right, 0.1 + 0.07 * up)
-        style = {"arrowstyle": "->", "color": INK, "linewidth": 1.0}
-        ax.annotate("", xy=end, xytext=start, xycoords="axes fraction", textcoords="axes fraction", arrowprops=style)
-        place = 0.1 + 0.1 * right, 0.1 + 0.1 * up
-        ax.text(*place, letter, transform=ax.transAxes, fontsize=7, color=INK, ha="center", va="center")
+    """Return the frame of a top-down picture: the recording's where that is level, else the level one."""
+    return FrameName.RECORDING if space.is_level else FrameName.LEVEL
 
 
 def _draw_heat(ax: "Axes", view: TopDown, values: Float32[np.ndarray, " n"]) -> None:

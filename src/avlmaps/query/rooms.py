@@ -15,7 +15,7 @@ from avlmaps.perception.protocols import RoomContents
 from avlmaps.query.factors import NearAnchors, NearThings
 from avlmaps.query.floor_plan import CELL_M, FloorPlan
 from avlmaps.query.room_regions import NONE, RoomRegions
-from avlmaps.query.settings import FOUND_AT, RoomSettings
+from avlmaps.query.settings import FEWEST_VIEWS, FOUND_AT, LEAST_PART, RoomSettings
 
 # A kind of room in which a thing was never counted holds it as often as this share of the mean of all kinds.
 _ELSEWHERE = 0.1
@@ -112,9 +112,7 @@ _PASSAGES = ("hallway", "corridor", "entrance hall", "staircase")
 _PASSAGE_ODDS = (0.2, 0.2, 0.4, 1.0)
 _LEAST_SHARE = 0.003  # no view rules a kind of room out by more than this
 _LOOKS = 2.0  # looks that agree count as so many independent ones
-FEWEST_VIEWS = 2
-"""A room is listed where at least this many keyframes show it."""
-LEAST_PART, _LEAST_PART_M2 = 0.2, 1.0  # of an open plan's floor
+_LEAST_PART_M2 = 1.0  # of an open plan's floor
 _OPEN = ("kitchen", "living room", "dining room", "office", "reception")  # kinds that may be parts of an open plan
 
 
@@ -136,8 +134,6 @@ class RoomField:
     plan: FloorPlan  # the cells
     kinds: tuple[str, ...]  # kinds of room
     share: Float32[np.ndarray, "c n"]  # of each cell; rows add up to 1
-    # Number of views that vote there, each by its nearness in [0, 1]; more between walls that reflect it.
-    views: Float32[np.ndarray, " c"]
     rooms: "tuple[RoomRegions, Int[np.ndarray, ' c']] | None" = None  # once settled, and the room of each cell
 
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float32[np.ndarray, "m n"]:
@@ -181,10 +177,6 @@ class RoomField:
         ``weights``: how much each kind is meant, in [0, 1].
         """
         return np.clip(self.share @ weights, 0.0, 1.0).astype(np.float32)
-
-    def of_voxels(self, weights: Float[np.ndarray, " n"]) -> Float32[np.ndarray, " v"]:
-        """Return the same for every voxel of the map."""
-        return self.of_cells(weights)[self.plan.voxel_cells]
 
     def of_rooms(self, regions: RoomRegions) -> Float[np.ndarray, "r n"]:
         """Return which share of each room's floor is of each kind; rows add up to 1."""
@@ -296,7 +288,7 @@ class Rooms:
         logits = np.clip(views, 1.0, settings.view_weight) * np.log(mean + _LEAST_SHARE) + self.thing_votes(kinds)
         raised = np.exp(logits - logits.max(axis=1, keepdims=True))
         likely = (raised / raised.sum(axis=1, keepdims=True)).astype(np.float32)
-        return RoomField(self.plan, tuple(kinds), likely, views[:, 0])
+        return RoomField(self.plan, tuple(kinds), likely)
 
     def thing_votes(self, kinds: Sequence[str]) -> Float32[np.ndarray, "c n"]:
         """Return by how much, in nats, the things near each cell speak for each kind of room."""
@@ -351,15 +343,11 @@ class InRooms(NearAnchors):
         self, among: Bool[np.ndarray, " n"] | None = None
     ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
         """Return the heat, and the anchor nearest to each voxel on its storey."""
-        plan, nearest = self.kinds.plan, self._nearest
-        if among is None:
-            heat = self.kinds.of_voxels(self.weights)
-            return heat, np.where(heat > 0.0, nearest[plan.voxel_cells], -1)
-        heat, anchor = np.zeros(len(among), np.float32), np.full(len(among), -1, np.int64)
-        rows = np.flatnonzero(among)
-        cells = plan.voxel_cells[rows]
-        heat[rows] = self.kinds.of_cells(self.weights)[cells]
-        anchor[rows] = np.where(heat[rows] > 0.0, nearest[cells], -1)
+        cells = self.kinds.plan.voxel_cells
+        rows = np.arange(len(cells)) if among is None else np.flatnonzero(among)
+        heat, anchor = np.zeros(len(cells), np.float32), np.full(len(cells), -1, np.int64)
+        heat[rows] = self.kinds.of_cells(self.weights)[cells[rows]]
+        anchor[rows] = np.where(heat[rows] > 0.0, self._nearest[cells[rows]], -1)
         return heat, anchor
 
     @cached_property
@@ -419,14 +407,3 @@ class ThingsInRooms:
         if nats is None:
             return None
         return np.log(np.maximum(self._field.share @ np.exp(nats), 1e-9)).astype(np.float32)
-
-
-def with_rooms(
-    confidence: Float[np.ndarray, " i"], nats: Float[np.ndarray, " i"], cost: float
-) -> Float[np.ndarray, " i"]:
-    """Return confidences after the evidence of rooms: their log-odds raised by it, less a cost.
-
-    ``confidence``: of each instance, in [0, 1]. ``nats``: evidence for each, times its weight.
-    """
-    odds = np.exp(nats - cost)
-    return confidence * odds / np.maximum(1.0 - confidence + confidence * odds, 1e-12)

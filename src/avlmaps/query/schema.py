@@ -7,7 +7,7 @@ OpenAPI document and the schemas of its agent tools from the same types. Positio
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict, TypeVar, cast
 
 from msgspec import Meta
 
@@ -15,6 +15,23 @@ from avlmaps.core.poses import FRAME
 
 if TYPE_CHECKING:
     from avlmaps.query.locate import Located
+
+T = TypeVar("T")
+
+
+def row_of(value: object, schema: type[T], **given: Any) -> T:
+    """Return a value as a JSON object of a schema: its attributes by the schema's keys, or what is given for a key.
+
+    Tuples become lists. What is None or empty is left out where the schema does not require it.
+    """
+    row: dict[str, Any] = {}
+    optional: frozenset[str] = cast(Any, schema).__optional_keys__
+    for key in cast(Any, schema).__annotations__:
+        one = given[key] if key in given else getattr(value, key, None)
+        if key not in optional or not (one is None or (isinstance(one, str | tuple | list) and not one)):
+            row[key] = list(cast("tuple[Any, ...]", one)) if isinstance(one, tuple) else one
+    return cast(T, row)
+
 
 Position = Annotated[list[float], Meta(min_length=3, max_length=3, description="x, y, z in metres, recording frame")]
 Size = Annotated[

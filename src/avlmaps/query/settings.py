@@ -17,6 +17,10 @@ from avlmaps.maps.settings import DEFAULTS, BuildSettings
 # From this probability on a query is found (``QuerySettings.found_at``), and a part of it by itself: an instance, a
 # sound, a view, the place of a photo.
 FOUND_AT = 0.5
+FEWEST_VIEWS = 2
+"""A room is listed where at least this many keyframes show it."""
+LEAST_PART = 0.2
+"""A kind of room is a part of an open plan from this share of its floor on."""
 
 
 @dataclass(frozen=True, slots=True)

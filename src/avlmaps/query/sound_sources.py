@@ -15,18 +15,20 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.poses import plain_point
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
 from avlmaps.maps.sources.candidates import CandidateGrid, Density, Spread, log_same_place
 from avlmaps.maps.sources.correlation import SourceSettings
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.contents import Thing
+from avlmaps.query.schema import SourceAnswer, row_of
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.manifest import Visit
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.schema import HeardFromAnswer, SourceAnswer
+    from avlmaps.query.schema import HeardFromAnswer
 
 _MAKERS_SHARE = 0.5  # probability that a sound comes from a thing that usually makes it, where there is one
 _AT_THING_M = 0.4
@@ -35,12 +37,12 @@ _MOST_HEARD, _LEAST_HEARD = 3, 0.1  # sounds of one thing
 _BELOW_THE_BEST = 0.999
 
 
-def unknown_sources(stored: "AVLMap") -> str:
+def unknown_sources(avlmap: "AVLMap") -> str:
     """Return why a map does not know where sounds came from, and what to do."""
-    what = f"{stored.path.name} does not know where sounds came from, only where the robot was"
-    if stored.data.sources_wait:
-        return f"Where the sounds came from is not found yet, {stored.data.sources_wait} wait; ask again in a moment."
-    if stored.data.info.visits:
+    what = f"{avlmap.path.name} does not know where sounds came from, only where the robot was"
+    if avlmap.data.sources_wait:
+        return f"Where the sounds came from is not found yet, {avlmap.data.sources_wait} wait; ask again in a moment."
+    if avlmap.data.info.visits:
         return (
             f"{what}: it is of several days, and not all of them say where the microphones are, or they have other "
             f"microphones. Build each day's map with their places ({option('microphones', 'FILE')}) and merge them "
@@ -52,11 +54,11 @@ def unknown_sources(stored: "AVLMap") -> str:
     )
 
 
-def no_sources(stored: "AVLMap") -> str:
+def no_sources(avlmap: "AVLMap") -> str:
     """Return why the robot's place stands for the source of a sound; "" where the map knows sources, or no sound."""
-    if stored.data.sources is not None or not len(stored.data.sounds):
+    if avlmap.data.sources is not None or not len(avlmap.data.sounds):
         return ""
-    return f"The place is where the robot was when it heard it: {unknown_sources(stored)}"
+    return f"The place is where the robot was when it heard it: {unknown_sources(avlmap)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,24 +84,9 @@ class SoundSource:
 
     def to_json(self) -> "SourceAnswer":
         """Return the source as ``avlmaps sources --json`` prints it."""
-        return {
-            "name": self.name,
-            "confidence": round(self.confidence, 3),
-            "probability": round(self.probability, 3),
-            "position": [round(value, 3) for value in self.position],
-            "within_50_m": round(self.within_50_m, 2),
-            "within_90_m": round(self.within_90_m, 2),
-            "area_50_m2": round(self.area_50_m2, 2),
-            "area_90_m2": round(self.area_90_m2, 2),
-            "rooms": [{"name": name, "probability": round(share, 3)} for name, share in self.rooms],
-            "things": [
-                {"name": name, "position": [round(value, 3) for value in place], "probability": round(share, 3)}
-                for name, place, share in self.things
-            ],
-            "sounds": list(self.events),
-            "moving": self.moving,
-            "microphones": self.microphones,
-        }
+        things = [{"name": name, "position": list(place), "probability": share} for name, place, share in self.things]
+        rooms = [{"name": name, "probability": share} for name, share in self.rooms]
+        return row_of(self, SourceAnswer, rooms=rooms, things=things, sounds=list(self.events))
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,52 +273,32 @@ class _Places:
     """Names the rooms and things of places in a map."""
 
     def __init__(self, avlmap: "AVLMap") -> None:
-        self._map = avlmap
-
-    @cached_property
-    def _rooms(self):
-        return self._map.where
-
-    @cached_property
-    def _things(self) -> "list[Thing]":
-        return self._map.things() if self._map.has(Kind.PIXELS) else []
+        self._rooms = avlmap.where
+        self._things = avlmap.things() if avlmap.has(Kind.PIXELS) else []
 
     def described(self, known: SourceMap, joined: Joined, kind: str, confidence: float) -> SoundSource:
         """Return a source with its region, rooms and things."""
-        x, y, z = known.position_of(joined).tolist()
-        density = joined.density
+        spread = joined.density.spread
         return SoundSource(
-            name=kind,
-            confidence=confidence,
-            probability=confidence * density.spread.right,
-            position=(x, y, z),
-            within_50_m=density.spread.within_50_m,
-            within_90_m=density.spread.within_90_m,
-            area_50_m2=density.area_m2(0.5),
-            area_90_m2=density.area_m2(0.9),
-            rooms=self._rooms_of(known, joined),
-            things=self._things_of(known, joined),
-            events=joined.events,
+            name=kind, confidence=round(confidence, 3), probability=round(confidence * spread.right, 3),
+            position=plain_point(known.position_of(joined)), within_50_m=round(spread.within_50_m, 2),
+            within_90_m=round(spread.within_90_m, 2), area_50_m2=round(joined.density.area_m2(0.5), 2),
+            area_90_m2=round(joined.density.area_m2(0.9), 2), rooms=self._rooms_of(known, joined),
+            things=self._things_of(known, joined), events=joined.events,
             moving=any(bool(known.evidence.moving[event]) for event in joined.events),
-            microphones=int(known.evidence.channels[0]),
-            spread=density.spread,
-        )
+            microphones=int(known.evidence.channels[0]), spread=spread,
+        )  # fmt: skip
 
     def _rooms_of(self, known: SourceMap, joined: Joined) -> tuple[tuple[str, float], ...]:
-        if not self._rooms.rooms:
-            return ()
         likely = joined.share > 1e-5
         number = self._rooms.rooms_of(known.place[likely])
         share = np.bincount(np.maximum(number, 0), joined.share[likely] * (number >= 0), len(self._rooms.names))
         order: list[int] = np.argsort(-share, kind="stable")[:_MOST_NAMED].tolist()
-        return tuple((self._rooms.names[i], float(share[i])) for i in order if share[i] >= _LEAST_NAMED)
+        return tuple((self._rooms.names[i], round(float(share[i]), 3)) for i in order if share[i] >= _LEAST_NAMED)
 
     def _things_of(self, known: SourceMap, joined: Joined) -> tuple[tuple[str, tuple[float, float, float], float], ...]:
-        things = self._things
-        return tuple(
-            (things[number].name, things[number].position, share)
-            for number, share in things_that_may_be(known, joined, things)
-        )
+        likely = [(self._things[number], share) for number, share in things_that_may_be(known, joined, self._things)]
+        return tuple((thing.name, thing.position, round(share, 3)) for thing, share in likely)
 
 
 def things_that_may_be(known: SourceMap, joined: Joined, things: "Sequence[Thing]") -> list[tuple[int, float]]:
@@ -353,34 +320,25 @@ def things_that_may_be(known: SourceMap, joined: Joined, things: "Sequence[Thing
     return [(one, float(share[one])) for one in order if share[one] >= _LEAST_NAMED]
 
 
-def with_heard(avlmap: "AVLMap", things: Sequence[Thing], *, are_all: bool = True) -> list[Thing]:
+def with_heard(
+    avlmap: "AVLMap",
+    things: Sequence[Thing],
+    *,
+    are_all: bool = True,
+    visit: int | None = None,
+    every: Sequence[Thing] | None = None,
+) -> list[Thing]:
     """Return things with the sounds that may have come from them; as they are where the map does not know that.
 
     The probability is that of the name of the sound times that the thing is its source. Of several sounds of one source
     the last gives the time.
 
-    ``are_all``: whether these are all that it lists; else a sound may have come from the others as well.
+    ``are_all``: whether these are all that it lists; else a sound may have come from the others as well, which are
+    those of ``every``, by default of the map's list. ``visit``: of a day, from 0, the sounds of that day alone.
     """
     if not things or avlmap.data.sources is None:
         return list(things)
-    return _with_heard(avlmap, things, [] if are_all else _others(avlmap.things(), things))
-
-
-def with_heard_then(avlmap: "AVLMap", visit: int, things: Sequence[Thing], every: Sequence[Thing]) -> list[Thing]:
-    """Return things that were there on a day with the sounds of that day; see ``with_heard``.
-
-    ``visit``: the number of the day, from 0. ``every``: all that were there; a sound may have come from the others as
-    well.
-    """
-    if not things or avlmap.data.sources is None:
-        return list(things)
-    listed = {(thing.name, thing.position) for thing in things}
-    return _with_heard(avlmap, things, [one for one in every if (one.name, one.position) not in listed], visit)
-
-
-def _with_heard(
-    avlmap: "AVLMap", things: Sequence[Thing], rivals: Sequence[Thing], visit: int | None = None
-) -> list[Thing]:
+    rivals = [] if are_all else _others(avlmap.things() if every is None else every, things)
     every = [*things, *rivals]
     heard: list[list[HeardFromAnswer]] = [[] for _ in every]
     sounds, visits = avlmap.sounds(), avlmap.data.info.visits
@@ -404,8 +362,10 @@ def _with_heard(
 
 
 def _others(every: Sequence[Thing], listed: Sequence[Thing]) -> list[Thing]:
+    named = {(thing.name, thing.position) for thing in listed}
     taken = np.concatenate([thing.rows for thing in listed])
-    return [thing for thing in every if np.isin(thing.rows, taken).mean() < 0.5]
+    others = [thing for thing in every if (thing.name, thing.position) not in named]
+    return [thing for thing in others if not len(thing.rows) or np.isin(thing.rows, taken).mean() < 0.5]
 
 
 def _visit_of(visits: "Sequence[Visit]", onset_s: float) -> int:

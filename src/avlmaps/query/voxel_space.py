@@ -128,24 +128,29 @@ class Blocks:
     @classmethod
     def of(cls, index: Int[np.ndarray, "n 3"]) -> "Blocks":
         """Sort voxels into blocks."""
-        n = len(index)
-        if not n:
-            empty = np.zeros((0, 3), np.int64)
-            return cls(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros((3, 0), np.int32), empty, empty)
+        if not len(index):
+            return cls._of_runs(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((3, 0), np.int32))
         least, most = (end // _BLOCK for end in index_ends(index))
         span: Int[np.ndarray, " xyz"] = most - least + 1
-        number = np.empty(n, np.int64)
-        for a in range(0, n, _CHUNK):
+        number = np.empty(len(index), np.int64)
+        for a in range(0, len(index), _CHUNK):
             x, y, z = ((index[a : a + _CHUNK, axis] >> _SHIFT) - least[axis] for axis in range(3))
             number[a : a + _CHUNK] = (x * span[1] + y) * span[2] + z
         order = np.argsort(number, kind="stable")
-        number = number[order]
-        first = np.flatnonzero(np.append(True, number[1:] != number[:-1]))
-        sorted_index = np.ascontiguousarray(index[order].T, np.int32)
-        low = np.minimum.reduceat(sorted_index, first, axis=1).T.astype(np.int64)
-        high = np.maximum.reduceat(sorted_index, first, axis=1).T.astype(np.int64)
-        starts = np.append(first, n).astype(np.int64)
-        return cls(order, starts, sorted_index, np.ascontiguousarray(low), np.ascontiguousarray(high))
+        return cls._of_runs(order, number[order], np.ascontiguousarray(index[order].T, np.int32))
+
+    @classmethod
+    def _of_runs(
+        cls, order: Int[np.ndarray, " n"], block: Int[np.ndarray, " n"], index: Int[np.ndarray, "3 n"]
+    ) -> "Blocks":
+        # Voxels of one block have its number and follow each other.
+        if not len(order):
+            return cls(order, np.zeros(1, np.int64), index, np.zeros((0, 3), np.int64), np.zeros((0, 3), np.int64))
+        first = np.flatnonzero(np.append(True, block[1:] != block[:-1]))
+        low, high = (
+            np.ascontiguousarray(end.reduceat(index, first, axis=1).T, np.int64) for end in (np.minimum, np.maximum)
+        )
+        return cls(order, np.append(first, len(order)).astype(np.int64), index, low, high)
 
     def near(self, things: "Blocks", reach: int) -> Int[np.ndarray, " k"]:
         """Return the numbers of the blocks that come within some voxels of a block of things along every axis."""
@@ -177,14 +182,7 @@ class Blocks:
         """Return the blocks of some of the voxels only, without sorting again; blocks that have none are left out."""
         rows = np.flatnonzero(mask[self.order])
         block = np.searchsorted(self.starts, rows, side="right") - 1
-        first = np.flatnonzero(np.r_[True, block[1:] != block[:-1]]) if len(rows) else np.zeros(0, np.int64)
-        index = np.ascontiguousarray(self.index[:, rows])
-        if not len(rows):
-            return Blocks(self.order[rows], np.zeros(1, np.int64), index, self.low[:0], self.high[:0])
-        low = np.minimum.reduceat(index, first, axis=1).T.astype(np.int64)
-        high = np.maximum.reduceat(index, first, axis=1).T.astype(np.int64)
-        starts = np.append(first, len(rows)).astype(np.int64)
-        return Blocks(self.order[rows], starts, index, np.ascontiguousarray(low), np.ascontiguousarray(high))
+        return Blocks._of_runs(self.order[rows], block, np.ascontiguousarray(self.index[:, rows]))
 
 
 class Space:

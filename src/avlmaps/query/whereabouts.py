@@ -16,11 +16,11 @@ from avlmaps.core.errors import AvlmapsError, QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.registry import Kind
 from avlmaps.query.contents import UNKNOWN, numbered
-from avlmaps.query.floor_plan import FloorPlan
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Thing
+    from avlmaps.query.floor_plan import FloorPlan
 
 NOWHERE = -1
 """The room of a point in no room."""
@@ -48,7 +48,7 @@ class Whereabouts:
         self.regions = avlmap.room_regions if has_rooms else None
 
     @cached_property
-    def _plan(self) -> FloorPlan | None:
+    def _plan(self) -> "FloorPlan | None":
         return None if (votes := self._map.room_votes) is None else votes.plan
 
     @property

@@ -167,19 +167,13 @@ def encoded_words(encoder: PixelEncoder | ViewEncoder, words: Sequence[str]) -> 
         raise
     except Exception as fault:
         raise BackendError(f"{what} failed on {len(words)} words with {type(fault).__name__}: {fault}") from fault
-    if rows.ndim != 2 or len(rows) != len(words):
-        raise BackendError(f"{what} gave {rows.shape} for {len(words)} words; it gives a row for each.")
-    card = getattr(encoder, "card", None)
-    if card is not None and card.dim and rows.shape[1] != card.dim:
-        raise BackendError(f"{what} gave {rows.shape} for {len(words)} words; its features have {card.dim} numbers.")
-    if not np.isfinite(rows).all():
-        raise BackendError(f"{what} gave NaN or infinity for {len(words)} words; what it does not know is zero.")
-    lengths = np.linalg.norm(rows, axis=1)
-    off = lengths[(lengths > _UNIT) & (np.abs(lengths - 1.0) > _UNIT)]
-    if len(off):
+    card, lengths = getattr(encoder, "card", None), np.linalg.norm(rows, axis=-1)
+    dim = (card is not None and card.dim) or rows.shape[-1]
+    is_unit = (lengths <= _UNIT) | (np.abs(lengths - 1.0) <= _UNIT)
+    if rows.shape != (len(words), dim) or not is_unit.all():  # NaN is neither
         raise BackendError(
-            f"{what} gave rows of length {off.min():.3g} to {off.max():.3g}; each has unit length, or is zero: divide "
-            "it by its length."
+            f"{what} gave {rows.shape}, of lengths {np.min(lengths):.3g} to {np.max(lengths):.3g}, for {len(words)} "
+            f"words; it gives a row of {dim} numbers and unit length for each, or zero for what it does not know."
         )
     return rows
 
@@ -490,15 +484,15 @@ class VoxelNamer:
         calibrated: whether confidences are probabilities; else they are cosines.
     """
 
-    def __init__(self, stored: "AVLMap", vocabulary: Sequence[str] | None = None) -> None:
+    def __init__(self, avlmap: "AVLMap", vocabulary: Sequence[str] | None = None) -> None:
         """Take the encoder's names, or a vocabulary for one that has none of its own.
 
         ``BackendError``: the map's profile has no pixel encoder. ``MapError``: the map was built with another encoder
         than is installed.
         """
-        self._voxels = stored.data.voxels
-        encoder = stored.encoders.pixels
-        stored.require_model(Kind.PIXELS)
+        self._voxels = avlmap.data.voxels
+        encoder = avlmap.encoders.pixels
+        avlmap.require_model(Kind.PIXELS)
         self._named = isinstance(encoder, NamedPixelEncoder)
         self._scale = float(encoder.logit_scale) if isinstance(encoder, ScaledEncoder) and not self._named else None
         if isinstance(encoder, NamedPixelEncoder):
@@ -552,16 +546,16 @@ class VoxelNamer:
         return number, confidence
 
 
-def keyframes_that_saw(stored: "AVLMap", space: "Space", row: int) -> Int[np.ndarray, " k"]:
+def keyframes_that_saw(avlmap: "AVLMap", space: "Space", row: int) -> Int[np.ndarray, " k"]:
     """Return the keyframes that had a voxel in view with nothing of the map in between, the nearest first."""
-    poses = np.asarray(stored.data.keyframes.world_from_camera, np.float64)
+    poses = np.asarray(avlmap.data.keyframes.world_from_camera, np.float64)
     if not len(poses):
         return np.zeros(0, np.int64)
     point = space.centres[row]
     away = point - poses[:, :3, 3]
     at = np.einsum("kji,kj->ki", poses[:, :3, :3], away)
     distance_m = np.linalg.norm(away, axis=1)
-    camera = stored.data.rig.depth
+    camera = avlmap.data.rig.depth
     with np.errstate(divide="ignore", invalid="ignore"):
         pixel = camera.project(at)
     inside = (at[:, 2] > _NEAR_M) & (distance_m < _FAR_M)

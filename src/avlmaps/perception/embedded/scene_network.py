@@ -25,7 +25,6 @@ from avlmaps.core.arrays import Bool, Float, Float32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.networks import open_network
-from avlmaps.recordings.images import depth_in_colour
 from avlmaps.recordings.types import Frame
 
 CHANNELS = 8
@@ -336,6 +335,8 @@ def at_working_size(
         fineness: how many times as wide and high the picture is.
     """
     import cv2
+
+    from avlmaps.recordings.images import depth_in_colour  # a question to a map needs no picture
 
     camera, depth_m = depth_in_colour(frame.depth_m, frame.rig)
     width = min(width_px, round(width_px / camera.fx * camera.width))

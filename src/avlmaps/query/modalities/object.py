@@ -20,7 +20,6 @@ from avlmaps.query.factors import NearThings
 from avlmaps.query.instances import (
     FeatureVoxels,
     Instances,
-    Segmentation,
     best_guesses,
     link,
     margin_confidence,
@@ -86,7 +85,7 @@ def colour_share(
 
 
 def object_factor(
-    voxels: FeatureVoxels, part: Part, heat: HeatSettings, searched: Segmentation | None = None
+    voxels: FeatureVoxels, part: Part, heat: HeatSettings, searched: Instances | None = None
 ) -> NearThings:
     """Return the heat of the object that a word names; if no confidence suffices, of the best guesses, not ``found``.
 
@@ -125,24 +124,22 @@ class _Search:
     heat: HeatSettings  # how fast it falls
     word: EncodedWord  # as the encoder takes it
     colour: ColourPhrase | None  # what the part says of colours beside it; None for nothing
-    searched: Segmentation | None = None  # its confident instances, where they were found before
+    searched: Instances | None = None  # its confident instances, where they were found before
 
     def factor(self) -> NearThings:
         """Return the heat of the confident instances; where there are none, of the best guesses."""
         confident = self._coloured(self._confident)
-        if len(confident.instances):
+        if len(confident):
             return self._factor(confident, lambda: self._factor(self._uncertain(self.voxels.settings)))
         settings, voxel_size_m = self.voxels.settings, self.voxels.space.grid.voxel_size_m
         uncertain = self._uncertain(settings)
-        guess = best_guesses(uncertain.instances, voxel_size_m)
+        guess = best_guesses(uncertain, voxel_size_m)
         if isinstance(self.voxels.encoder, NamedPixelEncoder) and guess.best < settings.guess_below:
             weaker = self._uncertain(settings.for_guess())
-            weaker_guess = best_guesses(weaker.instances, voxel_size_m)
+            weaker_guess = best_guesses(weaker, voxel_size_m)
             if len(weaker_guess):
                 uncertain, guess = weaker, weaker_guess
-        return replace(
-            self._factor(replace(uncertain, instances=guess)), with_uncertain=lambda: self._factor(uncertain)
-        )
+        return self._factor(guess, lambda: self._factor(uncertain))
 
     @cached_property
     def _scored(self) -> Callable[[float], Scored]:
@@ -150,23 +147,21 @@ class _Search:
         return scorer_of(voxels.feature, voxels.encoder, voxels.rivals, self.word, voxels.settings)
 
     @cached_property
-    def _confident(self) -> Segmentation:
-        return self.searched or segment(self.voxels, self.word, self._scored(1.0))
+    def _confident(self) -> Instances:
+        return segment(self.voxels, self.word, self._scored(1.0)) if self.searched is None else self.searched
 
-    def _uncertain(self, settings: ObjectSettings) -> Segmentation:
+    def _uncertain(self, settings: ObjectSettings) -> Instances:
         scored = self._scored(settings.share_in_company)
         voxels = replace(self.voxels, settings=settings)
         return self._coloured(segment(voxels, self.word, scored, self._confident))
 
-    def _coloured(self, found: Segmentation) -> Segmentation:
+    def _coloured(self, found: Instances) -> Instances:
         if self.colour is None or self.voxels.rgb is None:
             return found
-        one = found.instances
-        share = colour_share(self.voxels.rgb, one.rows, one.instance, self.colour)
-        one = replace(one, confidence=one.confidence * share)
-        return Segmentation(one, found.won, one.best)
+        share = colour_share(self.voxels.rgb, found.rows, found.instance, self.colour)
+        return replace(found, confidence=found.confidence * share)
 
-    def _factor(self, found: Segmentation, with_uncertain: Callable[[], NearThings] | None = None) -> NearThings:
+    def _factor(self, found: Instances, with_uncertain: Callable[[], NearThings] | None = None) -> NearThings:
         space, part, colour = self.voxels.space, self.part, self.colour
         understood, thing = self.word.understood, colour.thing if colour else part.query
         said = f"{colour.text} {understood}" if colour and understood else understood
@@ -177,10 +172,9 @@ class _Search:
             half += "" if is_named else ", and a colour alone is no thing: what has it is a guess"
             note = half + ("; " + note if note else "")
         is_found = found.best >= FOUND_AT and is_named
-        falloff, mask = self.heat.falloff_per_m(part.role), _mask(len(space), found.instances)
-        one = found.instances
+        falloff, mask = self.heat.falloff_per_m(part.role), _mask(len(space), found)
         return NearThings(
-            space, part, falloff, mask, one.instance, one.confidence, is_found, said, note, with_uncertain, is_named
+            space, part, falloff, mask, found.instance, found.confidence, is_found, said, note, with_uncertain, is_named
         )
 
 
@@ -219,10 +213,9 @@ def _is_whole(understood: str, name: str) -> bool:
     return all(lexicon().is_a(kind, entry.name, EntryKind.THING) for kind in understood.split(" or "))
 
 
-def _absence(word: str, voxels: int, found: Segmentation) -> str:
+def _absence(word: str, voxels: int, found: Instances) -> str:
     if not voxels:
         return "the map holds no voxels"
-    if not found.won:
-        return f"no voxel is closer to {word!r} than to other things"
-    best_of = f"the best of the {found.won} voxels closest to {word!r} make an instance of confidence"
-    return f"{best_of} {found.best:.2f}, below {FOUND_AT:.2f}"
+    if not len(found):
+        return f"nothing that the map shows is like {word!r}"
+    return f"what is most like {word!r} has a confidence of {found.best:.2f}, below {FOUND_AT:.2f}"

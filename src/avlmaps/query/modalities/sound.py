@@ -11,7 +11,6 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import AudioError, QueryError
 from avlmaps.core.question import Part, Role
-from avlmaps.maps.sources.candidates import RIGHT_M, Spread
 from avlmaps.maps.types import HeardSounds
 from avlmaps.query.factors import NearAnchors, stretch_scores
 from avlmaps.query.settings import FOUND_AT, HeatSettings, SoundSettings
@@ -19,6 +18,7 @@ from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import AudioTrack, Sound
 
 if TYPE_CHECKING:
+    from avlmaps.maps.sources.candidates import Spread
     from avlmaps.query.sound_sources import SourceMap
 
 # A clip whose loudest sample is below this (−80 dB of full scale) holds nothing to compare.
@@ -104,7 +104,7 @@ class SourceAnchors(NearAnchors):
         part: says that the place is the source's.
     """
 
-    spreads: tuple[Spread, ...]  # for each source, how well its place is known
+    spreads: "tuple[Spread, ...]"  # for each source, how well its place is known
     waits: bool = False  # whether such a sound was heard whose place is not found yet, in a map that grows
     found: bool = field(init=False)
     note: str = field(init=False)
@@ -122,11 +122,13 @@ class SourceAnchors(NearAnchors):
             return np.ones(len(self.spreads))
         return np.array([spread.right for spread in self.spreads])
 
-    def spread_of(self, instance: int) -> Spread:
+    def spread_of(self, instance: int) -> "Spread":
         """Return how well the place of a source is known."""
         return self.spreads[instance]
 
     def _absence(self) -> str:
+        from avlmaps.maps.sources.candidates import RIGHT_M
+
         best = float(self.scores.max(initial=0.0))
         if best < FOUND_AT and self.waits:
             return "it was heard, but where it came from is not known (a map that grows finds it in a moment)"
