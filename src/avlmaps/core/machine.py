@@ -94,6 +94,13 @@ class Options(TypedDict):
     fastmath: set[str]
 
 
+def share_heap() -> None:
+    """Let threads to come share one heap: glibc gives each its own, of which it gives little back to the system."""
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError, AttributeError):  # another C library
+            ctypes.CDLL(None).mallopt(-8, 1)  # M_ARENA_MAX
+
+
 def release_memory() -> None:
     """Give back to the system what was freed; glibc keeps what networks and compilers needed while they were made."""
     if sys.platform == "linux":

@@ -21,7 +21,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, RecordingError
 from avlmaps.core.files import lasting_path
-from avlmaps.core.machine import release_memory
+from avlmaps.core.machine import release_memory, share_heap
 from avlmaps.core.numbers import as_number
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.progress import say
@@ -203,6 +203,7 @@ class LiveMap:
         self._snapshot: tuple[AVLMap, float] | None = None
         self._generation, self._closed, self._final = 0, False, None
         self._ending, self._stop_behind = Lock(), Event()
+        share_heap()
         self._fuser = Thread(target=self._in_thread, args=(self._fuse_all,), name="avlmaps-fuse", daemon=True)
         self._behind = Thread(target=self._in_thread, args=(self._publish_all,), name="avlmaps-behind", daemon=True)
         self._fuser.start()
