@@ -1,6 +1,6 @@
 """The learned reader: what it may never do, what is decided of its readings, how well it reads what is new to it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -41,13 +41,13 @@ from avlmaps.language.learned.decision import DANGERS, NameResolver, Weighed, de
 from avlmaps.language.learned.features import columns, features
 from avlmaps.language.learned.linear import (
     SYMBOLS,
+    Grammar,
     MalformedError,
+    Open,
     Pointable,
-    State,
     Symbol,
     amount,
-    inquiry_of,
-    intents_of,
+    meaning_of,
 )  # fmt: skip
 from avlmaps.language.learned.reader import LearnedReader, ReadingLimits, learned_reader
 from avlmaps.language.sentence import Attachments, Sentence
@@ -85,17 +85,6 @@ def targets_of(meaning: Any) -> Iterator[Target]:
         yield from targets_of(Inquiry(None, target.near))  # pyright: ignore[reportArgumentType]
 
 
-def is_written_well(line: Sequence[Symbol], can: Pointable, *, is_question: bool) -> bool:
-    """Return whether each symbol of a line may follow those before it, and the line has ended."""
-    state = State(can, is_question)
-    for symbol in line:
-        may = state.open()
-        if symbol not in (may.tokens if isinstance(symbol, int) else may.symbols):
-            return False
-        state = state.after(symbol)
-    return state.is_over
-
-
 def flat(intents: tuple[Intent, ...]) -> list[Intent]:
     return [part for one in intents for part in (flat(one.body) if isinstance(one, Repeat) else [one])]
 
@@ -131,7 +120,7 @@ def test_every_line_is_written_well(text: str) -> None:
     tokens = Sentence(text).tokens
     for is_question in (False, True):
         for line in learned_reader().lines(tokens, is_question=is_question):
-            assert is_written_well(line.symbols, Pointable(tokens), is_question=is_question)
+            meaning_of(line.symbols, tokens, is_question=is_question)
             assert line.log <= 1e-4
 
 
@@ -139,25 +128,16 @@ def test_every_line_is_written_well(text: str) -> None:
 def test_what_may_follow_ends_in_something_that_can_be_read(data: st.DataObject) -> None:
     tokens = lexer.tokenise("go 2 m behind the red chair in the kitchen, turn left 30 degrees, wait 5 seconds, x.png")
     is_question = data.draw(st.booleans())
-    state, line = State(Pointable(tokens), is_question), []
-    while not state.is_over:
-        may = state.open()
+    grammar, line = Grammar(Pointable(tokens), is_question=is_question), list[Symbol]()
+    while isinstance(may := grammar.read(line), Open):
         options = sorted(may.symbols) + [str(at) for at in sorted(may.tokens)]
         assert options
         if len(line) > 40:
             options = [one for one in ("end", "close") if one in may.symbols] or options
-        if len(line) > 400:
+        if len(line) > 100:
             return
         drawn = data.draw(st.sampled_from(options))
-        symbol = int(drawn) if drawn.isdigit() else drawn
-        line.append(symbol)
-        state = state.after(symbol)
-    if line == ["purpose", "end"]:
-        return
-    if is_question:
-        inquiry_of(line, tokens)
-    else:
-        intents_of(line, tokens)
+        line.append(int(drawn) if drawn.isdigit() else drawn)
 
 
 def test_each_phrase_of_a_class_is_marked_where_it_begins() -> None:
@@ -173,7 +153,7 @@ def test_each_phrase_of_a_class_is_marked_where_it_begins() -> None:
 @pytest.mark.parametrize("line", [[], ["end"], ["go", "end"], ["turn", "end"], ["near"], ["repeat", "twice", "end"]])
 def test_a_line_that_means_nothing_is_an_error(line: list[str]) -> None:
     with pytest.raises(MalformedError):
-        intents_of(line, [])
+        meaning_of(line, [], is_question=False)
 
 
 names = st.sampled_from(["chair", "table", "door"]).map(lambda name: Target(TargetKind.OBJECT, name))

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from avlmaps.language.intents import Inquiry, Intent, Pick, Target, TargetKind
-from avlmaps.language.learned.linear import ROWS, Amount, MalformedError, Pointable, Row, Slot, State, Symbol
+from avlmaps.language.learned.linear import ROWS, Amount, Grammar, MalformedError, Pointable, Row, Slot, Symbol
 
 _ALIKE = 0.01
 
@@ -45,12 +45,10 @@ def line_of_question(inquiry: Inquiry | None, at: Pointers) -> list[Symbol]:
 
 def is_written_well(line: Sequence[Symbol], can: Pointable, *, is_question: bool) -> bool:
     """Return whether each symbol of a line may follow those before it."""
-    state = State(can, is_question)
-    for symbol in line:
-        may = state.open()
-        if symbol not in (may.tokens if isinstance(symbol, int) else may.symbols):
-            return False
-        state = state.after(symbol)
+    try:
+        Grammar(can, is_question=is_question).read(line)
+    except MalformedError:
+        return False
     return True
 
 

@@ -12,11 +12,11 @@ intent is a new row, its words (`verbalise`) and its program (`program.writing`)
 numbers, so another order needs other networks.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum, auto
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 from avlmaps.language import intents, lexer
 from avlmaps.language.intents import Inquiry, Intent, Pick, Target, TargetKind
@@ -26,12 +26,8 @@ from avlmaps.language.lexer import Token
 class Slot(Enum):
     """What is written in a place of a line that is no amount."""
 
-    START = auto()
-    HEAD = auto()  # the second symbol of an intent, or its first field
     TARGET = auto()
     BODY = auto()
-    END = auto()
-    OVER = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,11 +80,14 @@ class Row:
     intent: type[intents.Intent]
     fields: Mapping[str, Any]
 
+    @property
+    def ends(self) -> bool:
+        """Whether the line ends behind the symbols."""
+        return issubclass(self.intent, intents.Refuse | intents.Clarify)
+
     @cached_property
     def slots(self) -> tuple[Slot | Amount, ...]:
         """What is written behind the symbols."""
-        if issubclass(self.intent, intents.Refuse | intents.Clarify):
-            return (Slot.END,)
         every = [one for each in self.fields.values() for one in (each if isinstance(each, tuple) else (each,))]
         return tuple(one for one in every if isinstance(one, Amount | Slot))
 
@@ -136,8 +135,8 @@ ROWS = (
 ASKS = {f"ask_{ask}": ask for ask in intents.Ask}
 KINDS = tuple(str(kind) for kind in intents.TargetKind)
 PICKS = {f"pick_{pick}": pick for pick in (Pick.NEAREST, Pick.FARTHEST, Pick.OTHER)}
-STOPS = tuple(row.symbols[0] for row in ROWS if row.slots == (Slot.END,))
-STARTS = tuple(dict.fromkeys(row.symbols[0] for row in ROWS if row.slots != (Slot.END,)))
+STOPS = tuple(row.symbols[0] for row in ROWS if row.ends)
+STARTS = tuple(dict.fromkeys(row.symbols[0] for row in ROWS if not row.ends))
 SYMBOLS = (
     "start_command", "start_question", "end", *STARTS, "close", *STOPS, "refuse", "purpose", *ASKS, *KINDS, *PICKS,
     "near", "inside", "left", "right", *DEGREES, *HEADINGS, *TIMES, *VIEWS, *BIT,
@@ -145,14 +144,10 @@ SYMBOLS = (
 INDEX = {symbol: at for at, symbol in enumerate(SYMBOLS)}
 
 
-def rows_of(symbols: tuple[str, ...]) -> list[Row]:
-    """Return the rows that begin with some symbols."""
-    return [row for row in ROWS if row.symbols[: len(symbols)] == symbols]
-
-
 MOST_SYMBOLS = 80
 _MOST_WORDS = 6
 
+T = TypeVar("T")
 Symbol = str | int  # an entry of `SYMBOLS`, or the token that is pointed at
 
 
@@ -195,10 +190,16 @@ class Open:
     Attributes:
         symbols: which of `SYMBOLS`.
         tokens: which tokens may be pointed at.
+        names: whether these are words of a name.
     """
 
     symbols: frozenset[str] = frozenset()
     tokens: frozenset[int] = frozenset()
+    names: bool = False
+
+    def __contains__(self, symbol: Symbol) -> bool:
+        """Return whether a symbol may follow."""
+        return symbol in (self.tokens if isinstance(symbol, int) else self.symbols)
 
     def __or__(self, other: "Open") -> "Open":
         """Return what may follow either of two lines."""
@@ -224,244 +225,161 @@ class Pointable:
         return self._amounts[of]
 
 
-@dataclass(frozen=True, slots=True)
-class State:
-    """Where a line stands.
+Reading = Generator[Open, Symbol, T]  # says what may follow, takes a symbol, and returns what was read
+_STARTS = Open(frozenset(STARTS))
+_END = Open(frozenset({"end"}))
 
-    Attributes:
+
+class Grammar:
+    """The grammar of lines for one sentence: it says what may follow a line, and what a line means.
+
+    Args:
         can: what may be pointed at.
         is_question: which of the two forms the line has.
-        pending: what is still to be written of the intent; empty where another one may begin.
-        head: the symbols of an intent whose next one is not written yet.
-        kind: of the target whose name is being written; "" where none is.
-        words: of that name.
-        picked: whether that target has its pick.
-        near: whether the next target is what another one is near.
-        in_near: whether this target is.
-        depth: of repeats.
+        at_source: whether the words of a sound mean the place where it came from.
     """
 
-    can: Pointable
-    is_question: bool
-    pending: tuple[Slot | Amount, ...] = (Slot.START,)
-    head: tuple[str, ...] = ()
-    kind: str = ""
-    words: tuple[int, ...] = ()
-    picked: bool = False
-    near: bool = False
-    in_near: bool = False
-    depth: int = 0
+    def __init__(
+        self, can: Pointable, *, is_question: bool, at_source: Callable[[Sequence[int]], bool] = lambda _: False
+    ) -> None:
+        self.can, self.is_question, self.at_source = can, is_question, at_source
+        self.next: Symbol = ""
+        self.kinds = Open(frozenset(KINDS) - ({"here"} if is_question else frozenset()))
 
-    @property
-    def is_over(self) -> bool:
-        """Whether the line has ended."""
-        return self.pending == (Slot.OVER,)
+    def read(self, line: Iterable[Symbol]) -> "Open | tuple[Intent, ...] | Inquiry | None":
+        """Return what may follow a line; of one that has ended its meaning, None of a question without an answer.
 
-    def after(self, symbol: Symbol) -> "State":
-        """Return where the line stands after one more symbol."""
-        if self.kind:
-            return self._after_name(symbol)
-        slot, rest = (self.pending[0], self.pending[1:]) if self.pending else (None, ())
-        if isinstance(slot, Amount):
-            skipped = replace(self, pending=rest)
-            return skipped if isinstance(symbol, int) or symbol in slot.said else skipped.after(symbol)
-        if isinstance(symbol, int):  # the first field of an intent that has no second symbol
-            return replace(self, pending=rows_of(self.head)[0].slots[1:], head=())
-        if symbol in KINDS:
-            return replace(self, kind=symbol, words=(), picked=False, in_near=self.near, near=False, pending=rest)
-        if symbol == "end":
-            return replace(self, pending=(Slot.OVER,))
-        if symbol == "close":
-            return replace(self, depth=self.depth - 1)
-        if symbol in ("refuse", "purpose"):
-            return replace(self, pending=(Slot.END,))
-        return replace(self, pending=(Slot.TARGET,)) if symbol in ASKS else self._begun((*self.head, symbol))
+        Raises:
+            MalformedError: a symbol stands where it may not.
+        """
+        reading = self._question() if self.is_question else self._command()
+        may = next(reading)
+        symbols = iter(line)
+        for symbol in symbols:
+            if symbol not in may:
+                raise MalformedError(f"{symbol} stands where one of {sorted(may.symbols)} should")
+            try:
+                may = reading.send(symbol)
+            except StopIteration as ended:
+                if next(symbols, None) is not None:
+                    raise MalformedError("the line ends too late") from None
+                return ended.value
+        return may
 
-    def _after_name(self, symbol: Symbol) -> "State":
-        if isinstance(symbol, int):
-            return replace(self, words=(*self.words, symbol))
-        if symbol in PICKS:
-            return replace(self, picked=True)
-        if symbol in ("near", "inside"):
-            return replace(self, kind="", near=True, pending=(Slot.TARGET, *self.pending))
-        return replace(self, kind="").after(symbol)
+    def _see(self, may: Open) -> Reading[Symbol]:
+        self.next = yield may
+        return self.next
 
-    def _begun(self, head: tuple[str, ...]) -> "State":
-        rows = rows_of(head)
-        if any(row.symbols != head for row in rows):
-            return replace(self, head=head, pending=(Slot.HEAD,))
-        slots = rows[0].slots
-        return replace(self, head=(), pending=slots, near=False, depth=self.depth + (Slot.BODY in slots))
-
-    def open(self) -> Open:
-        """Return what may come next."""
-        if self.kind:
-            return self._named()
-        if not self.pending:
-            return self._next()
-        slot = self.pending[0]
-        if isinstance(slot, Amount):
-            found = Open(frozenset(slot.said), self.can.amounts(slot.of))
-            return found | replace(self, pending=self.pending[1:]).open() if slot.optional else found
-        match slot:
-            case Slot.START:
-                return Open(frozenset((*ASKS, "refuse", "purpose") if self.is_question else (*STARTS, *STOPS)))
-            case Slot.HEAD:
-                rows = rows_of(self.head)
-                further = frozenset(row.symbols[len(self.head)] for row in rows if row.symbols != self.head)
-                first = next(row.slots[:1] for row in rows if row.symbols == self.head)
-                return Open(further) | replace(self, pending=first).open()
-            case Slot.TARGET:
-                return Open(frozenset(KINDS) - ({"here"} if self.is_question else frozenset()))
-            case Slot.BODY:
-                return Open(frozenset(STARTS) - {"repeat"})
-            case Slot.END:
-                return Open(frozenset({"end"}))
-            case Slot.OVER:
-                return Open()
-
-    def _next(self) -> Open:
-        if self.is_question:
-            return Open(frozenset({"end", *KINDS}) - {"here"})
-        if self.depth:
-            return Open(frozenset({*STARTS, "close"}) - {"repeat"})
-        return Open(frozenset({*STARTS, "end"}))
-
-    def _named(self) -> Open:
-        symbols: set[str] = set()
-        tokens: frozenset[int] = frozenset()
-        if self.kind in ("image", "clip"):
-            tokens = self.can.files[self.kind] if not self.words else frozenset()
-        elif self.kind != "here" and len(self.words) < _MOST_WORDS and not self.picked:
-            tokens = self.can.words - frozenset(self.words)
-        if self.words or self.kind in ("image", "clip", "here"):
-            if not self.picked and self.kind in ("object", "area") and not self.in_near:
-                symbols |= set(PICKS)
-            if self.kind != "here":
-                symbols.add("near")
-            if self.in_near:
-                symbols.add("inside")
-            symbols |= set(KINDS) if self.pending else self._next().symbols  # the second of a pair
-        return Open(frozenset(symbols), tokens)
-
-
-def intents_of(
-    line: Sequence[Symbol], tokens: Sequence[Token], at_source: Callable[[Sequence[int]], bool] = lambda _: False
-) -> tuple[Intent, ...]:
-    """Return the intents of a line that ends with ``end``.
-
-    Raises:
-        MalformedError: it means nothing.
-    """
-    written = _Line(line, tokens, at_source)
-    found = written.intents()
-    written.take("end")
-    if not found or written.at != len(line):
-        raise MalformedError("the line ends too early or too late")
-    return found
-
-
-def inquiry_of(
-    line: Sequence[Symbol], tokens: Sequence[Token], at_source: Callable[[Sequence[int]], bool] = lambda _: False
-) -> Inquiry | None:
-    """Return the question of a line that ends with ``end``, see ``intents_of``; None where it cannot be answered.
-
-    Raises:
-        MalformedError: it means nothing.
-    """
-    if list(line) == ["refuse", "end"]:
-        return None
-    written = _Line(line, tokens, at_source)
-    ask, targets = written.take(*ASKS), list[Target]()
-    while written.next in KINDS:
-        targets.append(written.target())
-    written.take("end")
-    if not targets or written.at != len(line):
-        raise MalformedError("the line is no question")
-    return Inquiry(ASKS[ask], tuple(targets))
-
-
-@dataclass(slots=True)
-class _Line:
-    """A line of symbols that is read from its beginning; ``at`` is the next one."""
-
-    symbols: Sequence[Symbol]
-    tokens: Sequence[Token]
-    at_source: Callable[[Sequence[int]], bool]
-    at: int = 0
-
-    @property
-    def next(self) -> Symbol:
-        return self.symbols[self.at] if self.at < len(self.symbols) else ""
-
-    def take(self, *expected: str) -> str:
-        symbol = self.next
-        if isinstance(symbol, int) or symbol not in expected:
-            raise MalformedError(f"{symbol} stands where {' or '.join(expected)} should")
-        self.at += 1
-        return symbol
-
-    def intents(self) -> tuple[Intent, ...]:
+    def _command(self) -> Reading[tuple[Intent, ...]]:
+        yield from self._see(Open(frozenset((*STARTS, *STOPS))))
         found: list[Intent] = []
-        while self.next not in ("end", "close", ""):
-            found.append(self.intent())
+        while self.next != "end":
+            found.append((yield from self._intent(_END if self.next in STOPS else _STARTS | _END)))
         return tuple(found)
 
-    def intent(self) -> Intent:
-        fits = [row for row in ROWS if tuple(self.symbols[self.at : self.at + len(row.symbols)]) == row.symbols]
-        if not fits:
-            raise MalformedError(f"no intent begins with {self.next}")
-        row = max(fits, key=lambda each: len(each.symbols))
-        self.at += len(row.symbols)
-        return row.intent(**{name: self.field(of) for name, of in row.fields.items()})
+    def _question(self) -> Reading[Inquiry | None]:
+        symbol = yield from self._see(Open(frozenset((*ASKS, "refuse", "purpose"))))
+        targets: list[Target] = []
+        asks = ASKS.get(str(symbol))
+        yield from self._see(_END if asks is None else self.kinds)
+        while self.next != "end":
+            targets.append((yield from self._target(self.kinds | _END)))
+        return None if asks is None else Inquiry(asks, tuple(targets))
 
-    def field(self, of: Any) -> Any:
-        match of:
-            case Amount():
-                return self.amount(of)
-            case tuple():
-                return tuple(map(self.field, of))
-            case Slot.TARGET:
-                return self.target()
-            case Slot.BODY:
-                body = self.intents()
-                self.take("close")
-                return body
-            case _:
-                return of
+    def _intent(self, after: Open) -> Reading[Intent]:
+        """Read an intent that begins with the next symbol; ``after`` is what may follow it."""
+        row, *others = sorted((row for row in ROWS if row.symbols[0] == self.next), key=lambda row: len(row.symbols))
+        further = {other.symbols[1]: other for other in others}
+        yield from self._see(Open(frozenset(further)) | self._begin(row.slots, after))
+        if self.next in further:
+            row = further[str(self.next)]
+            yield from self._see(self._begin(row.slots, after))
+        left, values = list(row.slots), dict[str, Any]()
+        for name, of in row.fields.items():
+            parts: list[Any] = []
+            for each in of if isinstance(of, tuple) else (of,):
+                if isinstance(each, Amount | Slot):
+                    del left[0]
+                    parts.append((yield from self._field(each, self._begin(left, after))))
+                else:
+                    parts.append(each)
+            values[name] = tuple(parts) if isinstance(of, tuple) else parts[0]
+        return row.intent(**values)
 
-    def amount(self, of: Amount) -> float | None:
-        symbol = self.next
-        if isinstance(symbol, int):
-            value = amount(self.tokens, symbol, of.of) if symbol < len(self.tokens) else None
-            if value is None:
-                raise MalformedError("no amount begins there")
-            self.at += 1
-            return of.value(value)
-        if of.optional and symbol not in of.said:
+    def _begin(self, slots: Sequence[Slot | Amount], after: Open) -> Open:
+        """Return what may begin some slots, behind which something else may follow."""
+        if not slots:
+            return after
+        slot = slots[0]
+        if isinstance(slot, Amount):
+            found = Open(frozenset(slot.said), self.can.amounts(slot.of))
+            return found | self._begin(slots[1:], after) if slot.optional else found
+        return self.kinds if slot is Slot.TARGET else Open(_STARTS.symbols - {"repeat"})
+
+    def _field(self, of: Slot | Amount, after: Open) -> Reading[Any]:
+        if of is Slot.TARGET:
+            return (yield from self._target(after))
+        if of is Slot.BODY:
+            body: list[Intent] = []
+            while self.next != "close":
+                body.append((yield from self._intent(Open(_STARTS.symbols - {"repeat"} | {"close"}))))
+            yield from self._see(after)
+            return tuple(body)
+        assert isinstance(of, Amount)
+        symbol, tokens = self.next, self.can.tokens
+        value = amount(tokens, symbol, of.of) if isinstance(symbol, int) else of.said.get(symbol)
+        if value is None:
             return None
-        return of.value(float(of.said[self.take(*of.said)]))
+        yield from self._see(after)
+        return of.value(value)
 
-    def target(self) -> Target:
-        target = self.own()
-        while self.next == "near":
-            self.at += 1
-            near = self.own()
-            while self.next == "inside":
-                self.at += 1
-                near = near.with_near(self.own())
-            target = target.with_near(near)
+    def _target(self, after: Open, *, in_near: bool = False) -> Reading[Target]:
+        """Read a target whose kind is the next symbol, and what it is near."""
+        kind, words = str(self.next), list[int]()
+        may = self._named(kind, words, after, in_near=in_near)
+        while isinstance((yield from self._see(may)), int):
+            words.append(int(self.next))
+            may = self._named(kind, words, after, in_near=in_near)
+        pick = PICKS.get(str(self.next), Pick.ANY)
+        if pick:
+            yield from self._see(Open(may.symbols - frozenset(PICKS)))
+        name = " ".join(self.can.tokens[word].text for word in words)
+        place = "source" if kind in ("sound", "clip") and self.at_source(words) else None
+        target = Target(TargetKind(kind), name, (), pick, at=place)
+        while self.next == ("inside" if in_near else "near"):
+            yield from self._see(self.kinds)
+            target = target.with_near((yield from self._target(after, in_near=True)))
         return target
 
-    def own(self) -> Target:
-        """Return the target without what it is near."""
-        kind, words = self.take(*KINDS), list[int]()
-        while isinstance(symbol := self.next, int):
-            words.append(symbol)
-            self.at += 1
-        if not words and kind in ("object", "sound", "area"):
-            raise MalformedError("a target without a name")
-        pick = PICKS[self.take(*PICKS)] if symbol in PICKS else Pick.ANY
-        name = " ".join(self.tokens[word].text for word in words)
-        place = "source" if kind in ("sound", "clip") and self.at_source(words) else None
-        return Target(TargetKind(kind), name, (), pick, at=place)
+    def _named(self, kind: str, words: Sequence[int], after: Open, *, in_near: bool) -> Open:
+        """Return what may follow a kind of target and some words of its name."""
+        is_file, is_here = kind in ("image", "clip"), kind == "here"
+        tokens = frozenset[int]()
+        if is_file and not words:
+            tokens = self.can.files[kind]
+        elif not is_file and not is_here and len(words) < _MOST_WORDS:
+            tokens = self.can.words - frozenset(words)
+        symbols = set[str]()
+        if words or is_file or is_here:
+            symbols |= after.symbols
+            symbols |= {"inside"} if in_near else set(PICKS) if kind in ("object", "area") else set()
+            symbols |= set() if is_here else {"near"}
+        return Open(frozenset(symbols), tokens, names=not is_file and not is_here)
+
+
+def meaning_of(
+    line: Sequence[Symbol],
+    tokens: Sequence[Token],
+    *,
+    is_question: bool,
+    at_source: Callable[[Sequence[int]], bool] = lambda _: False,
+) -> tuple[Intent, ...] | Inquiry | None:
+    """Return what a line means, see `Grammar.read`.
+
+    Raises:
+        MalformedError: it means nothing.
+    """
+    found = Grammar(Pointable(tokens), is_question=is_question, at_source=at_source).read(line)
+    if isinstance(found, Open):
+        raise MalformedError("the line ends too early")
+    return found

@@ -29,7 +29,6 @@ from avlmaps.perception.networks import open_network
 _BEAM = 4
 _MOST_TOKENS = 100
 _LEAST = -12.0  # lines less likely than e to this are not followed
-_NAMED = frozenset({"object", "sound", "area"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +82,6 @@ class Read:
 
 @dataclass(slots=True)
 class _Open:
-    state: linear.State
     symbols: tuple[linear.Symbol, ...]
     log: float
     first: Float32[np.ndarray, " d"]
@@ -121,13 +119,12 @@ class LearnedReader:
         return self._reads(tokens, is_question=True)
 
     def _reads(self, tokens: Sequence[Token], *, is_question: bool) -> list[Read]:
-        meaning_of = linear.inquiry_of if is_question else linear.intents_of
         found: dict[Any, Read] = {}
         for line in self.lines(tokens, is_question=is_question):
             used = frozenset(symbol for symbol in line.symbols if isinstance(symbol, int))
             is_purpose = line.symbols == ("purpose", "end")
             at_source = partial(_at_source, tokens, used)
-            meaning = None if is_purpose else meaning_of(line.symbols, tokens, at_source)
+            meaning = linear.meaning_of(line.symbols, tokens, is_question=is_question, at_source=at_source)
             key = (_placeless(meaning), is_purpose)
             before = found.get(key, Read(meaning, 0.0, used, is_purpose))
             found[key] = replace(before, probability=before.probability + float(np.exp(line.log)))
@@ -144,9 +141,9 @@ class LearnedReader:
         return self._search(tokens, states, begin[0, 0], start, is_question=is_question)
 
     def _search(self, tokens: Sequence[Token], states: Any, begin: Any, start: int, *, is_question: bool) -> list[Line]:
-        can = linear.Pointable(tokens)
+        grammar = linear.Grammar(linear.Pointable(tokens), is_question=is_question)
         texts = [token.text for token in tokens]
-        beam = [_Open(linear.State(can, is_question), (), 0.0, begin, begin)]
+        beam = [_Open((), 0.0, begin, begin)]
         done: list[Line] = []
         for _ in range(linear.MOST_SYMBOLS):
             last = np.array([[_number(one.symbols[-1]) if one.symbols else start] for one in beam], np.int64)
@@ -158,7 +155,9 @@ class LearnedReader:
             said, first, second = outputs
             after: list[tuple[float, int, linear.Symbol]] = []
             for at, one in enumerate(beam):
-                after += [(one.log + log, at, symbol) for symbol, log in _following(one.state, said[at], texts)]
+                may = grammar.read(one.symbols)
+                assert isinstance(may, linear.Open)
+                after += [(one.log + log, at, symbol) for symbol, log in _following(may, said[at], texts)]
             after.sort(key=lambda each: (-each[0], each[1], str(each[2])))
             opened: list[_Open] = []
             for log, at, symbol in after[: _BEAM * 2]:
@@ -168,7 +167,7 @@ class LearnedReader:
                 if symbol == "end":
                     done.append(Line(symbols, log))
                 else:
-                    opened.append(_Open(beam[at].state.after(symbol), symbols, log, first[0, at], second[0, at]))
+                    opened.append(_Open(symbols, log, first[0, at], second[0, at]))
             best = max((line.log for line in done), default=-np.inf)
             beam = [one for one in opened if one.log > best - 4.0]
             if not beam or len(done) >= 2 * _BEAM:
@@ -177,13 +176,12 @@ class LearnedReader:
 
 
 def _following(
-    state: linear.State, said: Float32[np.ndarray, " k"], texts: Sequence[str]
+    may: linear.Open, said: Float32[np.ndarray, " k"], texts: Sequence[str]
 ) -> list[tuple[linear.Symbol, float]]:
     """Return what may follow, likely enough to matter; a name's word may stand at any of its places."""
-    may = state.open()
     found: list[tuple[linear.Symbol, float]] = [(symbol, float(said[INDEX[symbol]])) for symbol in may.symbols]
     base = len(SYMBOLS)
-    if state.kind in _NAMED:
+    if may.names:
         by_word: dict[str, list[int]] = {}
         for at in sorted(may.tokens):
             by_word.setdefault(texts[at], []).append(at)
