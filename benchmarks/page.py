@@ -194,14 +194,21 @@ ENTRIES = (
                r"fold 1.*first name right (\S+), own name says yes (\S+)",
                "first name right {1}, own name says yes {2}"),
         Figure("another hand: 85 more clips, first name right", "", r"more clips: first name right (\S+)", "{1}"),
+        Figure("another hand: another such writer, behind the gate", "",
+               r"another such writer.*right (\d+ %), asked back acceptably (\d+ %), asked back wrongly (\d+ %), "
+               r"misread (\d+ %).*driven (.+)",
+               "right {1}, asked back acceptably {2}, wrongly {3}, misread {4}; no orders, yet driven: {5}"),
+        Figure("another hand: a third, of conditions, things to avoid, things to count", "",
+               r"third writer.*right (\d+ %), asked back acceptably (\d+ %), asked back wrongly (\d+ %), "
+               r"misread (\d+ %).*driven (.+)",
+               "right {1}, asked back acceptably {2}, wrongly {3}, misread {4}; no orders, yet driven: {5}"),
         Figure("another hand: sentences of a writer who had read none of ours, before the gate", "",
                r"right (\d+ %), asked back acceptably (\d+ %), asked back wrongly (\d+ %), misread (\d+ %)"
                r".*driven (.+)",
                "right {1}, asked back acceptably {2}, wrongly {3}, misread {4}; no orders, yet driven: {5}"),
-        Figure("another hand: another such writer, behind the gate", "",
-               r"another such writer.*right (\d+ %), asked back acceptably (\d+ %), asked back wrongly (\d+ %), "
-               r"misread (\d+ %).*driven (.+)",
-               "right {1}, asked back acceptably {2}, wrongly {3}, misread {4}; no orders, yet driven: {5}"))),
+        Figure("another hand: six more writers, 1,097 commands in 44 voices", "",
+               r"six writers.*: right (\S+ %), asked back (\S+ %), misread (\S+ %); (.*)",
+               "right {1}, asked back {2}, misread {3}; {4}"))),
 )  # fmt: skip
 # What the README shows: entries and the labels of their figures. Tables I to VI stand together on the page alone.
 README_ROWS = {"fusion": 1, "queries": 1, "sounds": 2, "objects": 1, "rooms": 1, "language": 1, "outside": 5}

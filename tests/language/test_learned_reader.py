@@ -55,9 +55,8 @@ from avlmaps.language.translator import LearnedTranslator, explanation
 from avlmaps.language.word_classes import load_word_classes
 from avlmaps_sim.bench.language import judge, judge_intents, judge_question, read_list
 
-HELD_OUT = Path(__file__).parent / "commands" / "learned_held_out.jsonl"
-# Of the held-out rows as many are right at least, and misread at most; both are a little wide of what was measured.
-RIGHT, MISREAD = 0.77, 0.05
+LISTS = Path(__file__).parent / "commands"
+HELD_OUT = LISTS / "learned_held_out.jsonl"
 WORDS = (
     "go", "to", "the", "chair", "near", "sofa", "then", "turn", "left", "30", "degrees", "not", "if", "kitchen", "2",
     "m", "back", "behind", "between", "and", "barking", "dog", "heard", "where", "photo.png", "bark.wav", "wait",
@@ -267,11 +266,15 @@ def alone(row: Any, reader: LearnedReader) -> str:
     return judge_intents([to_json(intent) for intent in intents], row)
 
 
+# Right at least and misread at most; a little wide of what was measured.
 @pytest.mark.nightly
-def test_most_rows_that_it_has_not_learnt_are_right() -> None:
-    outcomes = [judge(row).outcome for row in held_out()]
-    assert outcomes.count("right") >= RIGHT * len(outcomes)
-    assert outcomes.count("misread") <= MISREAD * len(outcomes)
+@pytest.mark.parametrize(
+    ("name", "right", "misread"), [("learned_held_out", 0.77, 0.05), ("hand_held_out", 0.72, 0.08)]
+)
+def test_most_rows_that_it_has_not_learnt_are_right(name: str, right: float, misread: float) -> None:
+    outcomes = [judge(row).outcome for row in read_list(LISTS / f"{name}.jsonl")]
+    assert outcomes.count("right") >= right * len(outcomes)
+    assert outcomes.count("misread") <= misread * len(outcomes)
 
 
 @pytest.mark.nightly

@@ -68,6 +68,8 @@ def target_of(said: Any) -> Target:
     """Return a target of its JSON."""
     if isinstance(said, str):
         said = {"object": said}
+    if "number" in said:
+        raise ValueError("rows of `rewrites.toml` read what is counted, not the networks")
     kind = next(kind for kind in TargetKind if str(kind) in said)
     name = "" if kind is TargetKind.HERE else str(said[str(kind)])
     near = tuple(target_of(one) for one in said.get("near", ()))
@@ -107,6 +109,8 @@ def intent_of(said: Mapping[str, Any]) -> Intent:  # noqa: C901
             return Repeat(int(said["times"]), tuple(intent_of(one) for one in said["body"]))
         case "refuse":
             return Refuse(RefusalReason(said.get("reason") or "unknown"))
+        case "if":
+            raise ValueError("rows of `rewrites.toml` read conditions, not the networks")
         case _:
             return Clarify()
 
