@@ -202,10 +202,6 @@ ENTRIES = (
                r"third writer.*right (\d+ %), asked back acceptably (\d+ %), asked back wrongly (\d+ %), "
                r"misread (\d+ %).*driven (.+)",
                "right {1}, asked back acceptably {2}, wrongly {3}, misread {4}; no orders, yet driven: {5}"),
-        Figure("another hand: sentences of a writer who had read none of ours, before the gate", "",
-               r"right (\d+ %), asked back acceptably (\d+ %), asked back wrongly (\d+ %), misread (\d+ %)"
-               r".*driven (.+)",
-               "right {1}, asked back acceptably {2}, wrongly {3}, misread {4}; no orders, yet driven: {5}"),
         Figure("another hand: six more writers, 1,097 commands in 44 voices", "",
                r"six writers.*: right (\S+ %), asked back (\S+ %), misread (\S+ %); (.*)",
                "right {1}, asked back {2}, misread {3}; {4}"))),
@@ -215,12 +211,11 @@ README_ROWS = {"fusion": 1, "queries": 1, "sounds": 2, "objects": 1, "rooms": 1,
 
 INTRODUCTION = """# Benchmarks
 
-`make bench` writes this page and the README's table from [benchmarks.json](benchmarks.json), which holds all that
-each command printed: every table, count, interval, scene and checksum. Speed is that of one core of a shared machine
-with two; each script prints a ratio to another way of doing the same in the same run. Intervals are 95 %.
+`make bench` writes this page and the README's table from [benchmarks.json](benchmarks.json), all that each command
+printed. Speed is that of one core of a shared machine with two; each script prints a ratio to another way of doing it in
+the same run. Intervals are 95 %.
 
-*Weights* says whether a row was measured with the weights that ship. Where it says *older*, run the command again
-before you rely on it.
+*Weights* says whether a row was measured with the weights that ship. Do not rely on *older*.
 
     python benchmarks/report.py --only words sounds   # some; --stale: what older weights measured; --page: the page
 
