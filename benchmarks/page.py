@@ -212,7 +212,7 @@ README_ROWS = {"fusion": 1, "queries": 1, "sounds": 2, "objects": 1, "rooms": 1,
 INTRODUCTION = """# Benchmarks
 
 `make bench` writes this page and the README's table from [benchmarks.json](benchmarks.json), all that each command
-printed. Speed is that of one core of a shared machine with two; each script prints a ratio to another way of doing it in
+printed. Speed is of one core of a shared machine with two, as a ratio to another way in
 the same run. Intervals are 95 %.
 
 *Weights* says whether a row was measured with the weights that ship. Do not rely on *older*.
