@@ -331,12 +331,6 @@ def is_unit(tokens: Sequence[Token], at: int) -> bool:
     return any(_unit(tokens, at, units) for units in (LENGTHS, _ANGLES, _TIMES))
 
 
-def is_amount(tokens: Sequence[Token], at: int) -> bool:
-    """Return whether a distance, an angle, a time or a clock direction begins at a token."""
-    words = list(tokens)
-    return any(read(words, at) for read in (length_at, angle_at, duration_at, clock_at))
-
-
 def _unit(tokens: Sequence[Token], at: int, units: Mapping[str, float]) -> float | None:
     if at >= len(tokens):
         return None

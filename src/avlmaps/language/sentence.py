@@ -216,6 +216,7 @@ def any_one(before: str, behind: str) -> bool:
     return found is not None
 
 
+@cache
 def _order_words() -> frozenset[str]:
     classes = load_word_classes().words
     names = ("GO", "TURN", "FACE", "WAIT", "CIRCLE", "RETURN", "BACK_UP")

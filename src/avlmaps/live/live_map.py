@@ -342,8 +342,8 @@ class LiveMap:
                 self._require_open()
                 self._door.wait_for(lambda: self._fuser_ended or not (self._queue or self._in_hand_s))
                 self._require_open()
-            moved = self._mapper.correct_poses(stamps_s, poses)
             self._check = PoseCheck()  # the next pose is of the corrected world, which is no jump
+            moved = self._mapper.correct_poses(stamps_s, poses)
             self._came(time.perf_counter())
             return moved
 

@@ -277,7 +277,7 @@ class Robot:
 
     def move_to_left(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the left side of a thing, as seen from the robot, that distance from its edge."""
-        self._go_beside("move_to_left", target, lambda ahead: to_the_left(ahead), distance_m)
+        self._go_beside("move_to_left", target, to_the_left, distance_m)
 
     def move_to_right(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the right side of a thing, as seen from the robot, that distance from its edge."""

@@ -103,6 +103,8 @@ class FeatureStore:
 
     def put(self, kind: Kind, card: ModelCard, key: str, arrays: Mapping[str, np.ndarray]) -> None:
         """Store arrays by name, if there is room for them."""
+        if self._full:
+            return
         content = save({name: np.ascontiguousarray(array) for name, array in arrays.items()})
         path = self._path(kind, card, key)
         try:

@@ -181,4 +181,8 @@ def _opened(value: Any) -> Any:
     if callable(getattr(value, "cpu", None)):  # a tensor
         return value.cpu().numpy()
     names = getattr(value, "__slots__", ())
-    return getattr(value, "__dict__", {name: getattr(value, name) for name in names} or type(value).__qualname__)
+    return getattr(
+        value,
+        "__dict__",
+        {name: getattr(value, name) for name in names if hasattr(value, name)} or type(value).__qualname__,
+    )

@@ -273,8 +273,11 @@ class _Places:
     """Names the rooms and things of places in a map."""
 
     def __init__(self, avlmap: "AVLMap") -> None:
-        self._rooms = avlmap.where
-        self._things = avlmap.things() if avlmap.has(Kind.PIXELS) else []
+        self._map, self._rooms = avlmap, avlmap.where
+
+    @cached_property
+    def _things(self) -> "list[Thing]":
+        return self._map.things() if self._map.has(Kind.PIXELS) else []
 
     def described(self, known: SourceMap, joined: Joined, kind: str, confidence: float) -> SoundSource:
         """Return a source with its region, rooms and things."""

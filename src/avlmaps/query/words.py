@@ -162,7 +162,7 @@ def encoded_words(encoder: PixelEncoder | ViewEncoder, words: Sequence[str]) -> 
     """
     what = f"encode_words of the encoder {encoder!r}"
     try:
-        rows = np.asarray(encoder.encode_words(list(words)), np.float32)
+        rows = np.atleast_1d(np.asarray(encoder.encode_words(list(words)), np.float32))
     except AvlmapsError:
         raise
     except Exception as fault:
@@ -171,9 +171,10 @@ def encoded_words(encoder: PixelEncoder | ViewEncoder, words: Sequence[str]) -> 
     dim = (card is not None and card.dim) or rows.shape[-1]
     is_unit = (lengths <= _UNIT) | (np.abs(lengths - 1.0) <= _UNIT)
     if rows.shape != (len(words), dim) or not is_unit.all():  # NaN is neither
+        least, most = lengths.min(initial=np.inf), lengths.max(initial=0.0)
         raise BackendError(
-            f"{what} gave {rows.shape}, of lengths {np.min(lengths):.3g} to {np.max(lengths):.3g}, for {len(words)} "
-            f"words; it gives a row of {dim} numbers and unit length for each, or zero for what it does not know."
+            f"{what} gave {rows.shape}, of lengths {least:.3g} to {most:.3g}, for {len(words)} words; it gives a "
+            f"row of {dim} numbers and unit length for each, or zero for what it does not know."
         )
     return rows
 

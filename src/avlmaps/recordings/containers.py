@@ -92,7 +92,9 @@ def channel_power(path: Path, count: int, rate_hz: int) -> Float[np.ndarray, " c
     length = min(count, round(_LOOK_S * rate_hz))
     begins = np.linspace(0, count - length, min(_LOOKS, max(1, count // max(length, 1)))).astype(int).tolist()
     pieces = [read_all_channels(path, begin, begin + length, rate_hz) for begin in begins]
-    return np.mean([(piece**2).mean(axis=0) for piece in pieces if piece.shape == pieces[0].shape], axis=0)
+    return np.mean(
+        [(piece**2).mean(axis=0) for piece in pieces if len(piece) and piece.shape[1] == pieces[-1].shape[1]], axis=0
+    )
 
 
 def read_all_channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, "n channels"]:

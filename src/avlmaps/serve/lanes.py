@@ -5,7 +5,7 @@ import re
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextvars import ContextVar, copy_context
+from contextvars import Context, ContextVar, copy_context
 from typing import TypeVar
 
 from avlmaps.core.errors import (
@@ -54,6 +54,13 @@ class Cancellation:
 
 
 _here: ContextVar[Cancellation | None] = ContextVar("watch", default=None)
+
+
+def context_of_its_own() -> Context:
+    """Return the caller's context for work that goes on when the request that began it is cancelled."""
+    context = copy_context()
+    context.run(_here.set, None)
+    return context
 
 
 def watch_here() -> Cancellation:

@@ -386,7 +386,8 @@ class Endpoint:
             told=status if fault.status else fault.told,
             start="start the server there (Ollama: ollama serve)" if settings.on_this_machine else "check the network",
             key="OPENAI_API_KEY" if settings.hosted else "AVLMAPS_CHAT_API_KEY",
-            offered=(_listed(self._models()) if fault.kind == "model" else "") or "one that the server has",
+            offered=(_listed(self._models()) if fault.kind == "model" and not settings.hosted else "")
+            or "one that the server has",
             wait=f"in {fault.retry_after_s:.0f} s" if fault.retry_after_s else "later",
         )
         return self._without_key(sentence)

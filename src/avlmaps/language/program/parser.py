@@ -30,7 +30,9 @@ SIGNS: Mapping[type, str] = {
     ast.UAdd: "+", ast.Not: "not", ast.And: "and", ast.Or: "or", ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<",
     ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.In: "in", ast.NotIn: "not in", ast.Is: "is", ast.IsNot: "is not",
 }  # fmt: skip
-_QUOTED = re.compile(r"""#[^\n]*|'(?:[^'\\\n]|\\.)*'|"(?:[^"\\\n]|\\.)*\"""")
+_QUOTED = re.compile(
+    r"""#[^\n]*|\b[rR](?:'(?:[^'\\\n]|\\.)*'|"(?:[^"\\\n]|\\.)*")|'(?:[^'\\\n]|\\.)*'|"(?:[^"\\\n]|\\.)*\""""
+)
 _ESCAPE = re.compile(r"\\(?:x[0-9a-fA-F]{2}|u[0-9a-fA-F]{4}|U[0-9a-fA-F]{8}|[\\'\"nt])|(?P<odd>\\)")
 # What may stand in no program outside of strings, and why.
 _STRANGE = (
@@ -124,7 +126,7 @@ def _check_text(text: str) -> None:
         raise _at(text, unsafe, f"the character U+{ord(unsafe.group()):04X} has no place in a program; remove it")
     for quoted in _QUOTED.finditer(text):
         odd = next((found for found in _ESCAPE.finditer(quoted.group()) if found["odd"]), None)
-        if odd and quoted.group()[0] != "#":
+        if odd and quoted.group()[0] not in "#rR":
             raise _at(text, quoted, "a string has a backslash that makes no character; write `\\\\` for a backslash")
     bare = _QUOTED.sub("''", text)
     for strange, why in _STRANGE:

@@ -18,6 +18,7 @@ import msgspec
 import numpy as np
 from jaxtyping import Float, Float32
 
+from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded import logmel
 from avlmaps.perception.enrolment import TaughtSound, enrolled_sounds, sounds_folder
@@ -72,7 +73,12 @@ class EmbeddedSounds:
         self, words: WordEncoder | None = None, folder: Path | None = None, weights: Path | None = None
     ) -> None:
         place = Path(__file__).with_name("weights") if weights is None else weights
-        network, notes, examples = ((place / f"sounds.{end}").read_bytes() for end in ("onnx", "json", "npy"))
+        try:
+            network, notes, examples = ((place / f"sounds.{end}").read_bytes() for end in ("onnx", "json", "npy"))
+        except FileNotFoundError as fault:
+            raise BackendError(
+                f"The embedded sound encoder lacks {fault.filename}; install the package again."
+            ) from fault
         self._network = network
         self._folder = folder
         about = json.loads(notes)

@@ -20,7 +20,7 @@ from types import MappingProxyType
 import numpy as np
 
 from avlmaps.core.arrays import Float32, Int8
-from avlmaps.core.errors import QueryError
+from avlmaps.core.errors import BackendError, QueryError
 from avlmaps.core.lexicon import Entry, EntryKind, lexicon, noun_of
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 
@@ -70,7 +70,12 @@ def read_aliases(text: str) -> dict[str, str]:
 
 @cache
 def _load() -> "tuple[WordWeights, WordPieces, Mapping[str, str]]":
-    blob, alias_text = ((Path(__file__).parent / name).read_bytes() for name in ("weights/words.npz", "aliases.txt"))
+    try:
+        blob, alias_text = (
+            (Path(__file__).parent / name).read_bytes() for name in ("weights/words.npz", "aliases.txt")
+        )
+    except FileNotFoundError as fault:
+        raise BackendError(f"The embedded text encoder lacks {fault.filename}; install the package again.") from fault
     with np.load(BytesIO(blob), allow_pickle=False) as arrays:
         weights = WordWeights(
             entries=arrays["entries"].tobytes().decode("utf-8").split("\n"),

@@ -76,8 +76,9 @@ def _stamp(stamp: Any) -> SimpleNamespace:
     return SimpleNamespace(sec=int(seconds), nanosec=int(nanoseconds))
 
 
-def _header(message: Any, frame: str = "") -> SimpleNamespace:
-    return SimpleNamespace(stamp=_stamp(getattr(message, "timestamp", None)), frame_id=frame or message.frame_id)
+def _header(message: Any, frame: str | None = None) -> SimpleNamespace:
+    frame = message.frame_id if frame is None else frame
+    return SimpleNamespace(stamp=_stamp(getattr(message, "timestamp", None)), frame_id=frame)
 
 
 def _bytes(data: Any) -> np.ndarray:

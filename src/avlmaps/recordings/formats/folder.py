@@ -107,7 +107,8 @@ def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> 
 def _check_clocks(folder: Path, description: Description, found: "_Pictures", known: PoseTable) -> None:
     rgb_hz, pose_hz = description.rgb_rate_hz, description.pose_rate_hz
     of_poses = f"poses of {layout.POSES}", known.stamps_s, pose_hz or rgb_hz
-    for what, stamps_s, rate_hz in (("frames", found.stamps_s, rgb_hz or pose_hz), of_poses):
+    at_poses = found.stamps_s is None or np.array_equal(np.sort(found.stamps_s), np.sort(known.stamps_s))
+    for what, stamps_s, rate_hz in (("frames", found.stamps_s, rgb_hz or (pose_hz if at_poses else None)), of_poses):
         rising = np.zeros(0) if stamps_s is None else np.sort(stamps_s[np.isfinite(stamps_s)])
         if fault := pace_fault(rising, what, 1.0 / rate_hz if rate_hz else None):
             raise RecordingError(f"{folder}: {fault}")
@@ -186,7 +187,7 @@ def _find_pictures(folder: Path, description: Description, known: PoseTable, vid
     path = folder / layout.FRAMES
     if os.path.lexists(path):
         stems = {file: stem for stem, file in found.items()}
-        rows = [row for row in read_list(path, NAMED_FILE) if "/" not in row[0]]
+        rows = list(read_list(path, NAMED_FILE))
         names: list[str] = [stems.get(row[0]) or row[0] for row in rows]
         stamps_s: Float[np.ndarray, " n"] | None = np.array([row[1] for row in rows], np.float64)
         if not names:

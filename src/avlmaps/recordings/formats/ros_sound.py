@@ -231,7 +231,7 @@ def _sampled(
             yield [samples]
 
     track = _joined(topic, folder, pcm, start_s, lengths_s, silence_s, same())
-    if pcm.channels > 1 and track.channel is None:
+    if pcm.channels > 1:
         note(
             f"The sound of {topic} has {pcm.channels} channels, of which the mean is heard; where their microphones "
             f"are ({option('microphones', 'FILE')}) would show where sounds come from."

@@ -12,7 +12,6 @@ import threading
 from collections import deque
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
-from contextvars import copy_context
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from math import degrees
@@ -38,7 +37,7 @@ from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse
 from avlmaps.navigate.skills import RobotSettings
 from avlmaps.serve.drive.robots import Machine
 from avlmaps.serve.guard import token_digest
-from avlmaps.serve.lanes import RequestError
+from avlmaps.serve.lanes import RequestError, context_of_its_own
 from avlmaps.serve.requests import Request
 from avlmaps.serve.shelf import ServedMap
 
@@ -354,7 +353,7 @@ class Dispatcher:
                 self.log.write("confirmed", {"who": asdict(who), **msgspec.to_builtins(order.plan)})
                 if order.brake.pulled:
                     raise _refused("stopped")
-                run = copy_context().run  # what the order says is read over HTTP
+                run = context_of_its_own().run  # what the order says is read over HTTP
                 order.thread = threading.Thread(target=run, args=(self._run, order, who), name="avlmaps-order")
                 order.thread.start()
             except BaseException:
@@ -394,7 +393,7 @@ class Dispatcher:
             raise _refused("moved", here.distance_m(start), degrees(turned_rad))
 
     def _run(self, order: RunningOrder, who: Who) -> None:
-        plan, brake = order.plan, order.brake
+        plan, brake, faulted = order.plan, order.brake, False
         answer = {"ok": False, "error": "The order ended by a fault of avlmaps; the server's log has the details."}
         try:
             answer = instruct(
@@ -406,7 +405,8 @@ class Dispatcher:
         except Exception:
             log.exception("order %s", plan.order)
             brake.pull()
-        if brake.pulled and not order.stopped:  # by an edit, or by a fault of ours
+            faulted = True
+        if faulted or (brake.pulled and not order.stopped):  # by an edit, or by a fault of ours
             self._noted_stop(Who("server", "edit" if brake.forbidden else "fault"), plan.order, *self._halt())
         note = {"note": brake.forbidden} if brake.forbidden else {}
         ended = {"order": plan.order, "words": plan.words, "stopped": brake.pulled, "outcome": answer, **note}
