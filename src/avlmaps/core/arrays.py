@@ -1,8 +1,8 @@
 """Array types with shapes, as jaxtyping declares them: ``Float32[np.ndarray, "n 3"]``.
 
-Nothing checks shapes at run time but tests, which load jaxtyping first and get its own types here. Elsewhere its import
-would take as long as NumPy's own, so stand-ins take their place: they hold the declaration, which
-``maps.store.array_validation`` compares files with. Modules that a query of one word needs import the types from here.
+Tests alone check shapes: they load jaxtyping first and get its own types here. Elsewhere its import would take as long
+as NumPy's, so stand-ins hold the declaration for ``maps.store``. Modules that a query of one word needs import the
+types from here.
 """
 
 import sys
@@ -24,12 +24,7 @@ if TYPE_CHECKING or "jaxtyping" in sys.modules:
 else:
 
     class Declared:
-        """An array type of a shape.
-
-        Attributes:
-            dtypes: names of the types of number that fit.
-            dim_str: the shape, a letter or a number an axis.
-        """
+        """An array type: the names of the types of number that fit, and its shape, a letter or a number an axis."""
 
         __slots__ = ("dim_str", "dtypes")
 
@@ -42,14 +37,11 @@ else:
             raise TypeError("an array type declares; make arrays with NumPy")
 
         def __or__(self, other: object) -> object:
-            """Return a type that allows another one, too, and declares no shape."""
             return Any
 
         __ror__ = __or__
 
     class _Numbers:
-        """What ``Float32`` and the like are: given an array's class and a shape, a type."""
-
         __slots__ = ("dtypes",)
 
         def __init__(self, *dtypes: str) -> None:

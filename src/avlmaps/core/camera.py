@@ -15,15 +15,9 @@ _MOST_PIXELS = 1 << 28
 
 @dataclass(frozen=True, slots=True)
 class Pinhole:
-    """A pinhole camera without distortion.
+    """A pinhole camera without distortion: focal lengths and principal point, and the image's size, in pixels.
 
-    Attributes:
-        fx: focal length along the columns, pixels.
-        fy: focal length along the rows, pixels.
-        cx: column of the principal point, pixels (the image's middle is ``width / 2``).
-        cy: row of the principal point, pixels.
-        width: columns of the image.
-        height: rows of the image.
+    The middle of the image is at ``(width / 2, height / 2)``.
     """
 
     fx: float
@@ -54,7 +48,7 @@ class Pinhole:
 
     @property
     def matrix(self) -> Float[np.ndarray, "3 3"]:
-        """The 3x3 calibration matrix K."""
+        """The calibration matrix K."""
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
     def resized(self, width: int, height: int) -> "Pinhole":
@@ -88,10 +82,8 @@ class Pinhole:
 class Rig:
     """The colour and the depth camera of a robot, and how they sit to one another.
 
-    Attributes:
-        rgb: camera of the colour pictures.
-        depth: camera of the depth pictures. The pose of a frame is that of this camera.
-        rgb_from_depth: 4x4; the identity where depth was registered to colour.
+    The pose of a frame is that of the depth camera. ``rgb_from_depth`` is the identity where depth was registered to
+    colour.
     """
 
     rgb: Pinhole

@@ -53,12 +53,7 @@ def take(whole: T, rows: Int[np.ndarray, " r"] | Bool[np.ndarray, " n"] | slice)
 
 
 def concat(parts: Sequence[T], **others: Any) -> T:
-    """Put dataclasses of one kind, at least one, one after the other; offsets run on.
-
-    Args:
-        parts: of one kind.
-        others: the fields that are no arrays.
-    """
+    """Put dataclasses of one kind, at least one, one after the other; ``others`` are the fields that are no arrays."""
     kind: Any = type(parts[0])
     arrays = {name: [np.asarray(getattr(part, name)) for part in parts] for name in axes_of(kind)}
     for offsets, _ in ragged(kind):

@@ -1,7 +1,6 @@
-"""The one family of errors that a user can meet.
+"""The one family of errors that a user can meet: each is one sentence, what failed, with which numbers, and what to do.
 
-Every error is one sentence: what failed, with which numbers or names, and what to do next. The command line
-prints it without a traceback and exits 1. Mistakes of a programmer (wrong shapes, wrong types) stay
+The command line prints it without a traceback and exits 1. Mistakes of a programmer (wrong shapes, wrong types) stay
 ``ValueError`` and ``TypeError``.
 """
 
@@ -70,11 +69,7 @@ class GoalNotFoundError(AvlmapsError):
 
 
 class SeveralFitError(AvlmapsError):
-    """Several things fit a name equally, and the command does not say which is meant.
-
-    Attributes:
-        choices: where each of them is, in words; the first is chosen by 1.
-    """
+    """Several things fit a name equally; ``choices`` says in words where each is, the first is chosen by 1."""
 
     def __init__(self, message: str, choices: tuple[str, ...]) -> None:
         super().__init__(message)

@@ -11,18 +11,13 @@ import msgspec
 
 
 class _Source(msgspec.Struct):
-    """Where pip had a package from."""
-
     url: str = ""
 
 
 def install_command(extra: str = "", *more: str, distribution: str = "avlmaps") -> str:
-    """Return the command that installs an extra: from the clone that avlmaps runs or was installed from, else by name.
+    """Return the command that installs a distribution, with an extra such as ``serve`` and ``more`` packages.
 
-    Args:
-        extra: such as ``serve``; without one the distribution is installed alone.
-        more: further packages.
-        distribution: which of this project's (see ``distributions``).
+    It installs from the clone that avlmaps runs or was installed from, else by name.
     """
     clone = _clone()
     if clone is None:
@@ -62,16 +57,7 @@ What = Literal["verbs", "profiles", "backends", "robots", "sources"]
 
 @dataclass(frozen=True, slots=True)
 class Distribution:
-    """One distribution beside ``avlmaps``.
-
-    Attributes:
-        name: as pip knows it.
-        verbs: of the command line.
-        profiles: their names.
-        backends: ``kind:name``.
-        robots: what drives them.
-        sources: of live maps.
-    """
+    """A distribution beside ``avlmaps``, as pip knows it, and the names of what it brings (backends: ``kind:name``)."""
 
     name: str
     verbs: tuple[str, ...] = ()

@@ -67,16 +67,11 @@ class RefusedFileError(OSError):
 
 
 def open_regular(path: Path | str, limit_bytes: int) -> BinaryIO:
-    """Open a regular file for reading, after a look at what it is and how large.
-
-    Args:
-        path: the file; a link to a regular file will do.
-        limit_bytes: largest size that is accepted.
+    """Open a regular file of at most ``limit_bytes`` for reading; a link to one will do.
 
     Raises:
         FileNotFoundError: there is nothing there, not even a link.
-        OSError: it is a dangling link, a folder, a pipe, a device or a socket, is too large or cannot be opened;
-            ``strerror`` is the reason in words.
+        OSError: it is a dangling link, no regular file, too large or cannot be opened; ``strerror`` says why in words.
     """
     checked_size(path, limit_bytes)
     # Never waits for a writer, should the file become a pipe between the look and the opening.
@@ -120,11 +115,9 @@ def read_regular(path: Path | str, limit_bytes: int) -> bytes:
 
 
 def decode_json(content: bytes, type: type[T] | Any = Any) -> Any:
-    """Decode JSON to a type; nesting that no file of ours has is an error like any other.
+    """Decode JSON to a type; nested too deeply, not JSON or not of the type: ``msgspec.DecodeError``.
 
-    Raises:
-        msgspec.DecodeError: it is not JSON, not of the type, or nested too deeply.
-        UnicodeDecodeError: it is not UTF-8.
+    Bytes that are not UTF-8 are a ``UnicodeDecodeError``.
     """
     try:
         return msgspec.json.decode(content, type=type)
@@ -133,13 +126,10 @@ def decode_json(content: bytes, type: type[T] | Any = Any) -> Any:
 
 
 def sampled_digest(path: Path | str, budget_bytes: int) -> bytes:
-    """Return a SHA-256 over a file's size and content: the whole of it, or evenly spread blocks of a larger file.
+    """Return a SHA-256 over a file's size and content: all of it, or evenly spread blocks, ``budget_bytes`` (4096 on).
 
-    The last block reaches to the end of the file, where a PNG has the checksum of all its pixels.
-
-    Args:
-        path: a regular file; one that is missing or refused has a digest of its own.
-        budget_bytes: how much is read at most; at least 4096.
+    The last block reaches to the end of the file, where a PNG has the checksum of all its pixels. A file that is
+    missing or refused has a digest of its own.
     """
     try:
         with open_regular(path, SAMPLED_BYTES) as stream:

@@ -37,43 +37,30 @@ class EntryKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Entry:
-    """One thing, room or sound; ``lexicon.toml`` explains what is not listed here.
+    """One thing, room or sound; ``lexicon.toml`` explains what is not said here."""
 
-    Attributes:
-        name: what answers call it, singular where it has one.
-        plural: the name itself where it has no other.
-        synonyms: other names of the same, British and American.
-        learnt: phrases that the encoders which ship were trained with or carry in their notes for it; most are
-            synonyms, some name what the encoder takes for it: a tap for a sink.
-        wider: the kinds that it belongs to, nearest first, each an entry of its own: a chair is a seat.
-        compounds: names of special ones that are no entry of their own: a dining chair is a chair.
-        size_m: the usual width, depth and height, each from least to greatest, metres; None where it varies too much.
-        sounds: names of the sounds that it makes, for a thing.
-        makers: names of the things that make it, the likeliest first, for a sound.
-        rooms: names of the rooms where it usually is; for a sound, where it is also heard without its makers.
-        spoken: what people mostly say for it where that is not the name, else ``""``.
-        split: ``training`` where an encoder which ships was trained to name it; ``held out`` for all others.
-    """
-
-    name: str
+    name: str  # what answers call it, singular where it has one
     kind: EntryKind
-    plural: str = ""
-    synonyms: tuple[str, ...] = ()
+    plural: str = ""  # the name itself where it has no other
+    synonyms: tuple[str, ...] = ()  # other names of it, British and American
+    # phrases that the encoders which ship know it by; some name what they take for it: a tap for a sink
     learnt: tuple[str, ...] = ()
+    # the kinds that it belongs to, nearest first, each an entry of its own: a chair is a seat
     wider: tuple[str, ...] = ()
-    compounds: tuple[str, ...] = ()
+    compounds: tuple[str, ...] = ()  # special ones that are no entry of their own: a dining chair is a chair
     mount: Mount = "floor"
+    # usual width, depth and height, least to greatest; None where it varies too much
     size_m: tuple[Range, Range, Range] | None = None
     soft: bool = False
-    sounds: tuple[str, ...] = ()
-    makers: tuple[str, ...] = ()
-    rooms: tuple[str, ...] = ()
+    sounds: tuple[str, ...] = ()  # that a thing makes
+    makers: tuple[str, ...] = ()  # things that make a sound, the likeliest first
+    rooms: tuple[str, ...] = ()  # where a thing usually is; where a sound is also heard without its makers
     like: tuple[str, ...] = ()
     generic: bool = False
     wet: bool = False
     tiled: bool = False
-    spoken: str = ""
-    split: Split = "held out"
+    spoken: str = ""  # what people mostly say for it where that is not the name
+    split: Split = "held out"  # whether an encoder which ships was trained to name it
 
     @property
     def spellings(self) -> tuple[str, ...]:
@@ -89,16 +76,7 @@ class Entry:
 
 
 class Lexicon:
-    """All entries, with look-ups; `lexicon` returns the one that ships.
-
-    Args:
-        source: the parsed file: tables ``thing``, ``room`` and ``sound`` of groups of entries, and lists of adjectives.
-
-    Attributes:
-        colours: names of colours.
-        materials: adjectives that say what a thing is made of.
-        ambiguous: spellings that name several entries of a kind, squeezed, with the names, the likeliest first.
-    """
+    """All entries, with look-ups, of a parsed file; ``lexicon`` returns the one that ships."""
 
     def __init__(self, source: Mapping[str, Any]) -> None:
         self.colours = _listed(source.get("colours", ""))
@@ -117,23 +95,15 @@ class Lexicon:
         return tuple(self._entry(each, name) for each in kinds for name in self._said[each])
 
     def named(self, name: str, kind: EntryKind) -> Entry:
-        """Return the entry of exactly this name.
-
-        Raises:
-            KeyError: there is none; code that lists names of entries finds out at once.
-        """
+        """Return the entry of exactly this name; ``KeyError`` where there is none."""
         if name not in self._said[kind]:
             raise KeyError(f"the lexicon has no {kind} {name!r}; add it to core/lexicon.toml")
         return self._entry(kind, name)
 
     def find(self, phrase: str, kind: EntryKind | None = None) -> Entry | None:
-        """Return the entry that a phrase names exactly, by any of its spellings; None where there is none.
+        """Return the entry that a phrase without article names exactly: ``Sofas``, ``arm-chair``, ``couch``; else None.
 
         Without a kind things come before rooms and rooms before sounds. An ambiguous word names its likeliest entry.
-
-        Args:
-            phrase: ``Sofas``, ``arm-chair`` or ``couch``; no article.
-            kind: only entries of this kind.
         """
         for key in (squeezed(phrase), *(squeezed(single) for single in singulars_of(phrase))):
             for each in EntryKind if kind is None else (kind,):
@@ -153,14 +123,10 @@ class Lexicon:
         return tuple(out.values())
 
     def head(self, phrase: str, kind: EntryKind | None = None) -> Entry | None:
-        """Return the entry that the longest known tail of a phrase names; None where even its last word is unknown.
+        """Return the entry that the longest known tail of a phrase names: ``red kitchen table`` is a table; else None.
 
         A description after the noun is left out: "bottle of wine" is a bottle, "red chest of drawers" a chest of
         drawers.
-
-        Args:
-            phrase: ``red kitchen table`` is a table.
-            kind: only entries of this kind.
         """
         words = phrase.split()
         link = _link(words)
@@ -187,12 +153,9 @@ class Lexicon:
         return tuple(entry for each in self.senses(wider) for entry in self._members[each.kind].get(each.name, ()))
 
     def is_a(self, other: str, wanted: str, kind: EntryKind | None = None) -> bool:
-        """Return whether what one phrase names is what another wants.
+        """Return whether what one phrase (its head counts) names is what another wants: a chair, chairs or a seat.
 
-        Args:
-            other: ``red office chair``; its head counts.
-            wanted: ``chair``, ``chairs`` or ``seat``; a chair is not an office chair.
-            kind: compare only entries of this kind.
+        A chair is no office chair.
         """
         for want in self.senses(wanted, kind):
             named = self.senses(other, want.kind) or tuple(filter(None, (self.head(other, want.kind),)))
@@ -203,13 +166,7 @@ class Lexicon:
         return _ends_with(other, wanted)
 
     def suggest(self, word: str, kind: EntryKind | None = None, most: int = 3) -> tuple[str, ...]:
-        """Return known spellings close to a word that may be misspelt, the closest first: "labtop" gives laptop.
-
-        Args:
-            word: one that `find` does not know; a phrase is compared whole.
-            kind: only spellings of entries of this kind.
-            most: how many at most.
-        """
+        """Return known spellings close to one that `find` does not know, the closest first: "labtop" gives laptop."""
         return tuple(spelling for spelling, _ in self.scored_suggestions(word, kind, most))
 
     def scored_suggestions(
@@ -249,10 +206,8 @@ class Lexicon:
         return out
 
     def _indexed(self, kind: EntryKind) -> dict[str, str]:
-        """Return the name of the entry that each spelling means, by the squeezed spelling.
-
-        Names come first, then what the file calls ambiguous, then other spellings, then what encoders take for it.
-        """
+        # By squeezed spelling; names first, then what the file calls ambiguous, other spellings, what encoders take for
+        # it.
         said = self._said[kind]
         index = {squeezed(name): name for name in said}
         for key, names in self.ambiguous[kind].items():

@@ -23,13 +23,7 @@ class Action(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class GroundPose:
-    """Where a robot stands and looks.
-
-    Attributes:
-        x_m: level x.
-        y_m: level y.
-        heading_rad: counter-clockwise from +x, in (−π, π].
-    """
+    """Where a robot stands, level metres, and looks: radians counter-clockwise from +x, in (−π, π]."""
 
     x_m: float
     y_m: float
@@ -62,12 +56,7 @@ class GroundPose:
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """The result of one movement of a body.
-
-    Attributes:
-        pose: where the body is now, as its odometry says.
-        contact: whether it touched something, and stopped or slid along it.
-    """
+    """Where a body is after a movement, as its odometry says, and whether it touched something (it stopped or slid)."""
 
     pose: GroundPose
     contact: bool = False

@@ -15,11 +15,7 @@ T = TypeVar("T")
 
 
 def as_number(given: Any) -> float | None:
-    """Return a real number as one of Python; None for anything else, also for a boolean or text.
-
-    Args:
-        given: a scalar of Python or NumPy, a 0-d array, or a tensor without axes.
-    """
+    """Return a scalar of Python or NumPy, a 0-d array or tensor as a float; None for a boolean or anything else."""
     if hasattr(given, "mask") and np.ma.is_masked(given):  # numpy.ma takes long to load
         return None
     if getattr(given, "ndim", None) == 0 and hasattr(given, "item"):
@@ -107,12 +103,8 @@ def hold_numbers(
 ) -> None:
     """Make the numbers of frozen settings those of Python, so that they can be compared and written into a map.
 
-    Args:
-        settings: of which a field has a wrong kind, or a number that is not finite or out of its bounds, is refused.
-        error: how.
-        positive: names of fields, one after the other, that must be more than 0; None is no number.
-        least_0: that must be 0 or more.
-        least_1: that must be 1 or more.
+    A field of a wrong kind, or a number that is not finite or out of its bounds, raises ``error``. The bounds are names
+    of fields, one after the other, that must be more than 0, 0 or more, 1 or more; None is no number.
     """
     for field in fields(settings):
         kind: Any = field.type

@@ -42,13 +42,9 @@ def orthonormalize_all(
 ) -> Float[np.ndarray, "n 4 4"]:
     """Return poses with their rotations replaced by the nearest ones (in the Frobenius norm).
 
-    Args:
-        world_from_camera: as read from a file.
-        names: what each belongs to, for the error's sentence (such as ``frame 000012``).
-        max_fault: largest entry of RᵀR − I that still counts as rounding.
-
     Raises:
-        RecordingError: the first that holds NaN or infinity, is not a rigid transform, mirrors, or is off by more.
+        RecordingError: the first, by its name (``frame 000012``), that is not finite, is not a rigid transform,
+            mirrors, or has an entry of RᵀR − I over ``max_fault``, beyond which it is no rounding.
     """
     with np.errstate(invalid="ignore", over="ignore"):
         rotation = world_from_camera[:, :3, :3]
@@ -111,11 +107,7 @@ def from_rotation(
 def from_quaternion(
     translation: Float[np.ndarray, "*n 3"], quaternion_xyzw: Float[np.ndarray, "*n 4"]
 ) -> Float[np.ndarray, "*n 4 4"]:
-    """Build poses from translations (metres) and quaternions x y z w (any positive norm).
-
-    Raises:
-        ValueError: a quaternion has norm zero.
-    """
+    """Build poses from translations (metres) and quaternions x y z w of any positive norm (0: ``ValueError``)."""
     norm = np.linalg.norm(quaternion_xyzw, axis=-1, keepdims=True)
     if np.any(norm == 0.0):
         raise ValueError("a quaternion has norm 0")

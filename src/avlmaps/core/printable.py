@@ -24,9 +24,7 @@ _SHORT = {"\n": r"\n", "\r": r"\r", "\t": r"\t"}
 def printable(text: object, most: int | None = None) -> str:
     """Return a text on one line that a terminal shows as it is written: what is unsafe becomes its escape.
 
-    Args:
-        text: what to print; anything but text is taken as ``str`` writes it.
-        most: how many characters to show; a longer text ends in an ellipsis.
+    A text of more than ``most`` characters ends in an ellipsis.
     """
     safe = UNSAFE.sub(lambda found: _escaped(found.group()), str(text))
     return safe if most is None or len(safe) <= most else safe[: max(most - 1, 0)] + "…"
@@ -44,11 +42,7 @@ def shortened(answer: Any) -> Any:
 
 
 def printable_json(encoded: str) -> str:
-    """Return JSON with unsafe characters in its strings escaped as JSON has it; it reads as the same values.
-
-    Args:
-        encoded: one line of JSON, outside whose strings no unsafe character stands.
-    """
+    """Return a line of JSON with the unsafe characters in its strings escaped as JSON does; its values stay."""
     return UNSAFE.sub(lambda found: _utf16_escapes(found.group()), encoded)
 
 

@@ -41,10 +41,7 @@ def _is_quiet() -> bool:
 
 
 def _keep_lock_to_this_process(bar: type) -> None:
-    """Give bars a lock of this process alone.
-
-    Theirs is shared with forked processes, so that one that is killed while it draws stops all others for ever.
-    """
+    # tqdm shares its lock with forked processes, so that one that is killed while it draws stops all others for ever.
     global _lock_owner
     if _lock_owner != os.getpid():
         bar.set_lock(threading.RLock())  # pyright: ignore[reportAttributeAccessIssue, reportUnknownMemberType]

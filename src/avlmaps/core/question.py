@@ -38,10 +38,7 @@ class Part:
     """One thing that a question names.
 
     Attributes:
-        modality: how it points at a place.
-        query: a phrase, or the path of a file for an image and for a query by sound clip.
-        role: primary or context.
-        is_file: whether ``query`` is a path (always so for an image).
+        query: a phrase, or the path of a file for an image and for a query by sound clip (``is_file``).
         at: the place of a sound that is meant; None: what the settings of the map say.
         relation: how the goal lies to a part of context, in words; "" for in an area and near another.
     """
@@ -78,11 +75,7 @@ _EXAMPLES = {
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One primary part and any number of parts of context.
-
-    Attributes:
-        parts: in the order of the query; exactly one is primary.
-    """
+    """One primary part and any number of parts of context, in the order of the query."""
 
     parts: tuple[Part, ...]
 
@@ -97,8 +90,7 @@ class Question:
     def of(cls, parts: Sequence[Part], primary: Modality | None = None) -> "Question":
         """Make the first part primary, or the first one of the named modality, and the others its context.
 
-        Raises:
-            QueryError: there is no part, or none of that modality.
+        ``QueryError``: there is none.
         """
         chosen = next((i for i, part in enumerate(parts) if primary in (None, part.modality)), None)
         if parts and chosen is None:

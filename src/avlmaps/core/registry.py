@@ -38,36 +38,22 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Backend:
-    """One entry of the registry.
+    """One entry of the registry."""
 
-    Attributes:
-        kind: which module it serves.
-        name: its name in a profile.
-        target: ``package.module:Class``.
-        extra: the optional install that it needs, or ``""``.
-        needs: top-level packages that must be importable.
-        model: for a backend that can run several models, the one that it runs unless another is chosen: a hub's id or
-            the name of a file; its class is called with it. ``""`` where the class takes no argument.
-        licence: of that model's weights, for ``avlmaps profiles``; ``""`` where the class alone decides it.
-        slow: whether its features take longer to make than to store and read; those of every backend on torch do.
-        also: further models that it needs.
-        matcher: of local features: the matcher that was made for them; ``""`` where any does.
-        distribution: which one of this project brings it.
-        keyframes_only: of pixels: whether a build gives it keyframes alone, the other frames adding surfaces and
-            colours: for a model that takes a second a frame.
-    """
-
-    kind: Kind
+    kind: Kind  # the module that it serves
     name: str
-    target: str
-    extra: str = ""
-    needs: tuple[str, ...] = ()
+    target: str  # ``package.module:Class``
+    extra: str = ""  # the optional install that it needs
+    needs: tuple[str, ...] = ()  # top-level packages that must be importable
+    # that it runs unless another is chosen: a hub's id or a file's name, given to its class; "" where the class takes
+    # no argument
     model: str = ""
-    licence: str = ""
-    slow: bool = False
+    licence: str = ""  # of that model's weights, for ``avlmaps profiles``; "" where the class alone decides it
+    slow: bool = False  # features take longer to make than to store and read; those on torch always do
+    # of pixels: the other frames add surfaces and colours alone, for a model that takes a second a frame
     keyframes_only: bool = False
-    also: tuple[str, ...] = ()
-    matcher: str = ""
+    also: tuple[str, ...] = ()  # further models that it needs
+    matcher: str = ""  # of local features: that was made for them; "" where any does
     distribution: str = "avlmaps"
 
     @property
@@ -121,11 +107,7 @@ def entry_points(group: str) -> "EntryPoints":
 
 
 def brought(entry: "EntryPoint", what: str, error: type[AvlmapsError] = BackendError) -> Any:
-    """Return what an entry point of another package leads to.
-
-    Raises:
-        AvlmapsError: it cannot be imported.
-    """
+    """Return what an entry point of another package leads to; raises ``error`` where it cannot be imported."""
     try:
         return entry.load()
     except Exception as fault:  # an import runs another's code
@@ -155,11 +137,7 @@ def backends() -> list[Backend]:
 
 
 def load(kind: Kind, name: str) -> Any:
-    """Return the backend of that kind and name, made once in a process.
-
-    Args:
-        kind: which module.
-        name: as in a profile; ``name@model`` chooses one of several models.
+    """Return the backend of a name in a profile, made once in a process; ``name@model`` chooses one of several models.
 
     Raises:
         BackendError: there is none of that name, a package or the model that it needs is missing, it cannot be

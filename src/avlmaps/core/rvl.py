@@ -12,11 +12,7 @@ _MOST_GROUPS = 11  # 33 bits
 
 
 def decode_rvl(content: bytes, width: int, height: int) -> UInt16[np.ndarray, "h w"]:
-    """Return a 16-bit picture.
-
-    Raises:
-        ValueError: the content ends before the picture is whole.
-    """
+    """Return a 16-bit picture; ``ValueError`` where the content ends before it is whole."""
     words = np.frombuffer(content[: len(content) // 4 * 4], "<u4")
     groups = (words[:, None] >> np.arange(28, -1, -4, dtype=np.uint32) & 15).ravel().astype(np.int64)
     last = np.flatnonzero(groups < 8)

@@ -24,27 +24,18 @@ EDGE_TOLERANCE_S = 0.04
 
 @dataclass(frozen=True, slots=True)
 class InOrder:
-    """A stream's samples in the order of time.
-
-    Attributes:
-        index: rows of the stream that remain; their stamps rise strictly.
-        notices: one sentence for each thing that was done to get there.
-    """
+    """Rows of a stream whose stamps rise strictly, and a sentence for each thing that was done to get there."""
 
     index: Int[np.ndarray, " k"]
     notices: tuple[str, ...] = ()
 
 
 def in_order(stamps_s: Float[np.ndarray, " n"], what: str) -> InOrder:
-    """Put a stream in the order of time, for any clock.
+    """Put a stream, named in the plural (``poses of groundtruth.txt``), in the order of time, for any clock.
 
-    Stamps that are no number are left out. Where the clock steps back by at most ``MAX_DISORDER_S`` the samples
-    are sorted; where it steps back further it was reset, and only the longest stretch before, between or after
-    such jumps remains, since one time line cannot hold two of them. Of equal stamps the first remains.
-
-    Args:
-        stamps_s: the stream's stamps in the order of the file.
-        what: what the samples are, in the plural, for the sentences (``poses of groundtruth.txt``).
+    Stamps that are no number are left out. Where the clock steps back by at most ``MAX_DISORDER_S`` the samples are
+    sorted; where it steps back further it was reset, and only the longest stretch before, between or after such jumps
+    remains, since one time line cannot hold two of them. Of equal stamps the first remains.
     """
     notices: list[str] = []
     index = np.flatnonzero(np.isfinite(stamps_s))
@@ -99,15 +90,9 @@ def _plain(length_s: float) -> str:
 def associate(
     a_s: Float[np.ndarray, " n"], b_s: Float[np.ndarray, " m"], tolerance_s: float
 ) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-    """Pair the samples of two streams that are each other's nearest in time and at most ``tolerance_s`` apart.
+    """Return rows of two streams of rising stamps that are each other's nearest and at most ``tolerance_s`` apart.
 
-    Args:
-        a_s: rising stamps of the one.
-        b_s: rising stamps of the other.
-        tolerance_s: largest difference of a pair, seconds.
-
-    Returns:
-        Rows of a and rows of b, both rising; each row is in at most one pair.
+    Both rise; each row is in at most one pair.
     """
     if len(a_s) == 0 or len(b_s) == 0:
         none = np.zeros(0, np.int64)
@@ -126,12 +111,7 @@ def _nearest(asked_s: Float[np.ndarray, " n"], stamps_s: Float[np.ndarray, " m"]
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """Where a body was, known at some stamps and interpolated between them.
-
-    Attributes:
-        stamps_s: (n,), strictly rising, at least one.
-        world_from_body: (n, 4, 4), orthonormal.
-    """
+    """Where a body was, known at strictly rising stamps, one at least, and interpolated between them."""
 
     stamps_s: Float[np.ndarray, " n"]
     world_from_body: Float[np.ndarray, "n 4 4"]
@@ -151,8 +131,7 @@ class Trajectory:
         Args:
             stamps_s: when.
             edge_s: how far outside the trajectory a stamp may lie.
-            max_gap_s: longest pause between two poses that is still bridged; by default one second or five times
-                the usual interval, whichever is longer.
+            max_gap_s: the longest pause that is bridged; by default 1 s or five usual intervals, whichever is longer.
         """
         first, last = self.stamps_s[0], self.stamps_s[-1]
         inside = (stamps_s >= first - edge_s) & (stamps_s <= last + edge_s)
@@ -168,10 +147,8 @@ class Trajectory:
     def at(self, stamps_s: Float[np.ndarray, " k"], edge_s: float = EDGE_TOLERANCE_S) -> Float[np.ndarray, "k 4 4"]:
         """Return the pose at each stamp: positions on the straight line, rotations on the shortest arc (slerp).
 
-        At a known stamp the known pose is returned exactly. Past an end, by at most ``edge_s``, the end is held.
-
-        Raises:
-            ValueError: a stamp lies further outside; ask ``covers`` first.
+        At a known stamp the known pose is returned exactly. Past an end, by at most ``edge_s``, the end is held;
+        further outside is a ``ValueError``: ask ``covers`` first.
         """
         from scipy.spatial.transform import Rotation
 

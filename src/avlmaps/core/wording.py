@@ -1,8 +1,7 @@
 """How sentences of the library name an option: a flag on the command line, an argument in Python, a field over HTTP.
 
-Most remedies of errors and notices are options, and each front spells them in its own way. A sentence writes
-``option("depth-unit", "METRES")``; a front says once, for its process and those that it starts, how its readers spell
-that. A server in that process has readers of its own: what is done for them is spelled as they spell.
+A sentence writes ``option("depth-unit", "METRES")``; a front says once, for its process and those that it starts, how
+its readers spell that. A server in that process has readers of its own: what is done for them is spelled as they spell.
 """
 
 import os

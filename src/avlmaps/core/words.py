@@ -94,12 +94,7 @@ def _singular_words(word: str) -> tuple[str, ...]:
 
 
 def stem_of(word: str, endings: Sequence[str] = ("ing", "ed", "es", "s", "er", "y", "e")) -> str:
-    """Return the first letters of a word without its ending, so that "barked", "barking" and "barks" are alike.
-
-    Args:
-        word: in lower case.
-        endings: the first that fits, and leaves three letters, is cut off.
-    """
+    """Return the first letters of a lower-case word without the first ending that leaves three: "bark" of "barked"."""
     for ending in endings:
         if word.endswith(ending) and len(word) - len(ending) >= 3:
             word = word[: -len(ending)]
@@ -120,14 +115,9 @@ def squeezed(phrase: str) -> str:
 
 
 def distance(one: str, other: str, most: float = float("inf")) -> float:
-    """Return the edit distance of two words: insert, delete, replace or swap neighbours, each 1.
+    """Return the edit distance of two words: insert, delete, replace or swap neighbours, each 1, up to ``most``.
 
     A letter doubled, or one of a double left out, counts half. The optimal string alignment, row by row.
-
-    Args:
-        one: a word.
-        other: another.
-        most: give up beyond this; then some greater number is returned.
     """
     before: list[float] = []
     row = [0.0]

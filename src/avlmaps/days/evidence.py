@@ -52,13 +52,7 @@ class DayVerdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class VoxelEvidence:
-    """The evidence of a day on some voxels.
-
-    Attributes:
-        voxels: n, how many there are.
-        surface: n₊, with surface again.
-        through: n₋, seen through.
-    """
+    """The evidence of a day on some voxels: how many they are (n), with surface again (n₊), and seen through (n₋)."""
 
     voxels: int
     surface: int
@@ -74,7 +68,7 @@ class VoxelEvidence:
         return (1.0 + patches * self.through) / (2.0 + patches * (self.through + self.surface))
 
     def verdict(self, voxel_size_m: float) -> DayVerdict:
-        """Return what follows."""
+        """Return what the day says of the thing."""
         if self.coverage() < LEAST_COVERAGE:
             return DayVerdict.UNKNOWN
         p_gone = self.p_gone(voxel_size_m)
@@ -85,13 +79,7 @@ class VoxelEvidence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DayViews:
-    """How far the keyframes of one recording saw freely, in the map's world.
-
-    Attributes:
-        clear_mm: as ``FreeViews``.
-        pose: world_from_camera of each.
-        camera: that measured depth.
-    """
+    """How far the keyframes of one recording saw freely, in the map's world; ``pose`` is world_from_camera of each."""
 
     clear_mm: UInt16[np.ndarray, "k rows columns"]
     pose: Float[np.ndarray, "k 4 4"]
@@ -138,19 +126,12 @@ class DayViews:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Day:
-    """What one day knows of the map's world.
+    """What one day knows of the map's world."""
 
-    Attributes:
-        views: what its keyframes looked at.
-        occupied: its surface, in the grid of its own world.
-        recording_from_map: 4x4, into that world.
-        surface: its surface, in the grid of the map.
-    """
-
-    views: DayViews
-    occupied: Occupied
-    recording_from_map: Float[np.ndarray, "4 4"]
-    surface: Occupied
+    views: DayViews  # what its keyframes looked at
+    occupied: Occupied  # its surface, in the grid of its own world
+    recording_from_map: Float[np.ndarray, "4 4"]  # into that world
+    surface: Occupied  # its surface, in the grid of the map
 
     def has_surface(self, points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
         """Return where the day has surface; see ``Occupied.near``."""
@@ -188,11 +169,8 @@ def seen_before(
 def _counted(
     through: Bool[np.ndarray, " n"], surface: Bool[np.ndarray, " n"], own: Bool[np.ndarray, " n"]
 ) -> VoxelEvidence:
-    """Return the evidence of the voxels that lie beside nothing else; of all, where those are too few.
-
-    Of a thing that leans on a wall all voxels lie beside it. Where rays pass through more than some of them, the
-    surface behind is the wall's, and says nothing of the thing.
-    """
+    # Of a thing that leans on a wall all voxels lie beside it. Where rays pass through more than some of them, the
+    # surface behind is the wall's, and says nothing of the thing.
     through = through & ~surface
     if own.sum() >= max(_FEWEST_OWN, _LEAST_OWN * len(own)):
         through, surface = through[own], surface[own]

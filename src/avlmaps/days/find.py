@@ -1,9 +1,9 @@
 """Where a map of another day lies in this one: found by its pictures, held against the surfaces; and a map's days.
 
-The other map's keyframes are located here. Each located keyframe i votes for one rigid transform
-T_i = (its pose here)(its pose there)⁻¹. The transform that most votes support wins: vote j supports i where both
-place keyframe j within ``AGREE_M`` and ``AGREE_RAD`` of each other. Votes are counted at keyframes that stand apart,
-since one thing that was carried along makes all who see it agree.
+The other map's keyframes are located here. Each located keyframe i votes for one rigid transform T_i = (its pose
+here)(its pose there)⁻¹. The transform that most votes support wins: vote j supports i where both place keyframe j
+within ``AGREE_M`` and ``AGREE_RAD`` of each other. The agreeing keyframes must stand apart, since one thing that was
+carried along makes all who see it agree.
 """
 
 from collections.abc import Sequence
@@ -53,13 +53,7 @@ class NotTheSamePlaceError(MapError):
 
 @dataclass(frozen=True, slots=True)
 class Votes:
-    """What the keyframes of another map say of where it lies in this one.
-
-    Attributes:
-        map_from_other: (v, 4, 4) the transform of each located keyframe.
-        camera: (v, 4, 4) pose of each, in the other map's world.
-        tried: how many keyframes were located or not.
-    """
+    """What the located keyframes of another map say of where it lies here; ``camera`` is each one's pose there."""
 
     map_from_other: Float[np.ndarray, "v 4 4"]
     camera: Float[np.ndarray, "v 4 4"]
@@ -175,8 +169,7 @@ def spread_m(camera: Float[np.ndarray, "v 4 4"]) -> float:
 def consensus(votes: Votes, names: Sequence[object]) -> tuple[np.ndarray, dict[str, float]]:
     """Return map_from_other (4x4) as the agreeing votes say, and the numbers behind it.
 
-    Raises:
-        NotTheSamePlaceError: too few agree, or they stand too close together.
+    ``NotTheSamePlaceError``: too few agree, or they stand too close together.
     """
     agree = supporters(votes.map_from_other, votes.camera)
     count, apart_m = int(agree.sum()), spread_m(votes.camera[agree])
@@ -258,11 +251,7 @@ def find_other(
 
 
 def _agreement(avlmap: AVLMap, other: Path, points: Float[np.ndarray, "n 3"], known: Occupied) -> dict[str, float]:
-    """Return how much of the other map's surface (``points``) lies on this one's, of what this one looked at.
-
-    Raises:
-        NotTheSamePlaceError: too little, or too little was looked at.
-    """
+    # How much of the other map's surface (``points``) lies on this one's, of what this one looked at.
     grid = avlmap.data.grid
     on_surface = known.near(points)
     index = grid.index_of(points)

@@ -45,27 +45,16 @@ SameName = Callable[[str, str], bool]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenThing:
-    """A thing as a day's map lists it, in the grid of the map of all days.
+    """A thing as a day's map lists it, in the grid of the map of all days."""
 
-    Attributes:
-        name: the word of the vocabulary.
-        confidence: that it is one.
-        position: a point of it, metres.
-        size: along the level axes, metres.
-        color: mean RGB.
-        index: its voxels.
-        seen_s: when it was last seen, the map's time.
-        feature: how its voxels look together, unit norm; None where that is not known.
-    """
-
-    name: str
+    name: str  # the word of the vocabulary
     confidence: float
-    position: tuple[float, float, float]
-    size: tuple[float, float, float]
-    color: tuple[int, int, int]
-    index: Int[np.ndarray, "v 3"]
-    seen_s: float
-    feature: Float[np.ndarray, " d"] | None = None
+    position: tuple[float, float, float]  # a point of it, metres
+    size: tuple[float, float, float]  # along the level axes, metres
+    color: tuple[int, int, int]  # mean RGB
+    index: Int[np.ndarray, "v 3"]  # its voxels
+    seen_s: float  # when it was last seen, the map's time
+    feature: Float[np.ndarray, " d"] | None = None  # how its voxels look together, unit norm
 
 
 def begun(things: Sequence[SeenThing], visit: int = 0) -> Life:
@@ -177,10 +166,7 @@ def _matched(
     things: Sequence[SeenThing],
     same: SameName,
 ) -> dict[int, int]:
-    """Return for stays the thing of the new day that stands where they do, each thing once.
-
-    A name that fits counts first; what lies in the same voxels under another name is the same thing named otherwise.
-    """
+    # A name that fits counts first; what lies in the same voxels under another name is that thing named otherwise.
     keys = [np.unique(packed((np.asarray(thing.index)[:, None] + AROUND[None]).reshape(-1, 3))) for thing in things]
     own = [packed(voxels[number]) for number in present]
     value = np.zeros((len(present), len(things)))
@@ -215,11 +201,9 @@ def _moved(
     at_s: Sequence[float],
     same: SameName,
 ) -> list[Stay]:
-    """Join what appeared with what is gone from elsewhere: the pairs that are most alike, in name second.
-
-    It must be more alike where nobody had looked at the place of the new thing, or where the other was gone before this
-    visit; what no name fits is not followed over more than a visit.
-    """
+    # The pairs that are most alike, in name second. They must be more alike where nobody had looked at the place of the
+    # new thing, or where the other was gone before this visit; what no name fits is not followed over more than a
+    # visit.
     gone = [
         number
         for number, stay in enumerate(stays)
@@ -286,8 +270,8 @@ def changed_things(
     """Return what changed, each as a thing with the likeliest name of its voxels together.
 
     Voxels that touch are one thing where rays of another day pass through enough of them. Of a group that is too large
-    for a thing, or hardly looked at, those alone that rays pass through are. What lies beside a thing that changed
-    itself is a part of it.
+    for a thing, or hardly looked at, those alone that rays pass through are. What lies beside a thing that changed is a
+    part of it.
     """
     index = np.asarray(avlmap.data.voxels.index)
     changed = [rows for rows in owned if loose[rows].sum() > _MOSTLY * len(rows)]

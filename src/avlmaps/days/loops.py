@@ -40,15 +40,9 @@ _STEPS, _STILL = 60, 1e-7
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edges:
-    """Measured motions.
+    """Measured motions, metres: pose j (``second``) in the frame of pose i (``first``), with their standard deviations.
 
-    Attributes:
-        first: pose i of each.
-        second: pose j of each.
-        measured: (e, 4, 4) pose j in the frame of pose i, metres.
-        sigma_m: standard deviation of its translation.
-        sigma_rad: of its rotation.
-        is_closure: whether it may be wrong altogether.
+    A closure may be wrong altogether.
     """
 
     first: Int[np.ndarray, " e"]
@@ -107,10 +101,8 @@ def optimise(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> Float[np.ndarra
 
 
 def _slopes(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> tuple[np.ndarray, np.ndarray]:
-    """Return how errors change with small motions of both poses, in their own frames: (e, 6, 6) each.
-
-    Of the rotation's logarithm the slope is taken at 0, which is exact where the edges fit.
-    """
+    # How errors change with small motions of both poses, in their own frames: (e, 6, 6) each. Of the rotation's
+    # logarithm the slope is taken at 0, which is exact where the edges fit.
     off = inverse(edges.measured) @ inverse(poses[edges.first]) @ poses[edges.second]
     between = inverse(poses[edges.second]) @ poses[edges.first]  # of a motion of i, seen from j
     second = np.zeros((len(edges), 6, 6))
@@ -149,25 +141,15 @@ def motions(steps: Float[np.ndarray, "n 6"]) -> Float[np.ndarray, "n 4 4"]:
 
 @dataclass(frozen=True, slots=True)
 class Loops:
-    """What was found, and what it says.
-
-    Attributes:
-        stamps_s: of the keyframes.
-        poses: corrected poses of the keyframes.
-        tried: keyframes that were looked for.
-        closures: how many were located in earlier ones.
-        agreeing: how many of these agree with the corrected poses.
-        apart_before_m: how far the closures are from the poses before, median.
-        apart_m: from the corrected poses.
-    """
+    """Corrected poses of the keyframes, and how they were found."""
 
     stamps_s: Float[np.ndarray, " k"]
     poses: Float[np.ndarray, "k 4 4"]
-    tried: int
-    closures: int
-    agreeing: int
-    apart_before_m: float
-    apart_m: float
+    tried: int  # keyframes that were looked for
+    closures: int  # how many of them were located in earlier ones
+    agreeing: int  # how many of these agree with the corrected poses
+    apart_before_m: float  # of the closures from the poses before, median
+    apart_m: float  # from the corrected poses
 
     def report(self) -> dict[str, float]:
         """Return the numbers."""
@@ -178,9 +160,8 @@ class Loops:
 def close_loops(avlmap: AVLMap, recording: Recording | None = None) -> tuple[Corrected, Loops]:
     """Find where the drive came back, correct the poses by it, and make the map follow them, in its folder.
 
-    Raises:
-        MapError: the map has no submaps, or no models to find places by; too few closures were found, or they
-            contradict each other. It stays as it was.
+    ``MapError``: the map has no submaps, or no models to find places by; too few closures were found, or they
+    contradict each other. It stays as it was.
     """
     require_submaps(avlmap.path, avlmap.data)  # before the long search
     found = find_loops(avlmap)
@@ -232,7 +213,6 @@ def find_loops(avlmap: AVLMap) -> Loops:
 
 
 def _closures(avlmap: AVLMap, poses: Float[np.ndarray, "k 4 4"]) -> tuple[Edges, int]:
-    """Return what was seen again, and how many keyframes were looked for."""
     keyframes, rng, every = avlmap.data.keyframes, np.random.default_rng(0), LocatableMap.of(avlmap)
     stamps_s, place = np.asarray(keyframes.stamp_s), np.asarray(keyframes.place)
     way_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1))])

@@ -145,10 +145,7 @@ def merge_maps(
 def _edits(
     avlmap: AVLMap, other: AVLMap, replaced: Sequence[Edit], onto: Keyframes, moved: Float[np.ndarray, "4 4"]
 ) -> tuple[Edit, ...]:
-    """Return what people corrected in both maps, in the world of this one, in the order of time.
-
-    What they corrected in the map that is replaced stays as well.
-    """
+    # What people corrected in the map that is replaced stays as well.
     world = World.of(avlmap.data.info)
     own = carried_edits(read_edits(avlmap.path), avlmap.data.keyframes, world, world, onto, np.eye(4))
     others = carried_edits(read_edits(other.path), other.data.keyframes, World.of(other.data.info), world, onto, moved)
@@ -281,11 +278,8 @@ def _unnamed_new(
 def _still_there(
     known: Occupied, life: Life, surface: Bool[np.ndarray, " n"], through: Bool[np.ndarray, " n"], visit: int
 ) -> Bool[np.ndarray, " n"]:
-    """Return which voxels of the map are surface still.
-
-    One goes where two views of the new day see through it and nothing is beside it; of what is gone every voxel goes
-    where the new day has no surface; of what is there none goes; people's go.
-    """
+    # A voxel goes where two views of the new day see through it and nothing is beside it; of what is gone every voxel
+    # goes where the new day has no surface; of what is there none goes; people's go.
     goes = through & ~surface
     for number, stay in enumerate(life.stays):
         rows = _rows_of(number, life, known)

@@ -55,11 +55,8 @@ def refine(
 ) -> tuple[Float[np.ndarray, "4 4"], float]:
     """Return the transform that lays surface on surface, and how far apart they then lie (median, metres).
 
-    Args:
-        points: middles of the map's voxels, metres.
-        other: of the other map's, in its own world.
-        map_from_other: a first transform, right within a quarter of a metre.
-        rng: draws the points that are compared.
+    ``points`` are the middles of the map's voxels, ``other`` those of the other's, in its own world; ``map_from_other``
+    is right within a quarter of a metre. ``rng`` draws the points that are compared.
     """
     (still, still_normal), (moving, moving_normal) = (
         flat_surface(of, most, rng) for of, most in ((points, _MOST_POINTS), (other, _MOST_MOVING))
@@ -99,13 +96,7 @@ def _step(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Occupied:
-    """The voxels of a map, to ask whether a place lies on its surface.
-
-    Attributes:
-        key: packed voxel index, rising.
-        grid: their size.
-        tree: their middles, metres.
-    """
+    """The voxels of a map, to ask whether a place lies on its surface: packed and rising, and their middles, metres."""
 
     key: Int[np.ndarray, " n"]
     grid: GridSpec
@@ -157,14 +148,11 @@ def packed(index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
 def resampled(
     index: Int[np.ndarray, "n 3"], grid: GridSpec, map_from_other: Float[np.ndarray, "4 4"]
 ) -> tuple[Int[np.ndarray, "m 3"], Int[np.ndarray, " k"], Int[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-    """Return the voxels that another map's surface fills in this map's grid, and which of its voxels fill each.
+    """Return the voxels that another map's surface fills in this map's grid, sorted, and which of its voxels fill each.
 
-    Each voxel is eight points; a voxel of the grid is filled where three of them fall, or a voxel's middle. Under the
-    identity the voxels are the same.
-
-    Returns:
-        The filled voxels, sorted; then for each pair of one and a voxel that fills it: which filled one, which voxel
-        of the other map, and the part of that voxel.
+    Each voxel is eight points; a voxel of the grid is filled where three of them fall, or a voxel's middle: under the
+    identity the voxels are the same. For each pair of a filled voxel and one that fills it: their rows, and the part of
+    the latter.
     """
     corner = np.stack(np.meshgrid(*[[0.25, 0.75]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     points = (np.asarray(index)[:, None] + corner[None]).reshape(-1, 3) * grid.voxel_size_m

@@ -32,10 +32,8 @@ def build_together(
     """Build the map of several recordings of one place with the workers of a pool, or finish one that was begun.
 
     The maps of the single recordings lie beside it, in ``NAME-recordings``: a recording more costs its own work alone.
-    Their parts are the jobs.
-
-    Raises:
-        AvlmapsError: as ``build_map`` and ``merge_maps``; a recording of another place is refused with the numbers.
+    Their parts are the jobs. Errors are those of ``build_map`` and ``merge_maps``; a recording of another place is
+    refused with the numbers.
     """
     out = user_path(out)
     folder = out.with_name(f"{out.name.removesuffix('.avlmap')}-recordings")
@@ -49,8 +47,7 @@ def build_together(
 def merge_in_turn(days: Sequence[AVLMap], scratch: Path, out: Path, *, overwrite: bool = False) -> AVLMap:
     """Merge maps in their order, each found in the ones before; what a stopped run had merged is used again.
 
-    Raises:
-        MapError: see ``merge_maps``; what was merged before stays in ``scratch``.
+    Errors as of ``merge_maps``; what was merged before stays in ``scratch``.
     """
     keys = [days[0].data.info.build_key]
     for day in days[1:]:

@@ -37,17 +37,9 @@ class Once:
 
 
 class Patience:
-    """Says so when nothing comes, when it continues, and when it is time to end."""
+    """Says so when nothing comes (``into REC``), when it continues, and when it is time to end."""
 
     def __init__(self, place: str, give_up_s: float, tell: Callable[[str], None], stopped: str) -> None:
-        """Begin.
-
-        Args:
-            place: where nothing comes, as part of a sentence: ``into REC``.
-            give_up_s: how long to wait.
-            tell: called with each sentence.
-            stopped: what that seems to mean, the end of a sentence.
-        """
         self._place, self._give_up_s, self._tell, self._stopped = place, give_up_s, tell, stopped
         self._last_s, self._stalled = time.monotonic(), False
 
@@ -78,15 +70,10 @@ def is_being_written(path: Path) -> bool:
 
 
 def growing_frames(path: Path, give_up_s: float = 60.0, tell: Callable[[str], None] = say) -> Iterator[Frame]:
-    """Yield the frames of a recording as they are written, until it is finished.
+    """Yield the frames of a recording as they are written, until it is finished or nothing came for ``give_up_s``.
 
-    A frame that cannot be read, or that has no pose of its stamp, is left out with a sentence. So is said when nothing
-    comes for five seconds, and when it continues.
-
-    Args:
-        path: the folder.
-        give_up_s: end when nothing came for this long: the writer stopped.
-        tell: called with each sentence.
+    A frame that cannot be read, or that has no pose of its stamp, is left out with a sentence to ``tell``; so is said
+    when nothing comes for five seconds, and when it continues.
 
     Raises:
         RecordingError: it says no cameras (it was written by an older version), or a table is damaged.
@@ -106,8 +93,6 @@ def growing_frames(path: Path, give_up_s: float = 60.0, tell: Callable[[str], No
 
 
 class _Written:
-    """The frames of the folder."""
-
     def __init__(self, path: Path, tell: Callable[[str], None]) -> None:
         marker = path / layout.UNFINISHED
         description = layout.decode_description(marker if marker.exists() else path / layout.DESCRIPTION)
@@ -153,8 +138,7 @@ class _Written:
 
 
 class _Lines:
-    """The rows of a table that grows; a line counts when its end is written."""
-
+    # A line counts when its end is written.
     def __init__(self, path: Path) -> None:
         self._path, self._at, self._head = path, 0, True
 

@@ -52,15 +52,9 @@ _ROWS, _COLUMNS = 30, 40  # points of a frame that are looked up
 
 
 class Gates:
-    """Says of each frame whether it is fused."""
+    """Says of each frame whether it is fused; depths beyond ``farthest_m`` do not count."""
 
     def __init__(self, settings: LiveSettings, farthest_m: float) -> None:
-        """Begin with everything new.
-
-        Args:
-            settings: the limits.
-            farthest_m: depths beyond it do not count.
-        """
         self._settings, self._farthest_m = settings, farthest_m
         self._last: Float[np.ndarray, "4 4"] | None = None
 
@@ -148,10 +142,9 @@ class LiveMap:
             overwrite: replace a map that is there.
             begins_s: what the clock said at stamp 0, seconds since 1970, so that the day is known when days are merged;
                 0 where the stamps are dates already, or no clock is known.
-            microphones: where those of the sound's channels are, as ``microphones`` of ``recording.json``; the name of
-                an array or a JSON file will do. With them the map knows where its sounds came from.
-            same_device: map of an earlier drive with the same device that says directions: its offset is known from
-                there.
+            microphones: where those of the sound's channels are, as ``microphones`` of ``recording.json``, the name of
+                an array or a JSON file: the map then knows where its sounds came from.
+            same_device: map of an earlier drive with a device that says directions: its offset is known from there.
 
         Raises:
             MapError: settings are of another kind, ``begins_s`` is no time, the folder is something else or a map,
@@ -269,10 +262,7 @@ class LiveMap:
         return self._mapper.hearing.microphones
 
     def place_microphones(self, microphones: Any) -> None:
-        """Say where the microphones are, where that was not known at the beginning.
-
-        Args:
-            microphones: as those of ``LiveMap``.
+        """Say where the microphones are, in a form of ``LiveMap``'s, where that was not known at the beginning.
 
         Raises:
             AudioError: sound came before.
@@ -285,11 +275,9 @@ class LiveMap:
             self._mapper.hearing.place_microphones(array)
 
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
-        """Add a piece of the microphone's sound; see ``VoxelMap.add_audio``.
+        """Add a piece of the microphone's sound (``Sound``, ``ChannelSound``); see ``VoxelMap.add_audio``.
 
-        Args:
-            chunk: a ``Sound`` of one channel, or a ``ChannelSound`` of several: (m, n) float32 samples and their rate.
-            stamp_s: when its first sample sounds, on the clock of the frames; None where the one before ended.
+        ``stamp_s`` is when its first sample sounds, on the clock of the frames; None where the one before ended.
 
         Raises:
             AudioError: it is no sound, has another rate, other channels or not those of the microphones, repeats what

@@ -39,7 +39,6 @@ class PoseCheck:
     """Takes every frame that comes and compares a few of them."""
 
     def __init__(self) -> None:
-        """Begin without frames."""
         self._held: list[Frame] = []
         self._last: Frame | None = None
         self._bad, self._in_doubt = 0, False
@@ -50,9 +49,7 @@ class PoseCheck:
     def add(self, frame: Frame, heard_s: float | None = None) -> tuple[str, ...]:
         """Take the next frame, and return a sentence for each thing that is in doubt from it on.
 
-        Args:
-            frame: the frame.
-            heard_s: the end of the sound that came; None where none did.
+        ``heard_s`` is the end of the sound that came; None where none did.
         """
         found = self._depth_of(frame), self._sound_at(frame.stamp_s, heard_s), self._pose_of(frame)
         return tuple(doubt for doubt in found if doubt is not None)

@@ -25,18 +25,13 @@ class LiveSource(Protocol):
     def play(self, live: "LiveMap", give_up_s: float, over: Callable[[], bool]) -> None:
         """Give a live map frames until it is over, or none came for some seconds.
 
-        Raises:
-            RecordingError: no frame came at all.
+        ``RecordingError``: no frame came at all.
         """
         ...
 
 
 def join_source(kind: str, topics: Mapping[str, str]) -> LiveSource:
-    """Join a source.
-
-    Args:
-        kind: ``ros2``.
-        topics: names by what they are for; the others are found.
+    """Join a source, such as ``ros2``; ``topics`` are names by what they are for, the others are found.
 
     Raises:
         RecordingError: a topic is for nothing that is known.
@@ -91,15 +86,10 @@ def follow(
     over: Callable[[], bool] = lambda: False,
     microphones: Path | None = None,
 ) -> None:
-    """Give a live map the frames of a recording while it is written; its sound comes when it is finished.
+    """Give a live map the frames of a recording of ours while it is written; its sound comes when it is finished.
 
-    Args:
-        path: folder of our own format.
-        live: the map.
-        give_up_s: end when nothing came for this long.
-        tell: called with each doubt and what else is worth knowing.
-        over: whether to end before the recording does; queried at each frame.
-        microphones: where those of its sound are, instead of what it says.
+    It ends when nothing came for ``give_up_s``, or ``over`` says so at a frame. ``microphones`` says where those of its
+    sound are, instead of the recording.
     """
     told: set[str] = set()
     for frame in progress(growing_frames(path, give_up_s, tell), "mapping", note=lambda: _note(live)):
@@ -140,12 +130,6 @@ class Ears:
     """Gives a live map what a recording heard, piece by piece: its channels, and what a device said."""
 
     def __init__(self, track: AudioTrack | None, live: LiveMap) -> None:
-        """Begin before the first sample.
-
-        Args:
-            track: what was heard; its microphones must be those of the map.
-            live: the map.
-        """
         self._track, self._live = track, live
         self._heard_s, self._said_s = 0.0 if track is None else track.start_s, float("-inf")
 

@@ -51,12 +51,9 @@ FEATURES = "features"  # the name of an encoder's only array
 
 @dataclass(frozen=True, slots=True)
 class CacheSettings:
-    """Whether features are stored, and the limit of the store.
+    """Whether features are stored, and the limit of the store; what was used longest ago goes first.
 
-    Attributes:
-        place: ``auto`` stores those of models on torch in the user's cache folder; a folder stores those of every model
-        there; ``off`` stores none.
-        limit_gb: room on the disk; what was used longest ago goes first.
+    ``auto`` stores those of models on torch in the user's cache folder; a folder stores those of every model there.
     """
 
     place: Path | Literal["auto", "off"] = "auto"
@@ -73,14 +70,11 @@ DEFAULT_CACHE = CacheSettings()
 class FeatureStore:
     """The features on the disk; safe to use from several threads and processes.
 
-    A file that cannot be read or written is not an error: its features are made again, or not stored.
-
-    Attributes:
-        found: how many features of each module came from here.
+    A file that cannot be read or written is not an error: its features are made again, or not stored. ``found`` counts
+    by module the features that came from here.
     """
 
     def __init__(self, folder: Path, limit_bytes: float = 20 * _GB) -> None:
-        """Use a folder, which is made when the first feature is stored."""
         self.folder, self.limit_bytes = user_path(folder), limit_bytes
         self.found: dict[Kind, int] = {}
         self._opened_s = time.time()
@@ -137,11 +131,8 @@ class FeatureStore:
         self._full = True
 
     def _sweep(self, size: int) -> float:
-        """Make room where there is none; return the bytes that are left.
-
-        What was used longest ago goes first, but nothing that was used since this store was opened: a recording that is
-        larger than the store would otherwise push out its own first frames before their turn comes again.
-        """
+        # What was used longest ago goes first, but nothing that was used since this store was opened: a recording
+        # larger than the store would push out its own first frames before their turn comes again.
         entries: list[tuple[float, int, Path]] = []
         for path in self.folder.glob("*/*"):
             with suppress(OSError):  # another process may have removed it
@@ -193,7 +184,6 @@ def _each(
     make: Callable[[list[int]], Sequence[_Made]],
     seen: Sequence[Sequence[Any]],
 ) -> list[_Made]:
-    """Return what is made of each that is seen; those that are not in the store are made together, by number."""
     if store is None:
         return list(make(list(range(len(seen)))))
     model = (__version__, kind, card.id, card.checksum, precision_in_force())
@@ -208,13 +198,9 @@ def _each(
 
 
 def cached(kind: Kind, encoder: Any, store: FeatureStore | None, *, half: bool = False) -> Any:
-    """Return an encoder that makes the features of each frame, picture or sound once.
+    """Return an encoder of a module that makes the features of each frame, picture or sound once.
 
-    Args:
-        kind: the module.
-        encoder: the real one.
-        store: where its features are stored; None stores none.
-        half: features of pixels are rounded to float16.
+    They are stored in ``store``, if any; ``half`` rounds those of pixels to float16.
     """
     card = encoder.card
 

@@ -22,11 +22,7 @@ PHRASES = ("red chair", "dog bark", "kitchen")
 
 
 def check(kind: Kind, backend: Any) -> None:
-    """Hold a backend to its protocol.
-
-    Raises:
-        NonConformanceError: it breaks a promise.
-    """
+    """Hold a backend to its protocol; ``NonConformanceError`` names the promise that it breaks."""
     lacking = [name for name in protocols.members_of(PROTOCOLS[kind]) if not hasattr(backend, name)]
     hold(not lacking, f"{type(backend).__qualname__} lacks {', '.join(lacking)} of {PROTOCOLS[kind].__name__}")
     _check_card(backend.card)
@@ -79,10 +75,7 @@ def example_sound(seed: int = 0, seconds: float = 1.0, rate_hz: int = 16000) -> 
 
 
 def _equal(one: np.ndarray, other: np.ndarray) -> bool:
-    """Return whether two arrays are equal within rounding.
-
-    The last digits of a network's output can differ from call to call: they depend on where memory was allocated.
-    """
+    # The last digits of a network's output depend on where memory was allocated.
     return one.shape == other.shape and np.allclose(one, other, rtol=1e-4, atol=1e-5)
 
 

@@ -32,19 +32,12 @@ _OWN = "own"
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where the encoder of a module comes from.
-
-    Attributes:
-        kind: the module.
-        name: what a map remembers it by: ``backend`` or ``backend@model``, or ``given:Class`` for an object.
-        given: the object, if it is one, or what stands before the named one.
-        has_card: whether that brought a card of its own; one that was made knows its code and numbers, not all that
-            it may read, so that its features are not stored.
-    """
+    """Where the encoder of a module comes from."""
 
     kind: Kind
-    name: str
-    given: Any = None
+    name: str  # what a map remembers: ``backend`` or ``backend@model``, or ``given:Class`` for an object
+    given: Any = None  # the object, if it is one, or what stands before the named one
+    # of its own; a made one does not know all that an object may read: its features are not stored
     has_card: bool = True
 
     @classmethod
@@ -98,7 +91,6 @@ class Encoders:
     """The models that perceive, by module; ``encoders.pixels`` is the pixel encoder. One with a name is a profile.
 
     Attributes:
-        name: the word on the command line; ``own`` where there is none.
         sources: where each comes from; a module that is not among them is not perceived.
         about: one sentence for ``avlmaps profiles``.
         weight_variance_m2: v of the weight exp(−d² / (2·v)) by which a pixel counts in fusion, d its distance from the
@@ -126,10 +118,7 @@ class Encoders:
     ) -> None:
         """Take objects, or names of the registry (``name``, ``name@model``); None and ``""`` perceive nothing.
 
-        With ``sources`` the modules come from these alone.
-
-        Raises:
-            BackendError: an object lacks a method of its protocol.
+        With ``sources`` the modules come from these alone. ``BackendError``: an object lacks a method of its protocol.
         """
         given = dict(zip(MODULES, (pixels, views, sounds, local, place, matcher), strict=True))
         values = {"name": name, "about": about, "weight_variance_m2": weight_variance_m2}
@@ -138,11 +127,7 @@ class Encoders:
 
     @classmethod
     def named(cls, profile: "str | Encoders", /, **instead: object) -> "Encoders":
-        """Return the encoders of a profile, with others for some modules.
-
-        Args:
-            profile: it, or its name (``avlmaps profiles``).
-            instead: by module: an object, the name of a backend, or None for none.
+        """Return the encoders of a profile, with others (objects, names of backends, None for none) for some modules.
 
         Raises:
             BackendError: there is no such profile, module or backend, or an object lacks a method of its protocol.
@@ -167,10 +152,8 @@ class Encoders:
     def choosing(self, choices: Mapping[Kind, str]) -> "Encoders":
         """Return these encoders with other backends or models (``name``, ``name@model``) for some modules.
 
-        Other keypoints bring the matcher that was made for them, unless a matcher is chosen, too.
-
-        Raises:
-            BackendError: there is no such backend, or none of these modules is perceived by a profile.
+        Other keypoints bring the matcher that was made for them, unless a matcher is chosen, too. ``BackendError``:
+        there is no such backend, or no profile perceives that module.
         """
         if Kind.WORDS in choices:
             raise BackendError("Words are read by each model's own text encoder; there is none to choose.")
@@ -200,11 +183,7 @@ class Encoders:
         return self.sources[kind].name if kind in self.sources else ""
 
     def load(self, kind: Kind) -> Any:
-        """Return a module's encoder.
-
-        Raises:
-            BackendError: there is none, or it cannot be loaded.
-        """
+        """Return a module's encoder; ``BackendError`` where there is none, or it cannot be loaded."""
         if kind in self.sources:
             return self.sources[kind].load()
         if self.name == _OWN:
@@ -285,11 +264,7 @@ def profiles() -> list[Encoders]:
 
 
 def profile(name: str) -> Encoders:
-    """Return the profile of that name.
-
-    Raises:
-        BackendError: there is none.
-    """
+    """Return the profile of that name; ``BackendError`` where there is none."""
     if name in _PROFILES:  # installed packages need not be searched
         return _PROFILES[name]
     known = {one.name: one for one in profiles()}
@@ -302,11 +277,7 @@ def profile(name: str) -> Encoders:
 
 
 def encoders_of(chosen: str | Encoders) -> Encoders:
-    """Return the encoders of a profile's name; encoders are themselves.
-
-    Raises:
-        BackendError: it is none of these, or there is no such profile or backend.
-    """
+    """Return the encoders of a profile's name, or encoders themselves; ``BackendError`` where there are none."""
     if isinstance(chosen, str):
         chosen = profile(chosen)
     if not isinstance(chosen, Encoders):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -321,9 +292,7 @@ def encoders_of(chosen: str | Encoders) -> Encoders:
 def read_choices(words: Sequence[str]) -> dict[Kind, str]:
     """Return the backend and model that ``module=backend`` or ``module=backend@model`` choose for each module.
 
-    Raises:
-        ValueError: a word names no module or backend, or two words name the same module; the text continues the name
-            of a flag.
+    ``ValueError`` where a word names no module or backend, or two name one; the text continues the name of a flag.
     """
     modules = {kind.value: kind for kind in MODULES}
     choices: dict[Kind, str] = {}

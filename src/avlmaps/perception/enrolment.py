@@ -30,15 +30,7 @@ LONGEST_NAME = 80
 
 @dataclass(frozen=True, slots=True)
 class TaughtSound:
-    """A kind of sound learnt from examples.
-
-    Attributes:
-        name: what it is called.
-        features: the unit features of its clips' windows.
-        clips: the names of the clips.
-        model: the id of the encoder that made the features.
-        checksum: of that encoder's weights; another encoder cannot use them.
-    """
+    """A kind of sound learnt from clips: the unit features of their windows, by the encoder of that id and checksum."""
 
     name: str
     features: Float32[np.ndarray, "windows d"]
@@ -63,10 +55,10 @@ def sounds_folder(folder: Path | None = None) -> Path:
 def teach_sound(
     name: str, clips: Sequence[Path | str | Sound], folder: Path | None = None, encoder: SoundEncoder | None = None
 ) -> TaughtSound:
-    """Learn a new kind of sound from a few clips, and keep it; a sound of the same name is replaced.
+    """Learn a new kind of sound from clips, and keep it; a sound of the same name is replaced.
 
     Args:
-        name: what it shall be called, as one would ask for it: "our kettle's whistle".
+        name: as one would ask for it: "our kettle's whistle".
         clips: files or sounds, one at least; three to five different ones serve well.
         folder: a profile folder other than the user's own.
         encoder: the encoder to learn with; the embedded one if None.
@@ -96,22 +88,14 @@ def teach_sound(
 
 
 def enrolled_sounds(folder: Path | None = None) -> list[TaughtSound]:
-    """Return every sound that was taught, by name.
-
-    Raises:
-        BackendError: the notes of one are damaged; the sentence names the file.
-    """
+    """Return every sound that was taught, by name; ``BackendError`` names the file of one that is damaged."""
     root = sounds_folder(folder)
     found = [_read(notes) for notes in sorted(root.glob("*/sound.json"))] if root.is_dir() else []
     return sorted(found, key=lambda taught: taught.name.casefold())
 
 
 def forget_sound(name: str, folder: Path | None = None) -> None:
-    """Forget a taught sound.
-
-    Raises:
-        BackendError: none of that name was taught.
-    """
+    """Forget a taught sound; ``BackendError`` where none of that name was taught."""
     place = sounds_folder(folder) / _slug(name)
     if not (place / "sound.json").is_file():
         known = ", ".join(taught.name for taught in enrolled_sounds(folder)) or "none"
@@ -122,7 +106,7 @@ def forget_sound(name: str, folder: Path | None = None) -> None:
 
 
 def _slug(name: str) -> str:
-    """Return a folder's name for any name: letters and digits, and a short hash so that no two names meet."""
+    # A short hash, so that no two names meet.
     folded = " ".join(name.split()).casefold()
     plain = unicodedata.normalize("NFKD", folded).encode("ascii", "ignore").decode()
     return f"{re.sub('[^a-z0-9]+', '-', plain).strip('-')[:40] or 'sound'}-{sha256(folded.encode()).hexdigest()[:8]}"

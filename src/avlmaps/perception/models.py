@@ -24,8 +24,8 @@ _CACHE = {"win32": ("LOCALAPPDATA", "AppData/Local"), "darwin": ("", "Library/Ca
 def user_folder() -> Path:
     """Return the folder of this person's own profile; it need not exist yet.
 
-    ``AVLMAPS_HOME`` where it is set; else ``%APPDATA%`` on Windows, ``~/Library/Application Support`` on macOS and
-    ``$XDG_DATA_HOME`` (``~/.local/share``) elsewhere, and ``avlmaps`` in it.
+    ``AVLMAPS_HOME`` where it is set; else ``avlmaps`` in ``%APPDATA%``, ``~/Library/Application Support`` or
+    ``$XDG_DATA_HOME``.
     """
     own = os.environ.get("AVLMAPS_HOME")
     return user_path(own) if own else _of_system(*_OWN.get(sys.platform, ("XDG_DATA_HOME", ".local/share")))
@@ -34,8 +34,8 @@ def user_folder() -> Path:
 def cache_folder() -> Path:
     """Return the folder for what can be computed again and may be deleted at any time; it need not exist yet.
 
-    ``cache`` in ``AVLMAPS_HOME`` where that is set; else ``%LOCALAPPDATA%`` on Windows, ``~/Library/Caches`` on macOS
-    and ``$XDG_CACHE_HOME`` (``~/.cache``) elsewhere, and ``avlmaps`` in it.
+    ``cache`` in ``AVLMAPS_HOME`` where that is set; else ``avlmaps`` in ``%LOCALAPPDATA%``, ``~/Library/Caches`` or
+    ``$XDG_CACHE_HOME``.
     """
     own = os.environ.get("AVLMAPS_HOME")
     return user_path(own) / "cache" if own else _of_system(*_CACHE.get(sys.platform, ("XDG_CACHE_HOME", ".cache")))
@@ -79,8 +79,7 @@ class ModelSettings:
 def from_environment() -> ModelSettings:
     """Return the settings of AVLMAPS_MODELS, AVLMAPS_DEVICE, AVLMAPS_PRECISION, AVLMAPS_BATCH and HF_HUB_OFFLINE.
 
-    Raises:
-        BackendError: one of them is no such value.
+    ``BackendError``: one of them is no such value.
     """
     batch = os.environ.get("AVLMAPS_BATCH") or "0"
     if not batch.isdecimal():
@@ -152,23 +151,15 @@ ENTRY_POINT_GROUP = "avlmaps.published_models"
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """How a model is got.
+    """How a model is got."""
 
-    Attributes:
-        files: names that its single file goes by, below a folder of models; none for a hub's folder under its id.
-        repository: the hub's id of the repository that holds such a file.
-        package: an installed package in whose folder such a file may lie.
-        get: the command that brings it; ``hf download ID`` where it is ``""``.
-        fetched: the file that a folder of its name holds once avlmaps has fetched it; ``""`` for all others.
-        size_mb: about how much that is; 0 where it is not known.
-    """
-
+    # names of its single file below a folder of models; none for a hub's folder under its id
     files: tuple[str, ...] = ()
-    repository: str = ""
-    package: str = ""
-    get: str = ""
-    fetched: str = ""
-    size_mb: float = 0.0
+    repository: str = ""  # the hub's id of the repository that holds such a file
+    package: str = ""  # an installed package in whose folder such a file may lie
+    get: str = ""  # the command that brings it; ``hf download ID`` where it is ""
+    fetched: str = ""  # the file that a folder of its name holds once avlmaps has fetched it; "" for all others
+    size_mb: float = 0.0  # about how much that is; 0 where it is not known
 
 
 # By the name that a profile or the registry gives them. A model that is not here is looked for by its name.
@@ -205,14 +196,9 @@ def public_choice(choice: str) -> str:
 
 
 def local_model(model: str, how_to_get: str) -> Path:
-    """Return the folder or file of a model that is never fetched.
+    """Return the folder or file of a model that is never fetched: a name in the folder of models, or a path.
 
-    Args:
-        model: its name in the folder of models, or a path.
-        how_to_get: the command that makes or brings it, for the error.
-
-    Raises:
-        BackendError: it is not here.
+    ``BackendError``, with the command that brings it, where it is not here.
     """
     for place in places_of(model):
         if place.exists():
@@ -244,14 +230,9 @@ State = Literal["ready", "package missing", "weights missing", "broken"]
 
 @dataclass(frozen=True, slots=True)
 class Availability:
-    """The state of a backend.
+    """The state of a backend, its model and licence, what to do about it or know of its limits, and a feature's length.
 
-    Attributes:
-        state: ``ready`` says that it can be loaded (a small one: that it was).
-        model: which model it runs.
-        licence: of the weights.
-        note: what to do about it, or what to know of its limits.
-        dim: length of a feature; 0 where only loading would show it.
+    ``ready`` says that it can be loaded (a small one: that it was); ``dim`` is 0 where only loading would show it.
     """
 
     state: State

@@ -12,12 +12,7 @@ from avlmaps.recordings.types import Frame
 
 
 def open_network(graph: bytes | str, most_threads: int = 1) -> Any:
-    """Return a network, ready to run; raises what onnxruntime does, which has types of its own.
-
-    Args:
-        graph: the network, or the file of it.
-        most_threads: that it computes on, where there are as many cores.
-    """
+    """Return a network, or that of a file, ready to run on at most some threads; raises onnxruntime's own types."""
     import onnxruntime
 
     options = onnxruntime.SessionOptions()

@@ -34,12 +34,7 @@ _whole: dict[int, tuple[object, object]] = {}
 def completed(kind: Kind, encoder: object) -> Any:
     """Return an encoder of a module with all that its protocol asks for: itself where it has that already.
 
-    Args:
-        kind: the module.
-        encoder: an object with the methods of the module's protocol.
-
-    Raises:
-        BackendError: it is a class, or lacks a method that nobody can make for it.
+    ``BackendError``: it is a class, or lacks a method that nobody can make for it.
     """
     name = type(encoder).__qualname__
     if isinstance(encoder, type):
@@ -62,11 +57,7 @@ def completed(kind: Kind, encoder: object) -> Any:
 
 
 def whole(kind: Kind, encoder: object) -> Any:
-    """Return a package's encoder as ``completed`` does, the same object each time.
-
-    Raises:
-        BackendError: it lacks a method that nobody can make for it; the sentence names it.
-    """
+    """Return a package's encoder as ``completed`` does, the same object each time."""
     before, made = _whole.get(id(encoder), (None, None))
     if before is not encoder:
         made = completed(kind, encoder)
@@ -75,8 +66,7 @@ def whole(kind: Kind, encoder: object) -> Any:
 
 
 class _Members:
-    """An encoder's members, some of them others; in an object's own dictionary, where ``isinstance`` sees them."""
-
+    # In an object's own dictionary, where ``isinstance`` sees them.
     def __init__(self, encoder: object, members: Mapping[str, Any]) -> None:
         self.__dict__.update(members)
         self._name = type(encoder).__qualname__
@@ -95,7 +85,6 @@ def with_members(encoder: object, names: Iterable[str], others: Mapping[str, Any
 
 
 def _made(kind: Kind, encoder: Any) -> dict[str, Any]:
-    """Return the members of a protocol that can be made for an encoder."""
     name = type(encoder).__qualname__
 
     @cache
@@ -155,7 +144,6 @@ def _code(kind: type) -> bytes:
 
 
 def _held(value: Any, depth: int) -> Iterator[bytes]:
-    """Yield what an object holds: numbers, words, arrays, the weights of a network, and objects within."""
     value = _opened(value)
     if isinstance(value, np.ndarray):
         yield f"{value.dtype} {value.shape}".encode() + np.ascontiguousarray(value).tobytes()
@@ -173,7 +161,6 @@ def _held(value: Any, depth: int) -> Iterator[bytes]:
 
 
 def _opened(value: Any) -> Any:
-    """Return an object as the mapping or the array of what it holds; a number, a word or a container as it is."""
     if isinstance(value, str | bytes | int | float | bool | None | np.ndarray | Mapping | Sequence):
         return value
     if callable(getattr(value, "state_dict", None)):

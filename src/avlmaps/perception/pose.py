@@ -17,7 +17,11 @@ _PARTS = (slice(0, 3), slice(3, 6), slice(6, 7))
 
 @dataclass(frozen=True, slots=True)
 class PoseSettings:
-    """How a pose is estimated."""
+    """How a pose is estimated.
+
+    A point agrees when it is seen within ``max_error_rad`` of where it should be (6 px at f = 525); RANSAC stops after
+    ``max_iterations`` samples.
+    """
 
     max_error_rad: float = 0.012
     """A point agrees with a pose when it is seen within this angle of where it should be (6 px at f = 525)."""
@@ -35,15 +39,8 @@ def estimate_pose(
 ) -> tuple[Pose, Bool[np.ndarray, " n"]] | None:
     """Estimate the camera's pose by P3P in LO-RANSAC (PoseLib) with robust refinement of every inlier.
 
-    Args:
-        xy: image coordinates, pixels.
-        points_world: what they show, metres.
-        camera: the camera that took the picture.
-        rng: seeds the sampling; the same generator state gives the same pose.
-        settings: tolerance and effort.
-
-    Returns:
-        The pose and which points agree with it, or None where fewer than four do.
+    Points are pixels and metres. Returns the pose and which points agree with it, or None where fewer than four do; the
+    same state of ``rng`` gives the same pose.
     """
     import poselib
 
@@ -92,16 +89,8 @@ def refine_focal(
     """Let the focal length go along with the pose, and return the camera that fits the points best.
 
     Gauss-Newton with Cauchy weights on the reprojection error, over rotation, translation and the logarithm of one
-    factor on both focal lengths. Points that face the camera flatly constrain the focal length badly: let it replace a
-    given one only where that gains much ``agreement``.
-
-    Args:
-        xy: image coordinates, pixels.
-        points_world: what they show, metres; a few may be wrong.
-        camera: the camera as given.
-        world_from_camera: the pose found with it.
-        settings: the tolerance.
-        rounds: steps.
+    factor on both focal lengths. A few points may be wrong. Points that face the camera flatly constrain the focal
+    length badly: let it replace a given one only where that gains much ``agreement``.
     """
     camera_from_world = inverse(world_from_camera)
     log_factor = 0.0
@@ -130,11 +119,8 @@ def pose_deviation(
 ) -> tuple[float, float, float]:
     """Return the standard deviations of a pose whose focal length was estimated with it, from points that agree.
 
-    The inverse of the normal equations of ``refine_focal``, times the variance of the residuals.
-
-    Returns:
-        Of the focal length, as a part of it; of the place, metres; of the direction, radians. Infinite where the
-        points do not fix them.
+    They are of the focal length, as a part of it; of the place, metres; of the direction, radians; infinite where the
+    points do not fix them: the inverse of ``refine_focal``'s normal equations, times the variance of the residuals.
     """
     points = apply(inverse(world_from_camera), points_world)
     front = points[:, 2] > 0.05
@@ -154,7 +140,7 @@ def _reprojection(
     focal: Float[np.ndarray, "2"],
     centre: tuple[float, float],
 ) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2 7"]]:
-    """Return residuals in pixels and their derivatives by a small rotation, a small shift and the log focal length."""
+    # Residuals in pixels, and their derivatives by a small rotation, a small shift and the log focal length.
     x, y, z = points_camera.T
     seen = np.stack([x / z, y / z], axis=1) * focal
     by_point = np.zeros((len(xy), 2, 3))

@@ -23,13 +23,7 @@ FURNISHED = Path(__file__).parent
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomContents:
-    """The mean surface of each thing in a room of each kind.
-
-    Attributes:
-        things: names of the lexicon.
-        kinds: kinds of room, names of the lexicon.
-        surface_m2: of a thing (row) in a room of a kind (column).
-    """
+    """The mean surface, m², of each thing (row) in a room of each kind (column); both are names of the lexicon."""
 
     things: tuple[str, ...]
     kinds: tuple[str, ...]
@@ -38,11 +32,7 @@ class RoomContents:
 
 @cache
 def read_room_contents(folder: Path = FURNISHED) -> RoomContents:
-    """Return the table that a folder holds: a row for each thing, a column for each kind of room.
-
-    Args:
-        folder: by default that of rooms as they are furnished, else that of an encoder.
-    """
+    """Return the table of a folder (furnished rooms, or an encoder's): a row a thing, a column a kind of room."""
     text = (folder / TABLE).read_text(encoding="utf-8")
     head, *rows = csv.reader(text.splitlines())
     surface = np.array([[float(value) for value in row[1:]] for row in rows], np.float64)
@@ -51,23 +41,14 @@ def read_room_contents(folder: Path = FURNISHED) -> RoomContents:
 
 @dataclass(frozen=True, slots=True)
 class ModelCard:
-    """Which model made the features; it is written into the map.
+    """Which model made the features; it is written into the map."""
 
-    Attributes:
-        id: the model's name and version, such as ``avlmaps/words-1``.
-        dim: length of a feature.
-        licence: SPDX name of the weights' licence.
-        checksum: hex SHA-256 of the weights (or of the code's own constants); queries need the same.
-        prompts: the templates that a word is put into before it is encoded, ``{}`` standing for the word.
-        note: what a user must know of its limits, one sentence.
-    """
-
-    id: str
-    dim: int
-    licence: str
-    checksum: str
-    prompts: tuple[str, ...] = ("{}",)
-    note: str = ""
+    id: str  # the model's name and version, such as ``avlmaps/words-1``
+    dim: int  # length of a feature
+    licence: str  # SPDX name of the weights' licence
+    checksum: str  # hex SHA-256 of the weights (or of the code's own constants); queries need the same
+    prompts: tuple[str, ...] = ("{}",)  # that a word is put into before it is encoded, at ``{}``
+    note: str = ""  # what a user must know of its limits, one sentence
 
 
 @runtime_checkable
@@ -152,10 +133,8 @@ class NamedPixelEncoder(NamedEncoder, PixelEncoder, Protocol):
     ) -> Float[np.ndarray, " i"]:
         """Return how likely connected voxels are a true instance of a name.
 
-        Args:
-            name: one of ``names``.
-            mean_probability: of the name, over the voxels of each instance.
-            area_m2: surface of each instance: a voxel's face for each of its voxels.
+        ``mean_probability`` is of the name, over the voxels of each instance; ``area_m2`` a voxel's face for each of
+        its voxels.
         """
         ...
 
@@ -221,8 +200,7 @@ class SoundEncoder(Protocol):
     def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
         """Return a unit vector for each window of a sound; long sounds have many, any sound at least one.
 
-        Raises:
-            AudioError: the sound has no samples, or holds NaN.
+        ``AudioError``: the sound has no samples, or holds NaN.
         """
         ...
 
@@ -255,18 +233,13 @@ class FrameSoundEncoder(SoundEncoder, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class LocalFeatures:
-    """Keypoints of one picture.
+    """Keypoints of one picture."""
 
-    Attributes:
-        xy: image coordinates in pixels, sub-pixel, the centre of the first pixel at (0.5, 0.5).
-        descriptors: one row a keypoint, unit length.
-        score: the detector's confidence in each keypoint, in [0, 1]; empty where it is not known.
-        size: (width, height) of the picture, pixels; (0, 0) where it is not known. Learned matchers need it.
-    """
-
-    xy: Float32[np.ndarray, "n 2"]
-    descriptors: Float32[np.ndarray, "n d"]
+    xy: Float32[np.ndarray, "n 2"]  # pixels, sub-pixel, the centre of the first pixel at (0.5, 0.5)
+    descriptors: Float32[np.ndarray, "n d"]  # of unit length
+    # the detector's confidence in each, in [0, 1]; empty where it is not known
     score: Float32[np.ndarray, " n_or_none"] = field(default_factory=lambda: np.zeros(0, np.float32))
+    # (width, height) of the picture, pixels; (0, 0) where it is not known. Learned matchers need it
     size: tuple[int, int] = (0, 0)
 
 
@@ -328,12 +301,7 @@ class LearnedMatcher(Matcher, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a picture was taken.
-
-    Attributes:
-        world_from_camera: 4x4.
-        inliers: number of points that agree with it.
-    """
+    """Where a picture was taken, and the number of points that agree with that."""
 
     world_from_camera: Float[np.ndarray, "4 4"]
     inliers: int

@@ -85,12 +85,11 @@ _CELL = 4
 
 
 def _linear(srgb: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-    """Undo sRGB's gamma; values in [0, 1]."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def _lab(linear: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-    """Return CIELAB (D65) of linear sRGB."""
+    # CIELAB, D65
     xyz_from_rgb = np.array(
         [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
     )
@@ -100,18 +99,14 @@ def _lab(linear: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
 
 
 def _coordinates(lab: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-    """Return where colours are compared: lightness at half weight, and chroma relative to lightness.
-
-    Exposure scales lightness and chroma together, so their ratio identifies the colour; below a lightness of 15 chroma
-    is mostly noise and counts less.
-    """
+    # Exposure scales lightness and chroma together, so that their ratio identifies the colour; below a lightness of 15
+    # chroma is mostly noise and counts less.
     chroma = np.linalg.norm(lab[..., 1:], axis=-1, keepdims=True)
     relative = 100.0 / np.maximum(np.hypot(chroma, np.maximum(lab[..., :1], 15.0)), 1e-9)
     return np.concatenate([lab[..., :1] * _LIGHTNESS_SCALE, lab[..., 1:] * relative], axis=-1)
 
 
 def _example_table() -> tuple[Float[np.ndarray, "e 3"], np.ndarray]:
-    """Return the coordinates of all examples and the number of each one's colour."""
     linear, colour = [], []
     for number, name in enumerate(COLOURS):
         for code in _EXAMPLES[name].split():
@@ -129,11 +124,7 @@ def example_of(colour: str) -> tuple[int, int, int]:
 
 
 def memberships(srgb: Float[np.ndarray, "n 3"]) -> Float32[np.ndarray, "n 16"]:
-    """Return unit vectors: how much each colour is each basic term, then dark, medium and light.
-
-    Args:
-        srgb: in [0, 1].
-    """
+    """Return unit vectors of colours in [0, 1]: how much each is each basic term, then dark, medium and light."""
     lab = _lab(_linear(srgb))
     examples, colour = _example_table()
     points = _coordinates(lab)
@@ -170,7 +161,6 @@ class ColourWords:
 
     @cached_property
     def _table(self) -> Float32[np.ndarray, "32768 16"]:
-        """Features of all colours of five bits a channel."""
         level = (np.arange(32) + 0.5) / 32
         return memberships(np.stack(np.meshgrid(level, level, level, indexing="ij"), axis=-1).reshape(-1, 3))
 
@@ -214,7 +204,7 @@ class ColourWords:
 
 
 def _meaning(token: str) -> str:
-    """Return the basic term (with its shade) that a word of colour stands for, ``""`` for any other word."""
+    # The basic term (with its shade) that a word of colour stands for, "" for any other word.
     for word in (token, token.removesuffix("ish"), re.sub(r"(.)\1ish$", r"\1", token), token.removesuffix("ish") + "e"):
         if word in COLOURS:
             return word
@@ -224,7 +214,7 @@ def _meaning(token: str) -> str:
 
 
 def _colours_in(phrase: str) -> list[tuple[str, str, str]]:
-    """Return the words, the basic term and the shade (or ``""``) of each colour in a phrase, in order."""
+    # The words, the basic term and the shade (or "") of each colour in a phrase, in order.
     joined = phrase.lower()
     for compound in (word for word in _SYNONYMS if "-" in word):
         joined = joined.replace(compound.replace("-", " "), compound)

@@ -75,7 +75,7 @@ def _linear(off: Float64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
 
 
 def _cubic(off: Float64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
-    """Return Keys' weight of a neighbour that lies ``off`` cells away."""
+    # Keys' weight of a neighbour that lies so many cells away
     t = np.abs(off)
     near = ((_CUBIC + 2.0) * t - (_CUBIC + 3.0)) * t**2 + 1.0
     far = _CUBIC * (((t - 5.0) * t + 8.0) * t - 4.0)
@@ -88,7 +88,7 @@ def _sampled(
     y: Float64[np.ndarray, " n"],
     weight: Callable[[Float64[np.ndarray, " n"]], Float64[np.ndarray, " n"]],
 ) -> Float32[np.ndarray, "n d"]:
-    """Return values between cells; beyond the border they are zero."""
+    # Beyond the border cells are zero.
     padded = np.pad(np.moveaxis(cells, 0, -1), ((2, 2), (2, 2), (0, 0)))
     column, row = np.floor(x).astype(int), np.floor(y).astype(int)
     total = np.zeros((len(x), len(cells)), np.float32)
@@ -107,12 +107,12 @@ ROUNDS = 20
 class Vlad:
     """Sums, for each visual word, the residuals of the descriptors nearest to it (Jégou 2010).
 
-    Each word's sum is normalised by itself (Arandjelović and Zisserman 2013), so that a repeated texture does not
-    drown the rest, and the whole is of unit length. Its dot product measures how alike two pictures are.
+    Each word's sum is normalised by itself (Arandjelović and Zisserman 2013), so that a repeated texture does not drown
+    the rest, and the whole is of unit length. Its dot product measures how alike two pictures are. Descriptors of DISK
+    and ALIKED have 128 numbers.
     """
 
     def __init__(self, dim: int = 128) -> None:
-        """Take how many numbers a descriptor has: 128 of DISK's and ALIKED's."""
         constants = f"vlad-1 words={WORDS} dim={dim} learned_from={MAX_LEARNED_FROM} rounds={ROUNDS}"
         self._dim = dim
         self.card = ModelCard(
@@ -126,8 +126,7 @@ class Vlad:
     def fit(self, local: Sequence[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:
         """Learn the visual words from at most ``MAX_LEARNED_FROM`` of the keyframes' descriptors, drawn at random.
 
-        Returns:
-            ``centres``: (``WORDS``, d) float32. Fewer descriptors than words leave words that are alike or zero.
+        ``centres`` is (``WORDS``, d) float32; fewer descriptors than words leave words that are alike or zero.
         """
         return {"centres": learned_words(_drawn(local, self._dim, rng), rng)}
 
@@ -204,7 +203,6 @@ class MutualRatio:
     """Selects pairs that are mutually nearest and pass Lowe's ratio test from the first picture to the second."""
 
     def __init__(self, dim: int = 128, ratio: float = RATIO) -> None:
-        """Take how many numbers a descriptor has, and the ratio below which a pair stays."""
         self._ratio = ratio
         self.card = ModelCard(
             id="avlmaps/mutual-ratio-1",
@@ -221,13 +219,9 @@ class MutualRatio:
 def match_mutual(
     a: Float32[np.ndarray, "n d"], b: Float32[np.ndarray, "m d"], ratio: float = RATIO
 ) -> Int[np.ndarray, "k 2"]:
-    """Return the pairs of unit vectors that are mutually nearest and pass the ratio test.
+    """Return the pairs of unit descriptors that are mutually nearest and pass the ratio test.
 
-    Args:
-        a: unit descriptors of the first picture.
-        b: unit descriptors of the second.
-        ratio: a pair stays when its distance is below ``ratio`` times the distance to the second nearest in b; where
-            b has one row only there is no second, and the pair stays.
+    A pair stays when its distance is below ``ratio`` times that to the second nearest in b, or there is no second.
     """
     if not len(a) or not len(b):
         return np.zeros((0, 2), np.int64)

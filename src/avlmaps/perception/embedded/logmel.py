@@ -42,10 +42,9 @@ def mel_matrix() -> Float32[np.ndarray, "bins bands"]:
 
 
 def mel_power(samples: Float32[np.ndarray, " n"]) -> Float32[np.ndarray, "frames bands"]:
-    """Return the power in every band, 86 frames a second; frames are centred, the ends padded with silence.
+    """Return the power in every band of mono samples at ``RATE_HZ``, 86 frames a second; frames are centred.
 
-    Args:
-        samples: mono at ``RATE_HZ``.
+    The ends are padded with silence.
     """
     from scipy.fft import rfft
 
@@ -67,11 +66,7 @@ def normalised(mels: Float32[np.ndarray, "frames bands"]) -> Float32[np.ndarray,
 
 
 def check_audible(samples: Float[np.ndarray, " n"], name: str = "the sound") -> None:
-    """Refuse samples in which nothing is audible.
-
-    Raises:
-        AudioError: no samples, samples that are not finite numbers, or silence.
-    """
+    """Raise ``AudioError`` for no samples, samples that are not finite numbers, or silence."""
     if len(samples) == 0:
         raise AudioError(f"{name[0].upper() + name[1:]} has no samples; give a sound of at least a few milliseconds.")
     if not np.isfinite(samples).all():

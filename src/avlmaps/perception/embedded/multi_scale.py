@@ -30,11 +30,7 @@ AUGMENTATIONS = tuple(
 
 
 def see_multi_scale(network: SceneNetwork | PairedNetworks, frame: Frame) -> Seen:
-    """Encode a frame in every augmentation.
-
-    Returns:
-        the mean, on the grid of the plain one.
-    """
+    """Encode a frame in every augmentation, and return the mean, on the grid of the plain one."""
     import cv2
 
     first, *others = (network.see(frame, one) for one in AUGMENTATIONS)
@@ -64,11 +60,7 @@ def smoothed(
 ) -> Float32[np.ndarray, "h w c"]:
     """Return the mean of each cell and its neighbours, weighted by how near they are in space and in colour.
 
-    Args:
-        values: of each cell, such as probabilities.
-        depth_m: of the same cells; one without (0) stays as it is and counts for no other.
-        rgb: of the same cells.
-        camera: of this grid.
+    A cell without a depth (0) stays as it is and counts for no other. The camera is that of this grid.
     """
     import cv2
 

@@ -33,12 +33,9 @@ _ROOMS = Remembered()  # by network and frame
 
 
 class NamedEncoder:
-    """An encoder that distinguishes a closed set of names.
+    """An encoder that distinguishes a closed set of names; by default with the two networks and the words that ship.
 
-    Args:
-        network: which; the two that ship, together, if None.
-        words: the word encoder whose space the features live in; the embedded one if None.
-        licence: of the networks.
+    The features lie in the space of ``words``; ``licence`` is of the networks.
     """
 
     _names: ClassVar[str]  # ``categories`` or ``rooms`` of the network's notes
@@ -81,7 +78,7 @@ class NamedEncoder:
         return Meanings(self.names, called, notes.kinds, self._words, kind)
 
     def name_weights(self, word: str) -> Float32[np.ndarray, " k"]:
-        """Return for each of ``names`` how much a phrase means it, 1 for the most meant; zero where it means none.
+        """Return how much a phrase means each of ``names``, 1 for the most meant; zero where it means none.
 
         A name takes in its narrower ones: an armchair answers to "chair".
         """
@@ -160,10 +157,7 @@ class EmbeddedPixels(NamedEncoder):
     ) -> Float[np.ndarray, " i"]:
         """Return how likely connected voxels are a true instance of a name; see ``InstanceNotes``.
 
-        Args:
-            name: one of ``names``.
-            mean_probability: of the name, over the voxels of each instance.
-            area_m2: surface of each instance.
+        ``mean_probability`` is of the name, over the voxels of each instance; ``area_m2`` is each one's surface.
         """
         notes = self._network.notes.instances
         p = np.clip(np.asarray(mean_probability, np.float64), 1e-4, 1.0 - 1e-4)
@@ -235,11 +229,8 @@ def trained_views(model: str = MODEL) -> EmbeddedViews:
 def open_trained(model: str = MODEL) -> SceneNetwork | PairedNetworks:
     """Return networks from a folder, or the one of a file ``NAME.onnx`` with ``NAME.json`` beside it.
 
-    Args:
-        model: the name of the folder or file in the folder of models, or a path.
-
-    Raises:
-        BackendError: they are not here, cannot be read, or do not go together.
+    ``model`` is a name in the folder of models, or a path. ``BackendError``: they are not here, cannot be read, or do
+    not go together.
     """
     place = local_model(model, _HOW_TO_GET)
     if place.is_file():

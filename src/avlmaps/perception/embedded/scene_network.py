@@ -36,17 +36,11 @@ _LARGEST_STEP = 0.06  # of the depth: a greater step between neighbours is an ed
 def channels(
     depth_m: Float32[np.ndarray, "h w"], camera: Pinhole, up_in_camera: Float[np.ndarray, "3"], camera_height_m: float
 ) -> Float32[np.ndarray, "8 h w"]:
-    """Return the geometry of a depth picture, zero (but for the last channel) where there is no depth.
+    """Return the geometry of a depth picture (z, 0 where there is none): zero there, but for the last channel.
 
     The channels: logarithm of a pixel's size on the surface in centimetres; a quarter of the depth; height over the
-    floor in metres, within −1 and 4; the surface normal along up, to the camera's right and along its heading
-    (both level); 1 where there is a depth; the rise of the pixel's ray, −1 straight down to 1 straight up.
-
-    Args:
-        depth_m: z-depth, 0 where there is none.
-        camera: of that picture.
-        up_in_camera: unit vector.
-        camera_height_m: of the camera over the floor.
+    floor in metres, within −1 and 4; the surface normal along up, to the camera's right and along its heading (both
+    level); 1 where there is a depth; the rise of the pixel's ray, −1 straight down to 1 straight up.
     """
     rows, columns = np.ogrid[: depth_m.shape[0], : depth_m.shape[1]]
     x, y = ((columns + 0.5 - camera.cx) / camera.fx).astype("f4"), ((rows + 0.5 - camera.cy) / camera.fy).astype("f4")
@@ -69,7 +63,7 @@ def channels(
 def _normals(
     z: Float32[np.ndarray, "h w"], x: Float32[np.ndarray, "1 w"], y: Float32[np.ndarray, "h 1"], camera: Pinhole
 ) -> tuple[Float32[np.ndarray, "h w"], ...]:
-    """Return the normal of the surface at each pixel, towards the camera; zero where its neighbours are of others."""
+    # Towards the camera; zero where the neighbours are of other surfaces.
     (left, far_left), (right, far_right) = (_neighbour(z, 1, sign) for sign in (-1, 1))
     (above, far_above), (below, far_below) = (_neighbour(z, 0, sign) for sign in (-1, 1))
     across, down = right - left, below - above
@@ -87,7 +81,7 @@ def _normals(
 def _neighbour(
     z: Float32[np.ndarray, "h w"], axis: int, sign: int
 ) -> tuple[Float32[np.ndarray, "h w"], Float32[np.ndarray, "h w"]]:
-    """Return the depth of each pixel's farthest neighbour on one side that is of its surface, and how far that is."""
+    # The depth of each pixel's farthest neighbour on one side that is of its surface, and how many pixels away that is.
     depth, reach = z.copy(), np.zeros_like(z)
     largest = np.float32(_LARGEST_STEP) * z
     for pixels in (1, _REACH_PX):  # the farther one counts
@@ -121,12 +115,7 @@ SYNTHETIC_WEIGHTS: Final = "scene_encoder_synthetic"
 
 @dataclass(frozen=True, slots=True)
 class Augmentation:
-    """How a frame is changed before the network sees it (test-time augmentation).
-
-    Attributes:
-        scale: how wide the picture is, times ``Notes.width_px``.
-        mirrored: left is right, as in a mirror.
-    """
+    """How a frame is changed before the network sees it (test-time augmentation): wider, or as in a mirror."""
 
     scale: float = 1.0
     mirrored: bool = False
@@ -140,14 +129,8 @@ _ACROSS = 4  # the channel of geometry that changes its sign in a mirror: the no
 class InstanceNotes(msgspec.Struct, frozen=True):
     """How instances are distinguished from noise, fitted on maps of held-out homes (``training/pixels/instances.py``).
 
-    The log-odds that they are a true instance are ``bias + slopes[0]·log-odds(p) + slopes[1]·log(area / usual area)``.
-
-    Attributes:
-        slopes: of the log-odds of their mean probability, and of the logarithm of their area beside the usual one.
-        bias: of each category; of all others ``default_bias``.
-        area_m2: the usual surface of a true instance of each category; of all others ``default_area_m2``.
-        default_bias: see above.
-        default_area_m2: see above.
+    The log-odds that they are a true instance are ``bias + slopes[0]·log-odds(p) + slopes[1]·log(area / usual area)``,
+    p their mean probability. ``bias`` and ``area_m2``, the usual surface of a true instance, are by category.
     """
 
     slopes: tuple[float, float] = (1.0, 0.8)
@@ -158,50 +141,29 @@ class InstanceNotes(msgspec.Struct, frozen=True):
 
 
 class Notes(msgspec.Struct, frozen=True):
-    """The description of the weights beside them.
+    """The description of the weights beside them."""
 
-    Attributes:
-        id: the model's name and version.
-        note: its limits, one sentence.
-        categories: kinds of pixels, ``other`` among them.
-        rooms: kinds of room.
-        bias: added to the categories' scores: undoes the weights of training and calibrates.
-        temperature: divides the categories' scores before the softmax.
-        room_temperature: divides the rooms' scores.
-        called: for a category other phrases for it.
-        kinds: wider words and the categories that they take in.
-        width_px: how wide the pictures are that the network looks at; their focal length is no longer than this
-            either, since it was trained on none longer.
-        instances: how instances are distinguished from noise.
-        multiple: pictures are padded to a multiple of this.
-        fineness: how many times as wide and high as geometry the colour is that the network takes.
-        checksum: of the weights and of what else makes the features; see ``checksum_of``.
-    """
-
-    id: str
-    note: str
-    categories: tuple[str, ...]
-    rooms: tuple[str, ...]
-    bias: tuple[float, ...]
-    temperature: float
-    room_temperature: float
-    called: dict[str, tuple[str, ...]]
-    kinds: dict[str, tuple[str, ...]]
-    width_px: int = 240
+    id: str  # the model's name and version
+    note: str  # its limits, one sentence
+    categories: tuple[str, ...]  # kinds of pixels, ``other`` among them
+    rooms: tuple[str, ...]  # kinds of room
+    bias: tuple[float, ...]  # added to the categories' scores: undoes the weights of training and calibrates
+    temperature: float  # divides the categories' scores before the softmax
+    room_temperature: float  # divides the rooms' scores
+    called: dict[str, tuple[str, ...]]  # for a category other phrases for it
+    kinds: dict[str, tuple[str, ...]]  # wider words and the categories that they take in
+    width_px: int = 240  # of the pictures that it looks at; they have no longer focal length either, as in training
     instances: InstanceNotes = InstanceNotes()
-    multiple: int = 16
-    fineness: int = 1
-    checksum: str = ""
+    multiple: int = 16  # pictures are padded to a multiple of this
+    fineness: int = 1  # how many times as wide and high as geometry the colour is
+    checksum: str = ""  # of the weights and of what else makes the features; see ``checksum_of``
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """The network's outputs for a frame.
+    """The probabilities of categories on a grid that covers the colour picture evenly, and of kinds of room.
 
-    Attributes:
-        category: probability of each category on a grid that covers the colour picture evenly.
-        known: which cells have a depth.
-        room: probability of each kind of room.
+    ``known`` says which cells have a depth.
     """
 
     category: Float32[np.ndarray, "h w c"]
@@ -210,16 +172,7 @@ class Seen:
 
 
 class SceneNetwork:
-    """The network. Its weights are read for the first frame: a query in words needs its notes alone.
-
-    Args:
-        read_weights: returns the content of the ONNX file.
-        notes: their description.
-
-    Attributes:
-        notes: as given.
-        checksum: of the notes.
-    """
+    """The network. Its weights are read for the first frame: a query in words needs its notes alone."""
 
     def __init__(self, read_weights: Callable[[], bytes], notes: Notes) -> None:
         self._read_weights = read_weights
@@ -229,7 +182,6 @@ class SceneNetwork:
 
     @cached_property
     def _session(self) -> Any:
-        """The network, ready to run."""
         weights = self._read_weights()
         try:
             return open_network(weights, most_threads=4)
@@ -266,28 +218,16 @@ class SceneNetwork:
 
 @cache
 def load_network(weights: str = DEFAULT_WEIGHTS) -> SceneNetwork:
-    """Return a network that ships with the package.
-
-    Args:
-        weights: ``DEFAULT_WEIGHTS`` or ``SYNTHETIC_WEIGHTS``.
-
-    Raises:
-        BackendError: its files are missing or damaged.
-    """
+    """Return a network that ships, ``DEFAULT_WEIGHTS`` or ``SYNTHETIC_WEIGHTS``; raises ``BackendError``."""
     folder = Path(__file__).with_name("weights")
     return read_network(folder, weights, "install the package again, or make them with 'python -m training.pixels'")
 
 
 def read_network(folder: Path, weights: str, remedy: str) -> SceneNetwork:
-    """Return the network of two files: ``WEIGHTS.onnx``, and its ``Notes``, ``WEIGHTS.json``.
+    """Return the network of two files in a folder: ``WEIGHTS.onnx``, and its ``Notes``, ``WEIGHTS.json``.
 
-    Args:
-        folder: where they lie.
-        weights: their name without an ending.
-        remedy: what the user can do where they are missing or damaged, for the error.
-
-    Raises:
-        BackendError: the notes cannot be read. The weights are read for the first frame, and raise it there.
+    ``BackendError``, with the remedy, where the notes cannot be read; the weights are read for the first frame, and
+    raise it there.
     """
 
     def unusable(fault: object) -> BackendError:
@@ -329,10 +269,8 @@ def at_working_size(
 ) -> tuple[Pinhole, Float32[np.ndarray, "h w"], UInt8[np.ndarray, "hf wf 3"]]:
     """Return the colour camera, the depth as it sees it, and its picture, at the size that the network looks at.
 
-    Args:
-        frame: the frame.
-        width_px: how wide the network's geometry is, and no longer its focal length.
-        fineness: how many times as wide and high the picture is.
+    The geometry is ``width_px`` wide, and its focal length no longer; the picture is ``fineness`` times as wide and
+    high.
     """
     import cv2
 
@@ -377,15 +315,7 @@ NO_SAY, SAME_SAY = 0.75, 0.95
 
 
 class PairedNetworks:
-    """A network and a second one that has a say where the two agree.
-
-    Args:
-        first: its notes are the pair's; its categories hold all of the second's.
-        second: the other one.
-
-    Attributes:
-        notes: of the first.
-        checksum: of both and of how they are mixed.
+    """A network and a second one that has a say where the two agree; their notes are the first's.
 
     Raises:
         ValueError: the second network has categories that the first lacks, or other kinds of room.

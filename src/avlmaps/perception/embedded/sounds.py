@@ -31,13 +31,9 @@ _BATCH = 16
 
 @dataclass(frozen=True, slots=True)
 class KnownKind:
-    """A kind of sound that the network learnt.
+    """A kind of sound that the network learnt, with the phrases that a question is compared with.
 
-    Attributes:
-        name: what answers call it.
-        called: phrases that a question is compared with.
-        origin: ``recorded`` or ``synthesised``: what its examples were.
-        clips: how many examples.
+    ``clips`` counts its examples; its origin is ``recorded`` or ``synthesised``.
     """
 
     name: str
@@ -48,12 +44,9 @@ class KnownKind:
 
 @dataclass(frozen=True, slots=True)
 class EncodedSound:
-    """The features of one sound.
+    """How likely a sound holds each kind, the known ones and then the taught, and that it is of any of them.
 
-    Attributes:
-        kinds: how likely the sound holds each kind, the known ones and then the taught ones; they need not sum to one,
-            since a long sound may hold several and an unknown one none.
-        known: how likely it is of any of them.
+    They need not sum to one: a long sound may hold several and an unknown one none.
     """
 
     kinds: Float[np.ndarray, " kinds"]
@@ -63,10 +56,8 @@ class EncodedSound:
 class EmbeddedSounds:
     """Our own sound encoder (``SoundEncoder``): onnxruntime on one thread, no download.
 
-    Args:
-        words: the word encoder whose space the features live in; the embedded one if None.
-        folder: the profile folder with the taught sounds; the user's own if None.
-        weights: the folder of ``sounds.onnx``, ``sounds.json`` and ``sounds.npy``; those that ship if None.
+    By default with the words that ship, the user's taught sounds, and the weights that ship: a folder of
+    ``sounds.onnx``, ``sounds.json`` and ``sounds.npy``.
     """
 
     def __init__(
@@ -111,11 +102,7 @@ class EmbeddedSounds:
         return tuple(taught for taught in own if taught.checksum == self.card.checksum)
 
     def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
-        """Return a unit vector for each window of 5.2 s, one every 2.6 s.
-
-        Raises:
-            AudioError: the sound has no samples, or some that are not finite numbers.
-        """
+        """Return a unit vector for each window of 5.2 s, one every 2.6 s; ``AudioError`` without samples or for NaN."""
         logmel.check_audible(sound.samples)
         mels = logmel.normalised(logmel.mel_power(resample(sound, logmel.RATE_HZ).samples))
         windows = logmel.windows(mels)
@@ -173,7 +160,6 @@ class EmbeddedSounds:
 
     @cached_property
     def _prototypes(self) -> Float32[np.ndarray, "kinds d"]:
-        """The network's target for each kind: the mean over the templates of its first name."""
         firsts = [kind.called[0] for kind in self.kinds]
         total = np.sum(
             [self._words.encode([prompt.format(word) for word in firsts]) for prompt in self.card.prompts], axis=0
@@ -182,13 +168,11 @@ class EmbeddedSounds:
 
     @cached_property
     def _called(self) -> tuple[Float32[np.ndarray, "names d"], np.ndarray]:
-        """The vectors of everything that the known kinds are called, and where each kind's begin."""
         vectors = self._words.encode([name for kind in self.kinds for name in kind.called])
         starts = np.cumsum([0] + [len(kind.called) for kind in self.kinds[:-1]])
         return vectors, starts
 
     def _meant(self, words: Sequence[str], taught: Sequence[TaughtSound]) -> tuple[np.ndarray, np.ndarray]:
-        """Return for each phrase its share in each kind, and how likely it names one."""
         asked = self._words.encode(words)
         vectors, starts = self._called
         cosines = np.maximum.reduceat(asked @ vectors.T, starts, axis=1)
@@ -197,7 +181,6 @@ class EmbeddedSounds:
         return kinds_of_phrases(cosines, self.calibration)
 
     def _hear(self, features: Float32[np.ndarray, "windows d"], taught: Sequence[TaughtSound]) -> EncodedSound:
-        """Return the kinds in a sound: for each the most likely window."""
         near = nearness(features, self._examples, self._starts)
         typical = features @ self._typical.T
         posterior, known = kinds_of_windows(features @ self._prototypes.T, typical, near, self.calibration)
@@ -217,26 +200,16 @@ Array = Float[np.ndarray, "..."]
 
 @dataclass(frozen=True, slots=True)
 class SoundCalibration:
-    """The fitted constants.
+    """The fitted constants."""
 
-    Attributes:
-        temperature: of the softmax over kinds of what speaks for each.
-        known: weights (bias, nearness of the nearest example, lead over the runner-up) of the log-odds that a window is
-            of a known kind.
-        phrase_temperature: of the softmax over kinds of a phrase's cosines.
-        phrase: (bias, highest cosine) of the log-odds that a phrase names a known kind.
-        word: (bias, log-odds of the matched posterior) of the log-odds that a sound is what a phrase names.
-        pair: (bias, cosine, agreement of posteriors) of the log-odds that two sounds are of one kind.
-        taught: (bias, ``taught_lead``) of the log-odds that a window is of a taught kind.
-    """
-
-    temperature: float
+    temperature: float  # of the softmax over kinds of the evidence for each
+    # log-odds of a known kind: bias, nearness of the nearest example, lead over the runner-up
     known: tuple[float, float, float]
-    phrase_temperature: float
-    phrase: tuple[float, float]
-    word: tuple[float, float]
-    pair: tuple[float, float, float]
-    taught: tuple[float, float]
+    phrase_temperature: float  # of the softmax over kinds of a phrase's cosines
+    phrase: tuple[float, float]  # log-odds that it names a known kind: bias, highest cosine
+    word: tuple[float, float]  # log-odds that a sound is what a phrase names: bias, log-odds of the match
+    pair: tuple[float, float, float]  # log-odds that two are of one kind: bias, cosine, agreement
+    taught: tuple[float, float]  # log-odds of a taught kind: bias, ``taught_lead``
 
 
 def log_odds(p: Array) -> Array:

@@ -29,29 +29,17 @@ _REMEMBERED = 4096
 
 @dataclass(frozen=True, slots=True)
 class WordWeights:
-    """The files that the training command writes.
+    """The files that the training command writes."""
 
-    Attributes:
-        entries: names of the table's rows: word pieces, words, runs of words.
-        table: one row an entry; a row's vector is ``table * scale``.
-        scale: one step size a row.
-        roles: scaling of the rows before the head, of the head, and after it.
-        inner: first layer of the correction, ``relu(x @ inner + inner_bias) @ outer + outer_bias``.
-        inner_bias: its bias.
-        outer: second layer.
-        outer_bias: its bias.
-        checksum: hex SHA-256 of the file of weights and of the alias table together.
-    """
-
-    entries: list[str]
-    table: Int8[np.ndarray, "rows d"]
-    scale: Float32[np.ndarray, " rows"]
-    roles: Float32[np.ndarray, "3 d"]
-    inner: Float32[np.ndarray, "d h"]
+    entries: list[str]  # names of the table's rows: word pieces, words, runs of words
+    table: Int8[np.ndarray, "rows d"]  # one row an entry; a row's vector is ``table * scale``
+    scale: Float32[np.ndarray, " rows"]  # one step size a row
+    roles: Float32[np.ndarray, "3 d"]  # scaling of the rows before the head, of the head, and after it
+    inner: Float32[np.ndarray, "d h"]  # the correction is ``relu(x @ inner + inner_bias) @ outer + outer_bias``
     inner_bias: Float32[np.ndarray, " h"]
     outer: Float32[np.ndarray, "h d"]
     outer_bias: Float32[np.ndarray, " d"]
-    checksum: str
+    checksum: str  # hex SHA-256 of the file of weights and of the alias table together
 
 
 def read_aliases(text: str) -> dict[str, str]:
@@ -91,9 +79,6 @@ class EmbeddedWords:
 
     English only. Words that it has no row and no pieces for (other scripts, emoji) are left out of a phrase; a phrase
     that holds nothing else is refused.
-
-    Attributes:
-        card: which model this is.
     """
 
     def __init__(self) -> None:
@@ -113,11 +98,7 @@ class EmbeddedWords:
         return self._aliases
 
     def encode(self, phrases: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase; each is computed alone, so company cannot change it.
-
-        Raises:
-            QueryError: a phrase is empty, or holds no English word.
-        """
+        """Return a unit vector for each phrase, computed alone; ``QueryError`` where one holds no English word."""
         if isinstance(phrases, str):
             raise TypeError(f"Expected a sequence of phrases, got the string {phrases!r}; put it into a list.")
         vectors = np.empty((len(phrases), self.card.dim), np.float32)
@@ -126,11 +107,7 @@ class EmbeddedWords:
         return vectors
 
     def nearest(self, phrase: str, labels: Sequence[str]) -> list[tuple[str, float]]:
-        """Return the labels with their cosine to the phrase, nearest first; equals stay in the order given.
-
-        Raises:
-            QueryError: the phrase or a label is empty, or holds no English word.
-        """
+        """Return the labels with their cosine to the phrase, nearest first; errors as of ``encode``."""
         cosines = self.encode(labels) @ self.encode([phrase])[0]
         order = np.argsort(-cosines, kind="stable").tolist()
         return [(str(labels[int(index)]), float(cosines[index])) for index in order]
@@ -243,8 +220,7 @@ def replace_aliases(words: list[str], aliases: Mapping[str, str]) -> list[str]:
 class WordPieces:
     """Cuts words into rows of a table: the longest known run of words, else the word's pieces, longest first.
 
-    Args:
-        entries: the rows' names in order: word pieces (``##ing`` continues a word), words and runs of words.
+    The rows' names in order are word pieces (``##ing`` continues a word), words and runs of words.
     """
 
     def __init__(self, entries: list[str]) -> None:
@@ -310,36 +286,22 @@ _ARTICLES = frozenset({"a", "an", "the", "some", "any", "my", "our", "your", "hi
 
 @dataclass(frozen=True)
 class Meanings:
-    """Finds the names that a phrase means, and the share of each.
-
-    Attributes:
-        names: what can be meant.
-        called: for each name the phrases that stand for it, itself among them.
-        kinds: what a wider word takes in: ``table`` is a dining table, a coffee table ...; and a name its narrower
-            names: an armchair is a ``chair``.
-        words: vectors of phrases.
-        kind: of entry that the names are.
-        temperature: a cosine lower by this than the best makes a name e times less meant.
-        least_cosine: of the best name for a description; below, it means none of them.
-        least_within: the same where the noun is known and only the choice between its names is open.
-        sure_cosine: of a noun that the lexicon lacks; below, it means none of the names.
-        least_share: names meant less than this beside the best one are left out.
-        narrower: a narrower name must be nearer by this cosine than the noun's own.
-        narrower_share: a name means its narrower ones by this much: the chair is rather a chair than an armchair.
-    """
+    """Finds the names that a phrase means, and the share of each."""
 
     names: tuple[str, ...]
-    called: tuple[tuple[str, ...], ...]
+    called: tuple[tuple[str, ...], ...]  # for each name the phrases that stand for it, itself among them
+    # wider words: ``table`` is a dining table, a coffee table ...; and names of narrower ones: an armchair is a
+    # ``chair``
     kinds: dict[str, tuple[str, ...]]
     words: WordEncoder
     kind: EntryKind = EntryKind.THING
-    temperature: float = 0.07
-    least_cosine: float = 0.5
-    least_within: float = 0.3
-    sure_cosine: float = 0.8
-    least_share: float = 0.2
-    narrower: float = 0.15
-    narrower_share: float = 0.8
+    temperature: float = 0.07  # a cosine lower by this than the best makes a name e times less meant
+    least_cosine: float = 0.5  # of the best name for a description; below, it means none of them
+    least_within: float = 0.3  # likewise where the noun is known and only the choice between its names is open
+    sure_cosine: float = 0.8  # of a noun that the lexicon lacks; below, it means none of the names
+    least_share: float = 0.2  # names meant less than this beside the best one are left out
+    narrower: float = 0.15  # a narrower name must be nearer by this cosine than the noun's own
+    narrower_share: float = 0.8  # the chair is rather a chair than an armchair
 
     def name_weights(self, phrase: str) -> Float32[np.ndarray, " k"]:
         """Return for each name how much the phrase means it, 1 for the most meant; all zero where it means none."""
@@ -353,7 +315,7 @@ class Meanings:
         return out
 
     def own_weights(self, phrase: str) -> Float32[np.ndarray, " k"]:
-        """Return the same without what is narrower than the names: an armchair is a name of its own."""
+        """Return ``name_weights`` without what is narrower than the names: an armchair is a name of its own."""
         clean = _clean(phrase)
         if clean in self._exactly:
             return self._all_of(self._exactly[clean])
@@ -390,13 +352,13 @@ class Meanings:
         return ()
 
     def _general(self, phrase: str, head: Entry) -> Float32[np.ndarray, " k"]:
-        """Return the meaning of a phrase about an appliance, a piece of furniture ...: the nearest name."""
+        # of an appliance, a piece of furniture ...
         near = self._nearest(phrase, self.names, self.least_cosine)
         fitting = [entry.name for entry in lexicon().members(head.name) if entry.name in self.names]
         return near if near.any() else self._nearest(phrase, fitting, self.least_within)
 
     def _described(self, phrase: str, head: Entry) -> Float32[np.ndarray, " k"]:
-        """Return the meaning of a known noun with words round it: of several fitting names the nearest."""
+        # of a known noun with words round it
         fitting = self.names_of(head)
         if len(fitting) > 1:
             near = self._nearest(phrase, fitting, self.least_within)
