@@ -9,7 +9,7 @@ import numpy as np
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.audio import events
-from avlmaps.maps.audio.settings import HearingSettings
+from avlmaps.maps.settings import HearingSettings
 from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.protocols import ModelCard, SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac

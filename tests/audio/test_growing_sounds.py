@@ -15,9 +15,9 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.maps import hearing
 from avlmaps.maps.audio.events import detect_events
 from avlmaps.maps.audio.segmentation import segment
-from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.frame_sums import Walked
 from avlmaps.maps.hearing import ENDED_S, Hearing
+from avlmaps.maps.settings import HearingSettings
 from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.audio import AudioTrack, Sound

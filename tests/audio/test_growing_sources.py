@@ -8,9 +8,9 @@ import pytest
 from test_bearings import PLACES, SPANS, UP, said, surface
 
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.frame_sums import Walked
 from avlmaps.maps.hearing import Hearing
+from avlmaps.maps.settings import HearingSettings
 from avlmaps.maps.sources.bearings import Device
 from avlmaps.maps.sources.find import SourceFinder, find_sources
 from avlmaps.maps.types import SourceEvidence

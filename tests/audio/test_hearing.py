@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.maps.audio.events import track_of as places_of
 from avlmaps.maps.audio.segmentation import Segment, segment
-from avlmaps.maps.audio.settings import HearingSettings, SegmentationSettings
+from avlmaps.maps.settings import HearingSettings, SegmentationSettings
 from avlmaps.recordings.audio import AudioTrack
 
 PLAIN = HearingSettings()

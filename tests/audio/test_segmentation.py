@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import AudioError
 from avlmaps.maps.audio.background import band_powers
 from avlmaps.maps.audio.segmentation import Segment, segment
-from avlmaps.maps.audio.settings import SegmentationSettings
+from avlmaps.maps.settings import SegmentationSettings
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 
 HOP_S = 0.01

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from avlmaps.maps.audio.segmentation import Segment
-from avlmaps.maps.audio.settings import SegmentationSettings
+from avlmaps.maps.settings import SegmentationSettings
 from avlmaps_sim.bench.harness.figures import poisson, wilson
 from avlmaps_sim.bench.segmentation import COLUMNS, Tally, clips_to_test, measure
 

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.maps.audio.segmentation import frames_of_track, split_at_changes
-from avlmaps.maps.audio.settings import HearingSettings, SoundChangeSettings
-from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.settings import BuildSettings, HearingSettings, SoundChangeSettings
 from avlmaps.perception.protocols import FrameSoundEncoder, ModelCard
 from avlmaps.recordings.audio import Sound
 

@@ -12,9 +12,8 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AvlmapsError, MapError
 from avlmaps.core.numbers import as_number, as_whole
 from avlmaps.live.status import LiveSettings
-from avlmaps.maps.audio.settings import HearingSettings, SegmentationSettings
 from avlmaps.maps.fusion.sensor import FusionSettings
-from avlmaps.maps.settings import BuildSettings, FrameSettings
+from avlmaps.maps.settings import BuildSettings, FrameSettings, HearingSettings, SegmentationSettings
 from avlmaps.query.settings import QuerySettings
 from avlmaps.recordings.audio import require_rate
 from avlmaps.recordings.channels import ChannelSound

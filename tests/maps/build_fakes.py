@@ -13,8 +13,7 @@ import numpy as np
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import Backend, Kind, register
-from avlmaps.maps.keyframes.choose import KeyframeSettings
-from avlmaps.maps.settings import BuildSettings, FrameSettings
+from avlmaps.maps.settings import BuildSettings, FrameSettings, KeyframeSettings
 from avlmaps.perception.encoders import Encoders, register_profile
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from avlmaps.maps.gravity.up import some_frames, up_doubts
+from avlmaps.maps.gravity import some_frames, up_doubts
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
 from helpers.walked_room import write_walk

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.maps.gravity.up import find_up, surface_normals
+from avlmaps.maps.gravity import find_up, surface_normals
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame
 

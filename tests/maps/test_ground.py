@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.maps.gravity.floor import (
+from avlmaps.maps.gravity import (
     USUAL_HEIGHT_M,
     Expected,
     FoundGround,

@@ -11,13 +11,15 @@ from avlmaps.core.columns import concat
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import apply, from_quaternion, inverse, rotation_angle_rad
 from avlmaps.core.registry import Backend, Kind, register
-from avlmaps.maps.keyframes.album import (
+from avlmaps.maps.keyframes import (
     describe_keyframe,
+    keyframes_by_motion,
     lift_keypoints,
     middle_of_view,
     perceive_keyframes,
+    select_keyframes,
 )
-from avlmaps.maps.keyframes.choose import KeyframeSettings, keyframes_by_motion, select_keyframes
+from avlmaps.maps.settings import KeyframeSettings
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.images import depth_in_colour

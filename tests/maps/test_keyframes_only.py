@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map, encode_frames
-from avlmaps.maps.keyframes.choose import select_keyframes
+from avlmaps.maps.keyframes import select_keyframes
 from avlmaps.perception.cache import CacheSettings
 from avlmaps.perception.encoders import Encoders
 

@@ -9,8 +9,8 @@ import pytest
 
 from avlmaps.core.columns import concat
 from avlmaps.core.poses import inverse, rotation_angle_rad
-from avlmaps.maps.keyframes.album import describe_keyframe
-from avlmaps.maps.keyframes.choose import KeyframeSettings
+from avlmaps.maps.keyframes import describe_keyframe
+from avlmaps.maps.settings import KeyframeSettings
 from avlmaps.perception.embedded.keypoints import XFeat
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import LocalFeatures, ModelCard

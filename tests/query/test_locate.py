@@ -9,7 +9,7 @@ from PIL import Image
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse, rotation_angle_rad
-from avlmaps.maps.keyframes.album import NO_KEYFRAMES
+from avlmaps.maps.keyframes import NO_KEYFRAMES
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query import locate as locate_module
 from avlmaps.query.locate import Located, LocateSettings, alike, camera_of_35mm, focal_35mm_of, locate, nearest

@@ -23,8 +23,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.lexicon import Entry, EntryKind, lexicon
 from avlmaps.core.registry import Kind
 from avlmaps.maps.build import build_map
-from avlmaps.maps.keyframes.choose import KeyframeSettings
-from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.settings import BuildSettings, KeyframeSettings
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.perception.embedded.pixels import LARGEST_LOG_AREA, SMALLEST_LOG_AREA, EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, InstanceNotes, Notes

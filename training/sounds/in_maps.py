@@ -20,8 +20,8 @@ import numpy as np
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.audio.events import detect_events
-from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.settings import HearingSettings
 from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.embedded import logmel
 from avlmaps.perception.embedded.sounds import EmbeddedSounds

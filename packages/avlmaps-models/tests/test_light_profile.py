@@ -10,7 +10,7 @@ import soundfile
 from avlmaps.cli import main
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.registry import forget_loaded
-from avlmaps.maps.keyframes.choose import select_keyframes
+from avlmaps.maps.keyframes import select_keyframes
 from avlmaps.maps.store.folder import read
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.open import open_recording

@@ -21,7 +21,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.timeline import is_in_future
 from avlmaps.days.evidence import THROUGH_VIEWS, DayViews
 from avlmaps.days.surfaces import Occupied, refine
-from avlmaps.maps.keyframes.album import local_features
+from avlmaps.maps.keyframes import local_features
 from avlmaps.maps.store.manifest import RecordingInfo, Visit
 from avlmaps.perception.protocols import LocalFeatures
 from avlmaps.query.avlmap import AVLMap

@@ -29,10 +29,9 @@ from avlmaps.core.wording import option
 from avlmaps.live.pose_check import PoseCheck
 from avlmaps.live.status import LiveSettings, LiveStatus, memory_mb
 from avlmaps.maps.hearing import device_of
-from avlmaps.maps.keyframes.choose import KeyframeSettings
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.plan import require_place
-from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.settings import BuildSettings, KeyframeSettings
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.tables import lock_folder

@@ -18,7 +18,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
 from avlmaps.maps.estimate import Start, doubts_of
 from avlmaps.maps.frame_sums import bad_frames, load_state, save_state
-from avlmaps.maps.gravity.floor import GroundedRecording
+from avlmaps.maps.gravity import GroundedRecording
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.perceived import encode_pixels
 from avlmaps.maps.plan import BuildPlan, Span, claim, make_plan, require_unchanged, strip_folder

@@ -23,7 +23,7 @@ from avlmaps.maps.fusion.free_space import FreeViews, clean, count_where_it_matt
 from avlmaps.maps.fusion.sensor import NONE
 from avlmaps.maps.fusion.submaps import MovedSubmaps
 from avlmaps.maps.hearing import locate_sources
-from avlmaps.maps.keyframes.album import moved_keyframes
+from avlmaps.maps.keyframes import moved_keyframes
 from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.manifest import MapBounds, Removed, Timings, UpInfo

@@ -13,8 +13,7 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.fusion.sensor import FRAMES, MODELS, SensorModel, measure_noise, nearest_model
-from avlmaps.maps.gravity.floor import Expected, find_ground
-from avlmaps.maps.gravity.up import some_frames, up_doubts
+from avlmaps.maps.gravity import Expected, find_ground, find_up, some_frames, up_doubts
 from avlmaps.maps.plan import strip_folder
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.sources.wiring import check_wiring
@@ -161,13 +160,11 @@ class Start:
 
 def estimate_up(recording: Recording, settings: BuildSettings) -> UpInfo:
     """Return the up direction: as the recording says, else as the planes in view do, else as the camera was held."""
-    from avlmaps.maps.gravity.up import find_up as up_of_planes
-
     if recording.up_in_world is not None:
         return UpInfo.of(recording.up_in_world, "recording", 1.0)
     rng = np.random.default_rng([settings.seed, _RANDOMNESS])
     try:
-        up = up_of_planes(spread_frames(recording, settings.gravity.frames), rng)
+        up = find_up(spread_frames(recording, settings.gravity.frames), rng)
     except RecordingError:  # too little smooth surface: people and robots hold cameras upright, more or less
         held = -recording.world_from_camera[:, :3, 1].mean(axis=0)
         return UpInfo.of(held if np.linalg.norm(held) > 0.01 else np.array([0.0, 0.0, 1.0]), "camera", 0.0)

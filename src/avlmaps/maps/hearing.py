@@ -18,9 +18,9 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.audio.background import hop_samples
 from avlmaps.maps.audio.events import SoundFinder, StoredSound, collect, detect_events
-from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.estimate import doubts_of_channels
 from avlmaps.maps.frame_sums import Walked
+from avlmaps.maps.settings import HearingSettings
 from avlmaps.maps.sources.find import SourceFinder, find_sources, require_fit
 from avlmaps.maps.store.folder import read
 from avlmaps.maps.types import HeardSounds, SourceEvidence

@@ -36,8 +36,7 @@ from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts
 from avlmaps.maps.fusion.submaps import MovedSubmaps, submap_of
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.hearing import Hearing
-from avlmaps.maps.keyframes.album import KeyframeAlbum
-from avlmaps.maps.keyframes.choose import KeyframeChooser
+from avlmaps.maps.keyframes import KeyframeAlbum, KeyframeChooser
 from avlmaps.maps.perceived import encode_pixels, require_unit
 from avlmaps.maps.plan import BUILD_VERSION, models_of
 from avlmaps.maps.pose_correction import PoseCorrection

@@ -10,7 +10,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import sampled_digest
 from avlmaps.core.progress import say
 from avlmaps.core.wording import option
-from avlmaps.maps.keyframes.choose import keyframes_by_motion
+from avlmaps.maps.keyframes import keyframes_by_motion
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.folder import MANIFEST, PARTS, is_map_or_free, read_info, remove_parts, sweep
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo

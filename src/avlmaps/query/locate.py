@@ -18,7 +18,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.wording import option, place_text
-from avlmaps.maps.keyframes.album import local_features
+from avlmaps.maps.keyframes import local_features
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.pose import PoseSettings, agreement, estimate_pose, pose_deviation, refine_focal

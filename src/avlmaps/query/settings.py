@@ -10,9 +10,8 @@ from typing import Literal
 from avlmaps.core.errors import QueryError
 from avlmaps.core.numbers import hold_numbers
 from avlmaps.core.question import HeardAt, Role
-from avlmaps.maps.audio.settings import HearingSettings, SegmentationSettings
 from avlmaps.maps.fusion.sensor import PAPERS_VARIANCE_M2
-from avlmaps.maps.settings import DEFAULTS, BuildSettings
+from avlmaps.maps.settings import DEFAULTS, BuildSettings, HearingSettings, SegmentationSettings
 
 # From this probability on a query is found (``QuerySettings.found_at``), and a part of it by itself: an instance, a
 # sound, a view, the place of a photo.

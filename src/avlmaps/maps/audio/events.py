@@ -15,7 +15,7 @@ from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.audio.background import denoise, is_swell, noise_profile
 from avlmaps.maps.audio.segmentation import Segment, frames_of_track, segment, split_at_changes
-from avlmaps.maps.audio.settings import HearingSettings, SoundChangeSettings
+from avlmaps.maps.settings import HearingSettings, SoundChangeSettings
 from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.protocols import FrameSoundEncoder, SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac

@@ -21,7 +21,7 @@ from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.errors import BackendError
 from avlmaps.core.progress import progress
 from avlmaps.maps.audio.background import band_powers, find_noise_floor, hop_samples
-from avlmaps.maps.audio.settings import SegmentationSettings, SoundChangeSettings
+from avlmaps.maps.settings import SegmentationSettings, SoundChangeSettings
 from avlmaps.perception.protocols import FrameSoundEncoder
 from avlmaps.recordings.audio import AudioTrack
 

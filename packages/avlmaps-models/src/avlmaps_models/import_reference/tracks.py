@@ -21,7 +21,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind, find, load
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.audio.events import collect, detect_events
-from avlmaps.maps.audio.settings import HearingSettings
+from avlmaps.maps.settings import HearingSettings
 from avlmaps.maps.store.manifest import ModelInfo
 from avlmaps.maps.types import HeardSounds
 from avlmaps.recordings.open import open_recording

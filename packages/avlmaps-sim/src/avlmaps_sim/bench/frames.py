@@ -37,7 +37,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.core.progress import progress
-from avlmaps.maps.gravity.floor import find_ground
+from avlmaps.maps.gravity import find_ground
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.recordings.layout import CameraNumbers
 from avlmaps.recordings.types import Frame, Ground

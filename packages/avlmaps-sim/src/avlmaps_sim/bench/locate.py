@@ -10,8 +10,8 @@ from jaxtyping import Float, Int, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
-from avlmaps.maps.keyframes.album import perceive_keyframes
-from avlmaps.maps.keyframes.choose import KeyframeSettings, select_keyframes
+from avlmaps.maps.keyframes import perceive_keyframes, select_keyframes
+from avlmaps.maps.settings import KeyframeSettings
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query.locate import LocatableMap, Located, LocateSettings, locate
 from avlmaps.recordings.types import Recording, Subset

@@ -16,7 +16,7 @@ from jaxtyping import Float32
 
 from avlmaps.core.progress import progress
 from avlmaps.maps.audio.segmentation import Segment, segment
-from avlmaps.maps.audio.settings import SegmentationSettings
+from avlmaps.maps.settings import SegmentationSettings
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps_sim.bench.harness.figures import in_percent, poisson, wilson
 from avlmaps_sim.mixing.background import background

@@ -205,7 +205,7 @@ def _strip(recording: "Recording", avlmap: "AVLMap", moments: int) -> Strip:
     """Encode some moments of the walk again, as the map's own pixel encoder does."""
     from avlmaps.core.progress import progress
     from avlmaps.maps.estimate import Start
-    from avlmaps.maps.gravity.floor import GroundedRecording
+    from avlmaps.maps.gravity import GroundedRecording
     from avlmaps.maps.settings import DEFAULTS
     from avlmaps.perception.embedded.pixels import EmbeddedPixels
 

@@ -1,7 +1,8 @@
-"""The keyframes of a map that is made: what is stored of each, and what its places are known by."""
+"""Which frames are keyframes, what is stored of each, and what its places are known by."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Generic, TypeVar
 
 import cv2
 import numpy as np
@@ -9,19 +10,105 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from avlmaps.core.arrays import Float, Float32, Int, UInt8
 from avlmaps.core.columns import concat
-from avlmaps.core.poses import apply, inverse
+from avlmaps.core.poses import apply, inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
 from avlmaps.maps.fusion.free_space import free_views
 from avlmaps.maps.fusion.sensor import NONE, SensorModel
-from avlmaps.maps.keyframes.choose import DEFAULT_KEYFRAMES, KeyframeSettings
 from avlmaps.maps.perceived import as_row, perceiving
 from avlmaps.maps.pose_correction import PoseCorrection
+from avlmaps.maps.settings import DEFAULT_KEYFRAMES, KeyframeSettings
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import LocalFeatures
 from avlmaps.recordings.images import depth_in_colour
 from avlmaps.recordings.types import Frame, Recording
+
+T = TypeVar("T")
+_FAR_M = 2.0  # how far things are that a moving camera passes, for how fast the picture moves
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen(Generic[T]):
+    item: T
+    stamp_s: float
+    pose: Float[np.ndarray, "4 4"]
+
+
+class KeyframeChooser(Generic[T]):
+    """Takes frames in the order of time, and holds one at most.
+
+    Where the camera goes beyond the limits since the last keyframe, the frame beyond half of them that moved least
+    becomes the next one, because a camera that moves less blurs less.
+    """
+
+    def __init__(self, settings: KeyframeSettings) -> None:
+        self._limits = settings.translation_m, np.deg2rad(settings.rotation_deg), settings.max_gap_s
+        self._last: _Seen[T] | None = None  # the last keyframe
+        self._before: _Seen[T] | None = None  # the last frame
+        self._best: tuple[float, _Seen[T]] | None = None  # its speed, and the frame that may become a keyframe
+        self._after: list[_Seen[None]] = []  # frames since that one
+
+    def add(self, item: T, stamp_s: float, pose: Float[np.ndarray, "4 4"]) -> Iterator[T]:
+        """Take a frame, and yield those that are now known to be keyframes."""
+        seen, before = _Seen(item, stamp_s, pose), self._before
+        self._before = seen
+        if self._last is None or before is None:
+            self._last = seen
+            yield item
+            return
+        moved_m, turned_rad, gap_s = _motion(before, seen)
+        speed = (turned_rad + moved_m / _FAR_M) / max(gap_s, 1e-9)
+        share = self._share(seen)
+        if share > 0.5 and (self._best is None or speed < self._best[0]):
+            self._best, self._after = (speed, seen), []
+        if share <= 1.0 or self._best is None:
+            self._after.append(_Seen(None, stamp_s, pose))
+            return
+        best, self._best = self._best[1], None
+        turned_back = any(self._share(one, best) > 1.0 for one in self._after)
+        self._last, self._after = seen if turned_back else best, []
+        yield self._last.item
+        share = self._share(seen)
+        if share > 1.0:
+            self._last = seen
+            yield item
+        elif share > 0.5:
+            self._best = speed, seen
+
+    def end(self) -> Iterator[T]:
+        """Yield the last frame, unless it is a keyframe already."""
+        if self._before is not None and self._before is not self._last:
+            self._last, self._best = self._before, None
+            yield self._before.item
+
+    def _share(self, seen: "_Seen[Any]", since: "_Seen[Any] | None" = None) -> float:
+        begin = since or self._last
+        assert begin is not None
+        return max(value / limit for value, limit in zip(_motion(begin, seen), self._limits, strict=True))
+
+
+def _motion(one: _Seen[Any], other: _Seen[Any]) -> tuple[float, float, float]:
+    moved_m = float(np.linalg.norm(other.pose[:3, 3] - one.pose[:3, 3]))
+    return moved_m, float(rotation_angle_rad(other.pose[None], one.pose[None])[0]), other.stamp_s - one.stamp_s
+
+
+def keyframes_by_motion(
+    stamps_s: Float[np.ndarray, " n"],
+    world_from_camera: Float[np.ndarray, "n 4 4"],
+    settings: KeyframeSettings = DEFAULT_KEYFRAMES,
+) -> Int[np.ndarray, " k"]:
+    """Return the rising numbers of keyframes; see ``KeyframeChooser``."""
+    chooser = KeyframeChooser[int](settings)
+    chosen: list[int] = []
+    for index, (stamp_s, pose) in enumerate(zip(stamps_s.tolist(), world_from_camera, strict=True)):
+        chosen += chooser.add(index, stamp_s, pose)
+    return np.array([*chosen, *chooser.end()], np.int64)
+
+
+def select_keyframes(recording: Recording, settings: KeyframeSettings = DEFAULT_KEYFRAMES) -> Int[np.ndarray, " k"]:
+    """Choose the keyframes of a recording; it reads no picture."""
+    return keyframes_by_motion(recording.stamps_s, recording.world_from_camera, settings)
 
 
 def describe_keyframe(

@@ -1,1 +1,0 @@
-"""Keyframes: which frames they are, and their keypoints, places and views."""
