@@ -5,7 +5,7 @@ from typing import Any
 from zlib import crc32
 
 from avlmaps.core.errors import GoalNotFoundError
-from avlmaps.language.program import SKILLS, Skill
+from avlmaps.language.program import Skill, skills
 from avlmaps.language.program.vocabulary import Clip, Picture, Place
 
 ABSENT = "unicorn"
@@ -63,7 +63,7 @@ class _Calls:
         self.looked_up: list[str] = []
 
     def __getattribute__(self, name: str) -> Any:
-        if name not in SKILLS and name not in ("calls", "looked_up", "place", "__class__"):
+        if name not in skills() and name not in ("calls", "looked_up", "place", "__class__"):
             object.__getattribute__(self, "looked_up").append(name)
         return object.__getattribute__(self, name)
 
@@ -104,4 +104,4 @@ def _text(value: Any) -> str:
     return value.made if isinstance(value, RecordedHeat) else str(value)
 
 
-RecordingRobot = type("RecordingRobot", (_Calls,), {name: _method(skill) for name, skill in SKILLS.items()})
+RecordingRobot = type("RecordingRobot", (_Calls,), {name: _method(skill) for name, skill in skills().items()})

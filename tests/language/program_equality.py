@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from inspect import signature
 from typing import Any
 
-from avlmaps.language.program.vocabulary import RobotSkills
+from avlmaps.navigate.skills import Robot
 
 _PURE = {
     "load_image",
@@ -139,7 +139,7 @@ class _Run:
 
 def _arguments(name: str, given: list[Any], named: dict[Any, Any]) -> tuple[Any, ...]:
     """Return the arguments of a call by name in the signature's order, those that equal their default left out."""
-    skill = getattr(RobotSkills, name, None)
+    skill = getattr(Robot, name, None)
     if skill is None or name.startswith("_"):
         raise ValueError(f"{name!r} is no skill")
     shape = signature(skill)

@@ -25,7 +25,7 @@ from avlmaps.language.chat.translator import (
     unusable_message,
     without_thoughts,
 )
-from avlmaps.language.program import SKILLS, parse_program, run_program
+from avlmaps.language.program import parse_program, run_program, skills
 from helpers.recording_robot import RecordingRobot
 
 GO = 'robot.move_to_object("sofa")'
@@ -453,13 +453,13 @@ PROGRAMS = [each for each in EXAMPLES if not each.program.startswith("# cannot:"
 
 
 def test_every_skill_is_in_the_prompt_as_the_table_has_it() -> None:
-    for skill in SKILLS.values():
+    for skill in skills().values():
         assert f"- robot.{skill.signature}: {skill.doc}\n" in system_prompt()
 
 
 def test_the_prompt_speaks_of_no_skill_that_is_not_in_the_table() -> None:
     named = set(re.findall(r"robot\.(\w+)\(", system_prompt())) - {"NAME"}
-    assert named == set(SKILLS)
+    assert named == set(skills())
 
 
 def test_the_prompt_leaves_room_in_a_small_context() -> None:
@@ -473,7 +473,7 @@ def test_each_example_of_the_prompt_runs(example: Example) -> None:
     check_files(program, example.command)
     robot: Any = RecordingRobot()
     assert run_program(program, robot).error is None
-    assert any(SKILLS[skill].moves for skill in program.skills)
+    assert any(skills()[skill].moves for skill in program.skills)
 
 
 @pytest.mark.parametrize("example", PROGRAMS, ids=lambda each: each.command)

@@ -32,7 +32,7 @@ from avlmaps.language.intents import (
 )
 from avlmaps.language.lexer import tokenise
 from avlmaps.language.local import LocalModel, LocalTranslator, both, examples, grammar, meaning, prompt
-from avlmaps.language.program import SKILLS, parse_program
+from avlmaps.language.program import parse_program, skills
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.sentence import Sentence
 from avlmaps.language.verbalise import verbalise
@@ -122,7 +122,7 @@ def test_what_no_skill_does_and_nobody_said_cannot_be_written(program: str) -> N
 
 def test_every_skill_that_moves_can_be_written() -> None:
     text = grammar(tokenise("go to the sofa"))
-    assert all(f'"robot.{skill.name}("' in text for skill in SKILLS.values() if skill.moves)
+    assert all(f'"robot.{skill.name}("' in text for skill in skills().values() if skill.moves)
 
 
 @pytest.mark.parametrize(

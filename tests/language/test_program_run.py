@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AvlmapsError, GoalNotFoundError, NavigationError, ProgramError, QueryError
-from avlmaps.language.program import SKILLS, Budget, Step, Trace, parse_program, run_program
+from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program, skills
 from avlmaps.language.program.values import is_among
 from avlmaps.language.program.vocabulary import Place
 from helpers.recording_robot import RecordedHeat, RecordingRobot
@@ -287,4 +287,4 @@ def test_nothing_that_can_run_is_refused(text: str) -> None:
 def test_a_program_tells_which_skills_it_calls() -> None:
     text = "for i in range(0):\n    turn(i)\nif 1: move_to(get_pos('a'))\nelse: turn(2)"
     assert parse_program(text).skills == ("turn", "move_to", "get_pos")
-    assert set(parse_program(text).skills) <= SKILLS.keys()
+    assert set(parse_program(text).skills) <= skills().keys()

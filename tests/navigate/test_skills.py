@@ -2,9 +2,7 @@
 
 from contextlib import nullcontext
 from dataclasses import replace
-from inspect import getdoc, signature
 from math import atan2, cos, degrees, pi, radians, sin
-from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -13,8 +11,6 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError, ProgramError
 from avlmaps.core.motion import Action, GroundPose, wrap_angle
-from avlmaps.language.program import SKILLS
-from avlmaps.language.program.vocabulary import RobotSkills
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.skills import Robot, RobotSettings
 from helpers.kinematic import KinematicDriver, box, robot_among
@@ -37,14 +33,6 @@ def heading_deg(robot: Robot) -> float:
 def turned(corners: np.ndarray, angle_rad: float) -> np.ndarray:
     c, s = cos(angle_rad), sin(angle_rad)
     return corners @ np.array([[c, s], [-s, c]])
-
-
-@pytest.mark.parametrize("name", list(SKILLS))
-def test_every_skill_is_as_the_vocabulary_says(name: str) -> None:
-    declared, own = getattr(RobotSkills, name), getattr(Robot, name)
-    assert list(signature(own).parameters.values()) == list(signature(declared).parameters.values())
-    assert get_type_hints(own) == get_type_hints(declared)
-    assert getdoc(own) == getdoc(declared)
 
 
 @pytest.mark.parametrize(("start_deg", "ahead"), [(0, (1, 0)), (90, (0, 1)), (180, (-1, 0)), (-90, (0, -1))])

@@ -158,7 +158,7 @@ SKILLS = {
 @pytest.mark.parametrize("score", [0.05, 0.15, 0.95])
 def test_no_skill_takes_what_the_answer_calls_not_found(skill: str, score: float) -> None:
     robot = furnished_robot(sounds=sounds_of([track(5.0, 3.1)], [score]))
-    answer = robot.asked.ask(Question.of([Part(Modality.OBJECT, "chair"), Part(Modality.SOUND, "dog")]))
+    answer = robot.avlmap.ask(Question.of([Part(Modality.OBJECT, "chair"), Part(Modality.SOUND, "dog")]))
     heat = robot.get_major_map(obj="chair") * robot.get_map(sound="dog")
     if answer.found:
         SKILLS[skill](robot, heat)
@@ -323,7 +323,7 @@ def test_between_a_thing_and_one_inside_its_u_is_never_inside_the_thing() -> Non
 
 def test_the_floor_is_sought_among_the_voxels_that_count() -> None:
     robot = furnished_robot()
-    voxels = robot.asked.data.voxels
+    voxels = robot.avlmap.data.voxels
     speckle = np.array([[x, y, -30] for x in range(120) for y in range(80)], np.int32)
     index = np.concatenate([voxels.index, speckle])
     hits = np.concatenate([np.full(len(voxels), 9), np.ones(len(speckle), int)])

@@ -32,7 +32,7 @@ from avlmaps.language.learned.linear import amount, amount_end
 from avlmaps.language.learned.reader import Read
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.names import is_known
-from avlmaps.language.program.vocabulary import SKILLS, Skill, ValueType
+from avlmaps.language.program.vocabulary import Skill, ValueType, skills
 from avlmaps.language.sentence import Attachments, Sentence, stand_ins
 from avlmaps.language.translator import LearnedTranslator
 from avlmaps.perception.models import cache_folder
@@ -62,10 +62,10 @@ def grammar(tokens: Sequence[Token]) -> str:
 
     A program ends with an empty line, behind which nothing can follow.
     """
-    calls = " | ".join(_call(skill) for skill in SKILLS.values() if skill.moves)
+    calls = " | ".join(_call(skill) for skill in skills().values() if skill.moves)
     said = (token.text for token in tokens if token.kind in ("word", "number") and '"' not in token.text)
     words = dict.fromkeys(word for word in said if word not in _ARTICLES)
-    sought = " | ".join(_literal(f"{name}=") for name in SKILLS["get_major_map"].alternatives if name != "img")
+    sought = " | ".join(_literal(f"{name}=") for name in skills()["get_major_map"].alternatives if name != "img")
     rules = {
         "root": r'("start = robot.current_pos()\n")? step{1,10} "\n"',  # small models repeat themselves
         "step": r'call "\n" | each | round | again',

@@ -121,23 +121,21 @@ def _silent(_: str) -> None:
 
 
 class Robot:
-    """A robot that knows a map and can drive; it implements `avlmaps.language.program.vocabulary.RobotSkills`.
+    """A robot that knows a map and can drive. Each public method is a skill, for programs, plans and chat models alike.
 
+    Its types and its docstring are all that they know of it; it must bound its own work, and one whose thing is not in
+    the map raises ``GoalNotFoundError``. Names are those of the paper and of VLMaps, and angles are in degrees.
     A phrase or a heatmap means the likeliest thing. Where several fit equally the skill fails and asks which; a
     program that means any of them says so (`get_nearest_pos`). Settings may take the nearest without a question, as the
     paper's programs do.
 
     Attributes:
-        asked: the map.
-        driver: what moves the body.
-        settings: how skills are taken.
-        seeker: finds in the map what a program means.
         moves: the movements that it made.
     """
 
     def __init__(
         self,
-        asked: AVLMap,
+        avlmap: AVLMap,
         driver: Driver,
         settings: RobotSettings | None = None,
         readable: Readable | None = None,
@@ -145,24 +143,22 @@ class Robot:
         pause: Callable[[float], None] = sleep,
         heats: Heats | None = None,
     ) -> None:
-        """Make a robot.
+        """Make a robot of a map and what drives it in the map's level frame.
 
         Args:
-            asked: the map.
-            driver: moves the body in the map's level frame.
+            avlmap: the map.
+            driver: moves the body.
             settings: how skills are taken.
             readable: which files a program may load; those in the working directory by default.
             tell: is given a line for each thing found, as it happens.
             pause: waits for some seconds; a rehearsal does not wait, and a stop ends the wait.
             heats: what this map answered before.
         """
-        self.asked = asked
-        self.driver = driver
-        self._pause = pause
+        self.avlmap, self.driver, self._pause = avlmap, driver, pause
         self.settings = settings or RobotSettings()
         choose = None if self.settings.guess or self.settings.persist else self.settings.choose
         self.seeker = Seeker(
-            asked, self.settings.guess, readable or Readable(), tell, storey_of_walk(asked), heats, choose
+            avlmap, self.settings.guess, readable or Readable(), tell, storey_of_walk(avlmap), heats, choose
         )
         self.moves: list[LoggedMove] = []
 
@@ -353,7 +349,7 @@ class Robot:
     @cached_property
     def floor_m(self) -> float:
         """Level height of the floor that the robot is on."""
-        return floor_of_walk(self.asked)
+        return floor_of_walk(self.avlmap)
 
     @property
     def _here(self) -> Float[np.ndarray, "2"]:
@@ -362,14 +358,14 @@ class Robot:
 
     def _on_floor(self, xy: Float[np.ndarray, "2"], *things: Destination) -> Float[np.ndarray, "3"]:
         """Return a place on the floor: that of things, where they are on another storey than the robot."""
-        storeys, floors = self.asked.storeys, [self.floor_m]
+        storeys, floors = self.avlmap.storeys, [self.floor_m]
         if storeys is not None and things:
             numbers = storeys.of(np.array([thing.place[2] for thing in things]))
             floors = [storeys[number].floor_m for number in numbers.tolist()]
         return np.append(xy, max(floors, key=lambda floor_m: abs(floor_m - self.floor_m)))
 
     def _place(self, level: Float[np.ndarray, "3"]) -> Place:
-        return Place(*_triple(self.asked.space.world(level)))
+        return Place(*_triple(self.avlmap.space.world(level)))
 
     def _go_beside(
         self,
@@ -391,7 +387,7 @@ class Robot:
     def _go(
         self, skill: str, thing: Destination, goal: Float[np.ndarray, "3"], face: Float[np.ndarray, "3"] | None = None
     ) -> None:
-        world = self.asked.space.world
+        world = self.avlmap.space.world
         looked_at = None if face is None else world(face)
         self._done(skill, thing.name, goal, [self.driver.go_to(world(goal), face=looked_at)])
 
@@ -413,7 +409,7 @@ class Robot:
         if goal is not None and arrivals[-1].actions and arrivals[-1].actions[-1] is not Action.STOP:
             arrivals = [*arrivals, self.driver.stop()]
         arrival = _joined(arrivals)
-        world = self.asked.space.world
+        world = self.avlmap.space.world
         pose = arrival.pose
         here = np.array([pose.x_m, pose.y_m])
         stop = _triple(world(self._on_floor(here)))

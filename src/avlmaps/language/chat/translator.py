@@ -17,7 +17,7 @@ from time import monotonic
 from avlmaps.core.errors import LanguageError, ProgramError
 from avlmaps.language.chat.endpoint import ChatSettings, Endpoint, ModelReply, Replay, quoted
 from avlmaps.language.commands import check_order
-from avlmaps.language.program import SKILLS, Program, parse_program, skill_lines
+from avlmaps.language.program import Program, parse_program, skill_lines, skills
 from avlmaps.language.program.parser import called
 from avlmaps.language.translator import Translation
 
@@ -106,7 +106,7 @@ class ChatTranslator:
                 program = program_text(answer)
                 parsed = _parsed(program, answer)
                 check_files(parsed, plain_command(command))
-                if not any(SKILLS[skill].moves for skill in parsed.skills):
+                if not any(skills()[skill].moves for skill in parsed.skills):
                     insists = is_last or _MOVES_NOTHING in corrected
                     if not (insists and parsed.skills):
                         raise UnusableAnswerError(_MOVES_NOTHING)

@@ -6,11 +6,10 @@
 from avlmaps.language.program.interpreter import Step, Trace, run_program
 from avlmaps.language.program.parser import Program, parse_program
 from avlmaps.language.program.values import Budget
-from avlmaps.language.program.vocabulary import ROBOT, SKILLS, Parameter, Skill, skill_lines
+from avlmaps.language.program.vocabulary import ROBOT, Parameter, Skill, skill_lines, skills
 
 __all__ = [
     "ROBOT",
-    "SKILLS",
     "Budget",
     "Parameter",
     "Program",
@@ -20,4 +19,5 @@ __all__ = [
     "parse_program",
     "run_program",
     "skill_lines",
+    "skills",
 ]

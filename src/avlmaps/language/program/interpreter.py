@@ -20,7 +20,7 @@ from avlmaps.language.program.parser import (
     target_names,
 )
 from avlmaps.language.program.values import Budget, Value, refused
-from avlmaps.language.program.vocabulary import SKILLS, RobotSkills, ValueType
+from avlmaps.language.program.vocabulary import ValueType, skills
 
 # Between two skills the clock is read once in this many steps.
 _STEPS_BETWEEN_LOOKS = 256
@@ -119,7 +119,7 @@ def told(content: Any) -> str:
 
 def run_program(
     program: Program,
-    vocabulary: RobotSkills,
+    vocabulary: object,
     budget: Budget | None = None,
     on_step: Callable[[Step], None] | None = None,
     *,
@@ -165,7 +165,7 @@ class _Run:
     """One run: the values of its names, and what is left of its budget."""
 
     def __init__(
-        self, vocabulary: RobotSkills, budget: Budget, on_step: Callable[[Step], None], clock: Callable[[], float]
+        self, vocabulary: object, budget: Budget, on_step: Callable[[Step], None], clock: Callable[[], float]
     ) -> None:
         self.vocabulary, self.budget, self.on_step, self.clock = vocabulary, budget, on_step, clock
         self.started = clock()
@@ -278,7 +278,7 @@ class _Run:
                 return self.value(node.body if self.truth(node.test) else node.orelse)
             case ast.Subscript():
                 return values.element_of(line, self.needed(node.value, "index of"), self.needed(node.slice, "index"))
-            case ast.Call() if called(node) in SKILLS:
+            case ast.Call() if called(node) in skills():
                 return self.skill_call(node)
             case ast.Call():
                 return self.function_call(node)
@@ -336,7 +336,7 @@ class _Run:
 
     def skill_call(self, node: ast.Call) -> Value:
         """Call a skill, the one place where a program reaches anything."""
-        line, skill = node.lineno, SKILLS[called(node)]
+        line, skill = node.lineno, skills()[called(node)]
         arguments = {name: self.value(each) for name, each in given_to(skill, node).items()}
         check_arguments(line, skill, {name: values.kind_of(value) for name, value in arguments.items()})
         self.look_at_clock(line)

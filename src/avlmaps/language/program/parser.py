@@ -14,7 +14,7 @@ from avlmaps.core.errors import ProgramError
 from avlmaps.core.printable import UNSAFE, printable
 from avlmaps.core.words import nearest
 from avlmaps.language.program.values import bounded, kind_of, refused
-from avlmaps.language.program.vocabulary import ROBOT, SKILLS, Skill, ValueType
+from avlmaps.language.program.vocabulary import ROBOT, Skill, ValueType, skills
 
 MOST_CHARACTERS = 20_000
 DEEPEST_BLOCK = 10
@@ -88,7 +88,7 @@ class Program:
     def skills(self) -> tuple[str, ...]:
         """The skills that the program calls, each once, in the order of its text."""
         named = sorted(self.calls, key=lambda call: (call.lineno, call.col_offset))
-        return tuple(dict.fromkeys(name for name in map(called, named) if name in SKILLS))
+        return tuple(dict.fromkeys(name for name in map(called, named) if name in skills()))
 
 
 def parse_program(text: str) -> Program:
@@ -173,7 +173,7 @@ def check_arguments(line: int, skill: Skill, kinds: Mapping[str, "Guess"]) -> No
         parameter = skill.parameters[name]
         if isinstance(kind, ValueType) and kind not in parameter.kinds:
             wanted = _listed([str(each) for each in ValueType if each in parameter.kinds])
-            makers = [f"`{other.name}`" for other in SKILLS.values() if {other.returns} == parameter.kinds]
+            makers = [f"`{other.name}`" for other in skills().values() if {other.returns} == parameter.kinds]
             made = f"; {_listed(makers)} gives one" if makers else ""
             raise refused(
                 line, f"`{skill.name}` takes {wanted} as its `{name}`, not {kind}; it is {skill.signature}{made}"
@@ -229,7 +229,7 @@ class _Checker:
                 self.give(node.target)
             case ast.Expr(value=ast.Call() as call):
                 self.value(call)
-                if called(call) not in SKILLS:
+                if called(call) not in skills():
                     raise _no_part(node)
             case ast.For(orelse=[]):
                 self.value(node.iter)
@@ -254,7 +254,7 @@ class _Checker:
         names, line = target_names(target), target.lineno
         if len(names) != (len(target.elts) if isinstance(target, ast.Tuple) else 1) or not names:
             raise refused(line, "only names take a value, as in `a = 1` and `a, b = 1, 2`; a list is made again")
-        taken = next((name for name in names if name == ROBOT or name in SKILLS or name in BUILTINS), None)
+        taken = next((name for name in names if name == ROBOT or name in skills() or name in BUILTINS), None)
         if taken:
             raise refused(line, f"`{taken}` is the robot, a skill or a function; give the value another name")
         self.given.update(names)
@@ -288,7 +288,7 @@ class _Checker:
                 raise _no_part(node)
 
     def name(self, line: int, name: str) -> None:
-        if name == ROBOT or name in SKILLS or name in BUILTINS:
+        if name == ROBOT or name in skills() or name in BUILTINS:
             raise refused(line, f"`{name}` is no value; write `{ROBOT}.SKILL(...)` or call the function")
         if name in self.given:
             return
@@ -301,9 +301,9 @@ class _Checker:
     def call(self, node: ast.Call, deep: int) -> Guess:
         match node.func:
             case ast.Attribute(value=ast.Name(id=robot), attr=name) if robot == ROBOT:
-                known: Sequence[str] = tuple(SKILLS)
+                known: Sequence[str] = tuple(skills())
             case ast.Name(id=name):
-                known = (*SKILLS, *BUILTINS)
+                known = (*skills(), *BUILTINS)
             case _:
                 raise _no_part(node.func)
         if name not in known:
@@ -317,9 +317,9 @@ class _Checker:
             for each in node.args:
                 self.value(each, deep)
             return ValueType.RANGE if name == "range" else ValueType.NUMBER
-        kinds = {name: self.value(each, deep) for name, each in given_to(SKILLS[name], node).items()}
-        check_arguments(node.lineno, SKILLS[name], kinds)
-        return SKILLS[name].returns
+        kinds = {name: self.value(each, deep) for name, each in given_to(skills()[name], node).items()}
+        check_arguments(node.lineno, skills()[name], kinds)
+        return skills()[name].returns
 
 
 def _constant(line: int, value: bool | str | float | None) -> ValueType:

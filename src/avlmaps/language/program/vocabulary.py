@@ -1,19 +1,22 @@
 """The robot's vocabulary: every skill that a program may call, in one table, and the kinds of value of a program.
 
-`RobotSkills` is that table: each method with its typed signature and docstring is a skill. The interpreter calls
-nothing else, the chat prompt is made from it, plans are written in it, and `avlmaps.navigate` implements it.
-Names are those of the paper and of VLMaps; angles in degrees and metres, since people write programs in them.
+A skill is a public method of `avlmaps.navigate.skills.Robot`: its typed signature and docstring are the row. Language
+knows no map, so that the class is loaded by its name, when the table is first needed. The interpreter calls nothing
+else, the chat prompt is made from it, and plans are written in it.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
+from importlib import import_module
 from inspect import Signature, getdoc, signature
 from math import isfinite
 from types import MappingProxyType, NoneType, UnionType
 from typing import Any, Protocol, Union, get_args, get_origin, get_type_hints, runtime_checkable
 
 ROBOT = "robot"
+_ROBOT_CLASS = "avlmaps.navigate.skills", "Robot"
 
 
 class ValueType(StrEnum):
@@ -98,151 +101,6 @@ class Clip:
 Target = str | Place | Heat
 
 
-@runtime_checkable
-class RobotSkills(Protocol):
-    """The skills of a robot. A skill whose thing is not in the map raises ``GoalNotFoundError``."""
-
-    def load_image(self, path: str) -> Picture:
-        """Load a picture from a file, to ask where it was taken."""
-        ...
-
-    def load_sound(self, path: str) -> Clip:
-        """Load a recorded sound from a file, to ask where one like it was heard."""
-        ...
-
-    def get_major_map(
-        self,
-        obj: str | None = None,
-        sound: str | Clip | None = None,
-        img: Picture | None = None,
-        area: str | None = None,
-        at: str = "robot",
-    ) -> Heat:
-        """Return the heatmap of what is sought itself (falls to nothing within 0.5 m). Give exactly one thing.
-
-        A sound is sought where it was heard, or with at="source" where it came from.
-        """
-        ...
-
-    def get_map(
-        self,
-        obj: str | None = None,
-        sound: str | Clip | None = None,
-        img: Picture | None = None,
-        area: str | None = None,
-        at: str = "robot",
-    ) -> Heat:
-        """Return the heatmap of what the sought thing is near or in (falls off over 5 m). Give exactly one thing.
-
-        A sound is taken where it was heard, or with at="source" where it came from.
-        """
-        ...
-
-    def get_max_pos_3d(self, heat: Heat) -> Place:
-        """Return the best place of a heatmap, or of several multiplied with each other."""
-        ...
-
-    def get_pos(self, target: Target) -> Place:
-        """Return the place of the thing that a phrase or a heatmap means; where several fit equally it asks which."""
-        ...
-
-    def get_nearest_pos(self, target: Target) -> Place:
-        """Return the place of the nearest thing that a phrase or a heatmap may mean; it means the same later."""
-        ...
-
-    def get_all_pos(self, target: Target) -> list[Place]:
-        """Return the places of all objects of that name that the map is confident of, the nearest first; [] of none."""
-        ...
-
-    def get_nth_pos(self, target: Target, number: float = 1, order: str = "nearest") -> Place:
-        """Return the place of the nth thing in an order: nearest, farthest, left, right, north, south, east or west."""
-        ...
-
-    def exists(self, target: Target) -> bool:
-        """Return whether the map is confident of something of that name, or of a heatmap's best place."""
-        ...
-
-    def get_distance(self, a: Target, b: Target) -> float:
-        """Return how many metres of floor are between the nearest points of two things."""
-        ...
-
-    def get_contour(self, target: Target) -> list[Place]:
-        """Return the outline on the ground of the best instance of an object, counter-clockwise."""
-        ...
-
-    def current_pos(self) -> Place:
-        """Return the place where the robot stands now; keep it to come back later."""
-        ...
-
-    def move_to(self, target: Target) -> None:
-        """Drive to a place, or as near to it as the robot can stand and see it."""
-        ...
-
-    def move_to_object(self, name: Target) -> None:
-        """Drive to the nearest point beside the object of that name; where several fit equally it asks which."""
-        ...
-
-    def move_in_between(self, a: Target, b: Target) -> None:
-        """Drive to the middle between the nearest points of two things."""
-        ...
-
-    def move_to_left(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the left side of a thing, as seen from the robot, that distance from its edge."""
-        ...
-
-    def move_to_right(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the right side of a thing, as seen from the robot, that distance from its edge."""
-        ...
-
-    def move_behind(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive behind a thing, as seen from the robot, that distance from its edge."""
-        ...
-
-    def move_north(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the north (+y) of a thing, that distance from its edge."""
-        ...
-
-    def move_south(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the south (−y) of a thing, that distance from its edge."""
-        ...
-
-    def move_east(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the east (+x) of a thing, that distance from its edge."""
-        ...
-
-    def move_west(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the west (−x) of a thing, that distance from its edge."""
-        ...
-
-    def face(self, target: Target) -> None:
-        """Turn on the spot until the thing is straight ahead."""
-        ...
-
-    def turn(self, angle_deg: float) -> None:
-        """Turn on the spot: to the right by a positive angle, to the left by a negative one."""
-        ...
-
-    def turn_absolute(self, compass_deg: float) -> None:
-        """Turn on the spot to a heading on the compass: 0 north (+y), 90 east (+x), 180 south, 270 west."""
-        ...
-
-    def move_forward(self, distance_m: float) -> None:
-        """Drive straight ahead; with a negative distance turn round first, so that the robot sees where it goes."""
-        ...
-
-    def with_object_on_left(self, target: Target) -> None:
-        """Turn on the spot until the thing is straight to the left of the robot."""
-        ...
-
-    def with_object_on_right(self, target: Target) -> None:
-        """Turn on the spot until the thing is straight to the right of the robot."""
-        ...
-
-    def wait(self, duration_s: float) -> None:
-        """Stand still for some seconds, at most 600."""
-        ...
-
-
 _TYPES: dict[Any, tuple[ValueType, str]] = {
     NoneType: (ValueType.NOTHING, "None"),
     bool: (ValueType.TRUTH, "bool"),
@@ -318,10 +176,14 @@ class Skill:
         return self.returns is ValueType.NOTHING
 
 
-def skills_of(vocabulary: type) -> Mapping[str, Skill]:
-    """Return the skills that a vocabulary's class declares, in its order."""
-    names = [name for name, member in vars(vocabulary).items() if not name.startswith("_") and callable(member)]
-    return MappingProxyType({name: _skill(name, getattr(vocabulary, name)) for name in names})
+@cache
+def skills() -> Mapping[str, Skill]:
+    """Return the skills of the robot by their names, in the order in which its class declares them."""
+    module, name = _ROBOT_CLASS
+    methods = vars(getattr(import_module(module), name)).items()
+    return MappingProxyType(
+        {name: _skill(name, method) for name, method in methods if not name.startswith("_") and callable(method)}
+    )
 
 
 def _skill(name: str, method: Any) -> Skill:
@@ -340,9 +202,6 @@ def _kinds_of(hint: Any) -> tuple[frozenset[ValueType], str]:
     return frozenset(kind for kind, _ in known), " | ".join(text for _, text in known)
 
 
-SKILLS: Mapping[str, Skill] = skills_of(RobotSkills)
-
-
-def skill_lines(prefix: str = f"{ROBOT}.", skills: Sequence[Skill] | None = None) -> tuple[str, ...]:
+def skill_lines(prefix: str = f"{ROBOT}.", of: Sequence[Skill] | None = None) -> tuple[str, ...]:
     """Return the table as lines for people and language models: a signature, then what it does."""
-    return tuple(f"{prefix}{skill.signature}: {skill.doc}" for skill in skills or tuple(SKILLS.values()))
+    return tuple(f"{prefix}{skill.signature}: {skill.doc}" for skill in of or tuple(skills().values()))

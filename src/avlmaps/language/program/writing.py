@@ -11,7 +11,7 @@ from keyword import kwlist
 from avlmaps.language import intents as act
 from avlmaps.language.intents import Intent, Pick, Side, Target, TargetKind, TurnSense, blocks_of, targets_of
 from avlmaps.language.program.parser import BUILTINS
-from avlmaps.language.program.vocabulary import SKILLS
+from avlmaps.language.program.vocabulary import skills
 
 _CORNERS = 8
 _WAIT_S = 3.0
@@ -19,7 +19,7 @@ _SKILLS = {
     Side.LEFT: "move_to_left", Side.RIGHT: "move_to_right", Side.NORTH: "move_north", Side.SOUTH: "move_south",
     Side.EAST: "move_east", Side.WEST: "move_west",
 }  # fmt: skip
-_RESERVED = frozenset({*map(str.lower, kwlist), *BUILTINS, *SKILLS, "robot", "start", "place", "print"})
+_RESERVED = frozenset({*map(str.lower, kwlist), *BUILTINS, "robot", "start", "place", "print"})
 _FACING = {Side.AHEAD: "face", Side.LEFT: "with_object_on_left", Side.RIGHT: "with_object_on_right"}
 
 
@@ -56,7 +56,8 @@ class _Writer:
 
     def variable(self, stem: str) -> str:
         plain = "".join(mark if mark.isascii() and mark.isalnum() else "_" for mark in stem.lower()).strip("_")
-        plain = plain if plain and plain[0].isalpha() and plain not in _RESERVED else f"place_{plain}".rstrip("_")
+        is_free = plain[:1].isalpha() and plain not in _RESERVED and plain not in skills()
+        plain = plain if is_free else f"place_{plain}".rstrip("_")
         self.taken[plain] += 1
         return plain if self.taken[plain] == 1 else f"{plain}{self.taken[plain]}"
 
