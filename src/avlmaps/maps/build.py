@@ -58,7 +58,7 @@ def build_map(
     progress: bool = True,
     finds: Finds = find_nothing,
 ) -> MapData:
-    """Build a map of a recording, or finish one that was begun.
+    """Build a map of a recording, or finish one that was begun; see ``api.build_map``.
 
     A build that is killed at any instant continues from its last finished stretch of frames when it is started again,
     and ends with the same map. A finished map in the folder stays whole and readable until the new one replaces it.
@@ -75,11 +75,6 @@ def build_map(
         overwrite: replace a finished map there that came from another recording, or with other settings.
         progress: show how far it is on standard error.
         finds: what is stored with the map of what its encoders see; see ``query.avlmap.with_findings``.
-
-    Raises:
-        MapError: the folder is something else, holds another map, is in use or cannot be written.
-        RecordingError: too many frames cannot be read, none has depth, or the recording contradicts itself.
-        BackendError: the profile is not known, or a package for it is missing.
     """
     began_s, stamp = perf_counter(), recording.change_stamp()
     plan = make_plan(recording, user_path(path), with_cache(encoders_of(profile), cache), settings)
@@ -101,12 +96,7 @@ def build_map(
 
 
 def map_span(plan: BuildPlan, start: Start, frames: Iterable[EncodedFrame], file: Path) -> None:
-    """Map a stretch of frames and store what it brings.
-
-    Raises:
-        BackendError: an encoder failed.
-        MapError: the file cannot be written.
-    """
+    """Map a stretch of frames and store what it brings."""
     mapper = Mapper.of_recording(plan.recording, plan.settings, plan.encoders, start, plan.keyframes)
     for frame, features in frames:
         if isinstance(frame, BadFrame):
@@ -184,12 +174,9 @@ def encode_frames(
 ) -> Generator[EncodedFrame]:
     """Yield the frames with their features, in order; one that cannot be read yields its fault in its place.
 
-    Args:
-        recording: where the frames are.
-        stretches: numbers of frames; no batch reaches from one stretch into the next, so that a build that continues
-            from a stretch encodes the same batches as one that was never stopped.
-        encoder: None yields frames alone.
-        chosen: numbers of the frames to encode, the others coming alone; None encodes all.
+    No batch reaches from one of the ``stretches`` into the next, so that a build that continues from a stretch encodes
+    the same batches as one that was never stopped. Without an encoder frames come alone, as do those that are not
+    ``chosen``.
     """
     size = 1 if encoder is None else batch_of(encoder)
 

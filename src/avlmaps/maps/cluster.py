@@ -50,24 +50,17 @@ class RayPool:
     """A Ray cluster, while the context lasts: one that runs already, or one of this machine's cores."""
 
     def __init__(self, address: str = "", *, cores: int = 0, wait_s: float = WAIT_S) -> None:
-        """Name a cluster; it is met when the context begins.
+        """Name a cluster, which is met when the context begins; ``""`` makes one of this machine alone.
 
-        Args:
-            address: ``HOST:PORT`` of a cluster to which this machine belongs; ``""`` makes one of this machine alone.
-            cores: of the cluster that is made; 0 for all that this process may use.
-            wait_s: how long the address may take to answer.
+        That one has ``cores``, 0 for all that this process may use. One at ``HOST:PORT`` must include this machine, and
+        answer within ``wait_s``.
         """
         self._address, self._cores, self._wait_s = address, cores or usable_cores(), wait_s
         self.folder, self._began = "", False
         self._ray: Any = None
 
     def __enter__(self) -> Self:
-        """Connect.
-
-        Raises:
-            BackendError: Ray is not installed.
-            MapError: the address is none, does not answer, or is of another Ray.
-        """
+        """Connect; ``MapError`` where no cluster answers at the address, ``BackendError`` without Ray."""
         place = _host_and_port(self._address)
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         if place is None or is_loopback(place[0]):  # Ray named it for the systems that needed loopback alone first
@@ -107,8 +100,7 @@ class RayPool:
     def run(self, function: Callable[[J], A], jobs: Sequence[J]) -> Generator[tuple[int, A]]:
         """Do each job on one core of the cluster, again where its worker died; yield results as they come.
 
-        Raises:
-            MapError: the workers of one job died too often, or cannot import this avlmaps.
+        ``MapError``: the workers of one job died too often, or cannot import this avlmaps.
         """
         ray = self._ray
         remote = ray.remote(function).options(num_cpus=1, max_retries=MOST_DEATHS)
@@ -216,11 +208,7 @@ class Models:
 
     @classmethod
     def of(cls, encoders: Encoders, cache: CacheSettings) -> "Models":
-        """Return the names of encoders.
-
-        Raises:
-            BackendError: one of them is an object, which has none.
-        """
+        """Return the names of encoders; raise ``BackendError`` for one that is an object, which has none."""
         names = {kind.value: encoders.name_of(kind) for kind in encoders}
         own = [module for module, name in names.items() if name.startswith(GIVEN)]
         if own:

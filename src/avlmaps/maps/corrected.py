@@ -37,18 +37,10 @@ MOVED = "Its poses were corrected after it was built"
 
 @dataclass(frozen=True, slots=True)
 class Corrected:
-    """What a correction did to a map.
+    """What a correction did to a map."""
 
-    Attributes:
-        median_m: how far a frame moved, metres.
-        most_m: the one that moved farthest.
-        voxels_before: of the map.
-        voxels: after it.
-        elapsed_s: seconds.
-    """
-
-    median_m: float
-    most_m: float
+    median_m: float  # how far a frame moved
+    most_m: float  # the one that moved farthest
     voxels_before: int
     voxels: int
     elapsed_s: float
@@ -107,11 +99,7 @@ def correct_map(
 
 
 def require_submaps(path: Path, data: MapData) -> Submaps:
-    """Return the submaps of a map.
-
-    Raises:
-        MapError: it has none.
-    """
+    """Return the submaps of a map; raise ``MapError`` where it has none."""
     submaps = data.submaps
     if submaps is None:
         raise MapError(

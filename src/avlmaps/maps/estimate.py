@@ -53,10 +53,8 @@ def doubts_of(recording: Recording, allowed: Sequence[str]) -> tuple[str, ...]:
 def judge(recording: Recording, useless: Sequence[str] | None = None, *, closely: bool = False) -> Verdict:
     """Check a recording against itself, the up direction that was given against what it shows, and its microphones.
 
-    Args:
-        recording: to check.
-        useless: what ``useless_channels`` says of its sound, where that was read before.
-        closely: whether rare mistakes are looked for as well, and what would not show is said.
+    ``useless`` is what ``useless_channels`` says of its sound, where that was read before. ``closely`` looks for rare
+    mistakes as well, and says what would not show.
     """
     verdict = examine_recording(recording) if closely else check_recording(recording)
     if verdict.refused(()) is not None:  # with such poses nothing is level
@@ -93,7 +91,6 @@ def _useless(recording: Recording) -> list[str]:
 
 
 def _of_microphones(track: AudioTrack, walk: Trajectory, useless: Sequence[str] | None) -> list[Finding]:
-    """Return what is wrong with the order and the signs of the channels."""
     try:
         if useless_channels(track) if useless is None else useless:
             return []
@@ -136,18 +133,11 @@ _RANDOMNESS = 1  # number of the stage as a source of randomness (keyframes have
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """What is found in some frames before any is fused.
-
-    Attributes:
-        up: the up direction.
-        floors: where the floors are, for the manifest.
-        ground: up and the floor under each camera height, for encoders.
-        sensor: the depth camera.
-    """
+    """What is found in some frames before any is fused."""
 
     up: UpInfo
-    floors: GroundInfo
-    ground: Ground
+    floors: GroundInfo  # for the manifest
+    ground: Ground  # up and the floor under each camera height, for encoders
     sensor: SensorInfo
 
     @classmethod

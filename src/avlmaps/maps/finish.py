@@ -43,13 +43,8 @@ def surfaces(
 ) -> tuple[Voxels, manifest.Removed]:
     """Return the voxels of the sums that are a surface, and how many are not.
 
-    Args:
-        total: the sums.
-        views: where the frames saw freely; with ``counts`` one.
-        camera: of the depth.
-        fusion: how they were added up.
-        sensor: the error of the depth.
-        counts: of the last time, of the same map with fewer frames.
+    ``views`` says where the frames saw freely; with ``counts``, those of the last time, of this map with fewer frames,
+    it is one.
     """
     if len(total) == 0:
         farthest = min(fusion.max_depth_m, sensor.farthest_m(total.grid.voxel_size_m))

@@ -32,23 +32,14 @@ from avlmaps.recordings.types import Frame, Recording
 
 @dataclass(frozen=True, slots=True)
 class MapState:
-    """What some frames brought. Those of other frames of the same recording, made with the same ``Start``, add up.
-
-    Attributes:
-        sums: of voxels.
-        views: where the frames saw freely.
-        keyframes: those among the frames, without learnt places.
-        stamp_s: of each frame.
-        pose: of each.
-        bad: frames that were left out.
-    """
+    """What some frames brought. Those of other frames of the same recording, made with the same ``Start``, add up."""
 
     sums: VoxelSums
-    views: FreeViews
-    keyframes: Keyframes
+    views: FreeViews  # where the frames saw freely
+    keyframes: Keyframes  # those among the frames, without learnt places
     stamp_s: Float64[np.ndarray, " f"]
     pose: Float64[np.ndarray, "f 4 4"]
-    bad: tuple[BadFrame, ...]
+    bad: tuple[BadFrame, ...]  # frames that were left out
 
 
 class _Note(msgspec.Struct):
@@ -140,19 +131,11 @@ class HeldFrames:
 
 @dataclass(slots=True)
 class Part:
-    """Some frames, all of one submap.
+    """Some frames, all of one submap."""
 
-    Attributes:
-        number: of the submap.
-        sums: of voxels.
-        views: where the frames saw freely.
-        stamps_s: of each frame.
-        poses: of each.
-    """
-
-    number: int
+    number: int  # of the submap
     sums: VoxelAccumulator
-    views: list[FreeViews] = field(default_factory=list[FreeViews])
+    views: list[FreeViews] = field(default_factory=list[FreeViews])  # where the frames saw freely
     stamps_s: list[float] = field(default_factory=list[float])
     poses: list[np.ndarray] = field(default_factory=list[np.ndarray])
 
@@ -164,14 +147,14 @@ class Part:
 
 
 class SubmapBook:
-    """Takes sums in the order of their frames."""
+    """The submaps of a map that grows; the last one is open until frames of the next one come."""
 
     def __init__(self) -> None:
         self._whole: list[Submaps] = []
         self._open: Part | None = None
 
     def add(self, part: Part, empty: VoxelAccumulator) -> None:
-        """Add frames to the submap of a number, which begins in ``empty`` if it is another one than before."""
+        """Add frames to the open submap if that has their number; else close it, and begin theirs in ``empty`` sums."""
         if self._open is None or self._open.number != part.number:
             self.close()
             self._open = Part(part.number, empty)
@@ -180,26 +163,22 @@ class SubmapBook:
         self._open.poses += part.poses
 
     def add_whole(self, submap: Submaps) -> None:
-        """Add a submap that was made elsewhere."""
+        """Add a submap of a stored state, which is whole."""
         self._whole.append(submap)
 
     def close(self) -> None:
-        """End the submap that is being filled; the next frames begin another."""
+        """Close the open submap: frames that follow begin another one, even if their number is its number."""
         self._whole += [] if self._open is None else [self._open.submap()]
         self._open = None
 
     def submaps(self) -> Submaps | None:
-        """Return all, with the one that is not whole; None where there is none."""
+        """Return all, the open one as it is now; None where there is none."""
         every = self._whole + ([] if self._open is None else [self._open.submap()])
         return concat(every) if every else None
 
 
 class FrameSums:
-    """Takes frames, and gives them away as parts.
-
-    Attributes:
-        dim: length of a feature, 0 where there are none; None until that is known.
-    """
+    """Takes frames, and gives them away as parts; ``dim`` is the length of a feature, None until that is known."""
 
     def __init__(self, settings: BuildSettings, encoders: Encoders) -> None:
         self.dim: int | None = None

@@ -41,24 +41,17 @@ FEWEST_NORMALS = 200
 
 @dataclass(frozen=True, slots=True)
 class Up:
-    """The up direction.
+    """The up direction."""
 
-    Attributes:
-        direction: unit vector in the world.
-        support: share of the measured surface normals within 8 degrees of up or of down, in [0, 1]; below 0.05
-            there is hardly a level surface in view and the direction is a guess.
-    """
-
-    direction: Float[np.ndarray, "3"]
+    direction: Float[np.ndarray, "3"]  # unit vector in the world
+    # share of the surface normals within 8 degrees of up or of down; below 0.05 the direction is a guess
     support: float
 
 
 def find_up(frames: Iterable[Frame], rng: np.random.Generator) -> Up:
-    """Find the direction that level surfaces share.
+    """Find the direction that level surfaces share in some ten frames or more, spread over the recording.
 
-    Args:
-        frames: spread over the recording, some ten or more; one after the other is held in memory.
-        rng: draws the normals.
+    One frame after the other is held in memory; ``rng`` draws the normals.
     """
     normals: list[Float[np.ndarray, "n 3"]] = []
     rotations: list[Float[np.ndarray, "3 3"]] = []
@@ -192,19 +185,12 @@ _BIAS = 1 << (_BITS - 1)
 
 @dataclass(frozen=True, slots=True)
 class Voxelised:
-    """Points gathered into voxels of 0.1 x 0.1 x 0.05 m, so that a place counts once however long it is looked at.
+    """Points gathered into voxels of 0.1 x 0.1 x 0.05 m, so that a place counts once however long it is looked at."""
 
-    Attributes:
-        key: (n,) rising number of each voxel.
-        count: (n,) how many points fell into it.
-        height_m: (n,) their mean height along up.
-        range_m: (n,) their mean depth.
-    """
-
-    key: Int64[np.ndarray, " n"]
-    count: Float[np.ndarray, " n"]
-    height_m: Float[np.ndarray, " n"]
-    range_m: Float[np.ndarray, " n"]
+    key: Int64[np.ndarray, " n"]  # rising number of each voxel
+    count: Float[np.ndarray, " n"]  # how many points fell into it
+    height_m: Float[np.ndarray, " n"]  # their mean height along up
+    range_m: Float[np.ndarray, " n"]  # their mean depth
 
     @classmethod
     def of(cls, point_m: Float[np.ndarray, "n 3"], range_m: Float[np.ndarray, " n"]) -> "Voxelised":
@@ -242,17 +228,11 @@ class Voxelised:
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """The surfaces of one frame, in level axes: x and y horizontal, the third along up; metres.
+    """The surfaces of one frame, in level axes: x and y horizontal, the third along up; metres."""
 
-    Attributes:
-        camera_m: (3,) where the camera was.
-        surface: all that was seen.
-        level: of it what is level and faces up.
-    """
-
-    camera_m: Float[np.ndarray, "3"]
-    surface: Voxelised
-    level: Voxelised
+    camera_m: Float[np.ndarray, "3"]  # where the camera was
+    surface: Voxelised  # all that was seen
+    level: Voxelised  # of it what is level and faces up
 
 
 def sight_of(frame: Frame, up_in_world: Float[np.ndarray, "3"]) -> Sight:
@@ -345,34 +325,21 @@ _AT_BOTTOM = 0.65  # the bottom of what is in view is taken for a floor out of v
 
 @dataclass(frozen=True, slots=True)
 class SurfacesAtHeight:
-    """The surfaces round a camera height.
+    """The surfaces round a camera height."""
 
-    Attributes:
-        camera_m: height of the cameras, along up.
-        surface: all that was seen by cameras of about that height.
-        level: level surfaces that face up, seen by them.
-        under_m: (k,) height of what each camera at this height stood over; NaN where that was not seen.
-    """
-
-    camera_m: float
-    surface: Voxelised
-    level: Voxelised
-    under_m: Float[np.ndarray, " k"]
+    camera_m: float  # of the cameras, along up
+    surface: Voxelised  # all that was seen by cameras of about that height
+    level: Voxelised  # level surfaces that face up, seen by them
+    under_m: Float[np.ndarray, " k"]  # of what each camera at this height stood over; NaN where that was not seen
 
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """A user's or a robot's hint about the floor.
+    """A user's or a robot's hint about the floor."""
 
-    Attributes:
-        floor_m: its height along up.
-        camera_height_m: of the camera over it.
-        exact: whether the floor lies there, or only not above it.
-    """
-
-    floor_m: float
-    camera_height_m: float
-    exact: bool = True
+    floor_m: float  # along up
+    camera_height_m: float  # over it
+    exact: bool = True  # whether the floor lies there, or only not above it
 
 
 Weighed = tuple[float, FloorGuess]
@@ -481,18 +448,15 @@ def prior_nats(height_m: float, camera_m: float, expected: Expected | None = Non
 
 
 def _below(view: SurfacesAtHeight, height_m: float) -> float:
-    """Return the share of all surface in view that lies below a height."""
     window = view.surface[view.surface.height_m > view.camera_m - DEEPEST_M]
     deep_m = height_m - window.height_m - _BELOW_M - _BELOW_PER_M * window.range_m
     return float(np.clip(deep_m / _DEEP_M, 0.0, 1.0).mean()) if len(window) else 0.0
 
 
 def stood_over(camera_m: Float[np.ndarray, "k 3"], level: Voxelised) -> Float[np.ndarray, " k"]:
-    """Return the height of the level surface that each camera stood over, along up; NaN where none was seen.
+    """Return the height along up of the level surface that each camera stood over; NaN where none was seen.
 
-    Args:
-        camera_m: (k, 3) in level axes.
-        level: level surfaces that any frame saw.
+    Cameras are in level axes; ``level`` is what any frame saw.
     """
     middle_m = level.middles_m()
     under = np.full(len(camera_m), np.nan)
@@ -516,29 +480,19 @@ _STOREY_M = 0.6  # a camera's view counts for others whose height differs by no 
 
 @dataclass(frozen=True, slots=True)
 class FoundGround:
-    """The floors of a recording, and their confidence.
+    """The floors of a recording, and their confidence."""
 
-    Attributes:
-        ground: for the height of each camera the floor under it.
-        floors: each of them once, lowest first.
-    """
-
-    ground: Ground
-    floors: tuple[FloorInfo, ...]
+    ground: Ground  # for the height of each camera the floor under it
+    floors: tuple[FloorInfo, ...]  # each of them once, lowest first
 
 
 def find_ground(
     frames: Iterable[Frame], up_in_world: Float[np.ndarray, "3"], start: Expected | None = None
 ) -> FoundGround:
-    """Find the floors that a recording's cameras stood over.
+    """Find the floors that the cameras of frames, spread over a recording, stood over.
 
-    Args:
-        frames: spread over the recording; one after the other is held in memory.
-        up_in_world: unit vector.
-        start: the floor that someone gave for the start of the recording.
-
-    Returns:
-        For the height of each frame's camera the height of the floor under it, along up, and the confidence.
+    One frame after the other is held in memory. ``start`` is the floor that someone gave for the start of the
+    recording.
     """
     up = np.asarray(up_in_world, np.float64)
     return ground_of_sights([sight_of(frame, up) for frame in frames], up, start)
@@ -597,7 +551,6 @@ def _floors(
     bands: Sequence[Int[np.ndarray, " m"]],
     choices: Sequence[tuple[FloorGuess, FloorGuess | None]],
 ) -> tuple[FloorInfo, ...]:
-    """Return each floor once, lowest first; of bands with the same one, that with the most cameras speaks for it."""
     joined: list[list[int]] = []
     for index in sorted(range(len(bands)), key=lambda index: choices[index][0].height_m):
         same = joined and choices[index][0].height_m - choices[joined[-1][0]][0].height_m < SAME_M

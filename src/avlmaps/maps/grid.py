@@ -11,11 +11,7 @@ _ROWS = 256
 
 @dataclass(frozen=True, slots=True)
 class GridSpec:
-    """An unbounded grid of cubes; voxel i covers [i·s, (i+1)·s) along each axis of the world, i of any sign.
-
-    Attributes:
-        voxel_size_m: the edge of a cube.
-    """
+    """An unbounded grid of cubes; voxel i covers [i·s, (i+1)·s) along each axis of the world, i of any sign."""
 
     voxel_size_m: float = 0.05
 

@@ -83,26 +83,16 @@ class Hearing:
 
     No cut of a track that grows is final, as its background is measured from what comes before and after. So until the
     end the last minutes are segmented again each time, as if the track ended now; what is older stays. At the end the
-    whole track is heard by the same functions.
-
-    Attributes:
-        whole: the sound of a recording, which comes as a whole; None where it comes piece by piece.
-        came: the track that came until now, None without one.
-        microphones: one for each channel; None where they are not known.
-        known_rad: of the device that says directions, as ``DirectionTrack.known_rad``.
-        sources: where sounds came from, as far as that was looked for.
+    whole track is heard by the same functions. ``whole`` is the sound of a recording, None where it comes piece by
+    piece; ``known_rad`` is ``DirectionTrack.known_rad`` of the device that says directions.
     """
 
     def __init__(
         self, encoders: Encoders, settings: HearingSettings, whole: AudioTrack | None, *, name_first: bool
     ) -> None:
-        """Begin without sound, or with all of it.
+        """Begin without sound, or with the ``whole`` of a recording's.
 
-        Args:
-            encoders: that of sounds is used.
-            settings: how.
-            whole: the sound of a recording.
-            name_first: a sound has its name in one snapshot, and its place in a later one.
+        With ``name_first`` a sound has its name in one snapshot, and its place in a later one.
         """
         self.whole, self.came = whole, None if whole is not None else GrowingTrack(self._folder() / "track.f32")
         self.microphones: Microphones | None = None

@@ -195,18 +195,10 @@ MAX_SPREAD = 0.03
 
 
 def lift_keypoints(xy: Float32[np.ndarray, "n 2"], frame: Frame, max_depth_m: float) -> Float32[np.ndarray, "n 3"]:
-    """Return the world points that keypoints of the colour picture show.
+    """Return the world points that keypoints of the colour picture show, metres; NaN without a trustworthy depth.
 
     A keypoint's depth is the median of the patch around it; it has none where half of the patch has none, where the
     patch's depths differ too much, or beyond the limit.
-
-    Args:
-        xy: pixels of the colour picture.
-        frame: its depth, cameras and pose.
-        max_depth_m: the limit.
-
-    Returns:
-        Metres, world; NaN where there is no trustworthy depth.
     """
     camera, depth_m = depth_in_colour(frame.depth_m, frame.rig)
     scale = np.array([camera.width / frame.rig.rgb.width, camera.height / frame.rig.rgb.height])
@@ -305,9 +297,8 @@ class KeyframeAlbum:
     def keyframes(self, rng: np.random.Generator, *, final: bool = True) -> tuple[Keyframes, dict[str, np.ndarray]]:
         """Return the keyframes, and what places are known by: the same objects as before where nothing came.
 
-        Args:
-            rng: for what the place encoder learns.
-            final: learn places again; else only where enough has come since.
+        ``rng`` is for what the place encoder learns. Places are learned again if ``final``, else only where enough has
+        come since.
         """
         plain = self.plain()
         if self._stacked is None or (final and self._learnt_from != len(plain)):

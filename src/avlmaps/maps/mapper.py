@@ -56,14 +56,8 @@ _MOST_DOUBTS = 5
 class Mapper:
     """Takes frames and sound, in the order of time, and makes maps of what came.
 
-    One thread may add frames and one sound while another makes snapshots.
-
-    Attributes:
-        settings: of a build; of ``frames`` only ``per_submap`` counts.
-        encoders: the models that perceive.
-        start: up, the floor and the depth camera; None until the first frames show them.
-        began_s: when the work began (``perf_counter``).
-        hearing: the sound.
+    One thread may add frames and one sound while another makes snapshots. ``start`` is up, the floor and the depth
+    camera: None until the first frames show them. ``began_s`` is ``perf_counter`` when the work began.
     """
 
     def __init__(
@@ -78,13 +72,9 @@ class Mapper:
     ) -> None:
         """Begin without frames.
 
-        Args:
-            settings: of a build.
-            encoders: the models that perceive.
-            up_in_world: unit vector; None finds it in the frames.
-            first_frames: in which up, the floor and the sensor are found; ``gravity.frames`` if None.
-            behind: another thread makes snapshots, and looks at keyframes.
-            begins_s: what the clock said at time 0.
+        Up, where ``up_in_world`` is None, the floor and the sensor are found in ``first_frames`` (``gravity.frames`` if
+        None). With ``behind``, another thread makes snapshots, and looks at keyframes. ``begins_s`` is what the clock
+        said at time 0. Of ``settings.frames`` only ``per_submap`` counts.
         """
         self.settings, self.encoders = settings.for_profile(encoders.weight_variance_m2), encoders
         self.start: Start | None = None
@@ -128,14 +118,8 @@ class Mapper:
     ) -> "Mapper":  # fmt: skip
         """Return a mapper of frames of a recording, of which is known what all of it shows.
 
-        Args:
-            recording: whose frames will be added, or their states; it also has the sound.
-            settings: of the build.
-            encoders: the models that perceive.
-            start: up, the floor and the depth camera.
-            keyframes: numbers of the frames that become keyframes.
-            key: hash of all that goes into the map.
-            doubts: what is odd about it.
+        Its frames will be added, or their states; the sound is the recording's. ``keyframes`` are numbers of frames,
+        ``key`` is the hash of all that goes into the map, ``doubts`` says what is odd about it.
         """
         mapper = cls(settings, encoders, recording.up_in_world, begins_s=recording.begins_s)
         mapper._recording, mapper._rig, mapper.start = recording, recording.rig, start
@@ -166,10 +150,10 @@ class Mapper:
     # Frames
 
     def add(self, frame: Frame, features: Any = None, *, encode: bool = True) -> None:
-        """Add a frame. What is wrong with it leaves the map as it was.
+        """Add a frame, later than the last one, of the same cameras. What is wrong with it leaves the map as it was.
 
         Args:
-            frame: later than the last one, of the same cameras.
+            frame: the frame.
             features: of its pixels, (rows, columns, d) covering the picture evenly, instead of the encoder's.
             encode: give it to the encoder; else it adds its surface and colours alone. Of an encoder of keyframes
                 alone, they decide.
@@ -210,8 +194,7 @@ class Mapper:
     def settle(self) -> list[BackendError]:
         """Find up, the floor and the depth camera in the frames that came, and fuse those that waited for that.
 
-        Returns:
-            Why frames were left out: their features are wrong.
+        Returned is why frames were left out: their features are wrong.
         """
         faults: list[BackendError] = []
         with self._adding, silence_progress(True):
@@ -287,11 +270,7 @@ class Mapper:
             )  # fmt: skip
 
     def add_state(self, state: MapState) -> None:
-        """Add what frames brought that come after those before; arrays may be memory-mapped.
-
-        Raises:
-            MapError: its features have another length.
-        """
+        """Add what frames brought that come after those before; arrays may be memory-mapped."""
         assert self._rig is not None
         if self._whole is None:
             self._whole = VoxelAccumulator(GridSpec(self.settings.voxel_size_m), state.sums.feature_sum.shape[1])
@@ -345,14 +324,13 @@ class Mapper:
         return known.world_from_body[np.searchsorted(known.stamps_s, stamps_s)]
 
     def correct_poses(self, stamps_s: Any, poses: Any) -> tuple[float, float]:
-        """Move what came to corrected poses of it; frames to come have poses of the corrected world.
+        """Move what came to corrected poses; return how far frames moved, the median and the most, metres.
+
+        Frames to come have poses of the corrected world.
 
         Args:
             stamps_s: (k,) of corrected poses, rising.
             poses: (k, 4, 4) world_from_camera of the depth camera then. Between them frames follow smoothly.
-
-        Returns:
-            How far frames moved: the median and the most, metres.
 
         Raises:
             MapError: it stores no submaps, no frame came, or the poses are not of its frames.
@@ -395,10 +373,8 @@ class Mapper:
     def snapshot(self, *, absorb: bool = True) -> MapData:
         """Return the map of what came. Frames that wait for others to show up and the floor wait no longer.
 
-        The same arrays as before where nothing came. Each sound has a place as soon as it was looked for.
-
-        Args:
-            absorb: take the frames since the last one as well, and not only sounds.
+        The same arrays as before where nothing came. Each sound has a place as soon as it was looked for. Without
+        ``absorb`` only sounds are taken since the last one, and no frames.
 
         Raises:
             MapError: no frame came, or none has a depth within the limits.
@@ -422,9 +398,7 @@ class Mapper:
     def finish(self) -> MapData:
         """Return the map of what came as a whole: up, the floor, places, sounds and their sources are found in all.
 
-        Raises:
-            MapError: no frame came, or none has a depth within the limits.
-            BackendError: an encoder is missing, or broke its protocol; the frame is left out.
+        Errors are those of ``snapshot``.
         """
         if not len(self) and self._recording is None:
             raise MapError("The map has no frame yet; add one.")

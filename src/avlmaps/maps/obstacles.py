@@ -76,19 +76,12 @@ class BodyShape:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForbiddenArea:
-    """An area of the floor that a person forbade.
-
-    Attributes:
-        name: its own.
-        said: who forbade it and when, in words.
-        corners: (k, 2) level x and y, metres.
-        storey: the number of the one that it is on.
-    """
+    """An area of the floor that a person forbade."""
 
     name: str
-    said: str
-    corners: Float64[np.ndarray, "k 2"]
-    storey: int = 0
+    said: str  # who forbade it and when, in words
+    corners: Float64[np.ndarray, "k 2"]  # level x and y, metres
+    storey: int = 0  # number of the one that it is on
 
     def cells(self, shape: tuple[int, ...], origin_m: Float[np.ndarray, "2"], cell_m: float) -> Bool[np.ndarray, "r c"]:
         """Return the cells of a grid that it touches."""
@@ -102,30 +95,17 @@ class ForbiddenArea:
 
 @dataclass(frozen=True, slots=True)
 class Obstacles:
-    """A top-down grid; cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_size_m`` of the level x and y.
-
-    Attributes:
-        level_from_world: rotation into the level frame.
-        origin_m: level x and y of the corner of cell (0, 0).
-        cell_size_m: edge of a cell.
-        floor_m: level z of the floor.
-        states: `CellState` of each cell.
-        tall: where something stands at the height of eyes (`SIGHT_M`), so that nobody looks over it; None where
-            that is not known.
-        storeys: those of the map; None where it has one.
-        storey: the number of the one that this is the grid of.
-        forbidden: the areas that people forbade, of all storeys; on this one they are occupied.
-    """
+    """A top-down grid; cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_size_m`` of the level x and y."""
 
     level_from_world: Float64[np.ndarray, "3 3"]
-    origin_m: Float64[np.ndarray, "2"]
+    origin_m: Float64[np.ndarray, "2"]  # level x and y of the corner of cell (0, 0)
     cell_size_m: float
-    floor_m: float
-    states: UInt8[np.ndarray, "nx ny"]
-    tall: Bool[np.ndarray, "nx ny"] | None = None
-    storeys: Storeys | None = None
-    storey: int = 0
-    forbidden: tuple[ForbiddenArea, ...] = ()
+    floor_m: float  # level z of the floor
+    states: UInt8[np.ndarray, "nx ny"]  # `CellState` of each cell
+    tall: Bool[np.ndarray, "nx ny"] | None = None  # where something blocks the view (`SIGHT_M`), if that is known
+    storeys: Storeys | None = None  # of the map; None where it has one
+    storey: int = 0  # number of the one that this is the grid of
+    forbidden: tuple[ForbiddenArea, ...] = ()  # of all storeys; on this one they are occupied
 
     def without(self, areas: Sequence[ForbiddenArea]) -> "Obstacles":
         """Return the grid with areas that no body enters; itself without any."""
@@ -149,11 +129,7 @@ class Obstacles:
     def elsewhere(self, point_world: Float[np.ndarray, "3"], climbs: bool = False) -> str:
         """Return why a body on this storey does not come to a place of another one, or to one that a person forbade.
 
-        ``""`` for a place of its own.
-
-        Args:
-            point_world: the place, metres.
-            climbs: whether the body takes stairs.
+        ``""`` for a place of its own. Bodies that climb take stairs.
         """
         if not np.isfinite(point_world).all():
             return ""
@@ -197,10 +173,10 @@ def find_obstacles(
 ) -> Obstacles:
     """Draw the grid of a map.
 
-    A cell is occupied where a voxel stands between the body's step and its height over the floor, free where the
-    floor was seen and nothing stands, and unknown elsewhere. For a body that flies, what it flies over is as good as
-    a floor, and only voxels that reach into its height are obstacles. Where the camera was carried the floor is free as
-    well, though it never looked down there, unless something was seen to stand there.
+    A cell is occupied where a voxel stands between the body's step and its height over the floor, free where the floor
+    was seen and nothing stands, and unknown elsewhere. For a body that flies, what it flies over is as good as a floor,
+    and only voxels that reach into its height are obstacles. Where the camera was carried the floor is free as well,
+    though it never looked down there, unless something was seen to stand there.
 
     Args:
         voxels: the map's.

@@ -25,25 +25,15 @@ Span = tuple[int, int, int]  # (first, last + 1, step) of frames
 
 @dataclass(frozen=True, slots=True)
 class BuildPlan:
-    """A build's ingredients.
-
-    Attributes:
-        recording: what to map.
-        path: the map's folder.
-        encoders: which models perceive.
-        settings: all that can be chosen.
-        models: the models' cards, by module.
-        key: hash of all ingredients; two builds with one key make one map.
-        keyframes: numbers of the frames that become keyframes.
-    """
+    """A build's ingredients; two builds with one key make one map."""
 
     recording: Recording
     path: Path
     encoders: Encoders
     settings: BuildSettings
-    models: dict[str, ModelInfo]
-    key: str
-    keyframes: frozenset[int]
+    models: dict[str, ModelInfo]  # by module
+    key: str  # hash of all ingredients
+    keyframes: frozenset[int]  # numbers of frames
 
     def spans(self) -> dict[Path, Span]:
         """Return the stretches of frames that are fused one after the other, by the files of what they bring."""
@@ -108,13 +98,7 @@ def audio_key(recording: Recording) -> list[str | float] | None:
 
 
 def claim(plan: BuildPlan, resume: bool, overwrite: bool) -> MapInfo | None:
-    """Check that the folder may be built into; return the map that is there if it is this very one.
-
-    Args:
-        plan: of the build.
-        resume: keep what a stopped build had finished.
-        overwrite: whether a finished map may be replaced.
-    """
+    """Check that the folder may be built into; return the map that is there if it is this very one."""
     there = None if overwrite else read_info(plan.path)
     if there is not None:
         if there.build_key != plan.key:

@@ -23,11 +23,7 @@ _MOST_OFF_M, _MOST_OFF_SHARE = 0.1, 0.5
 
 @dataclass(frozen=True, slots=True)
 class PoseCorrection:
-    """The motion of a walk's frames.
-
-    Attributes:
-        motions: new world from the world of now, at some stamps.
-    """
+    """The motion of a walk's frames: new world from the world of now, at some stamps."""
 
     motions: Trajectory
 
@@ -37,11 +33,8 @@ class PoseCorrection:
     ) -> "PoseCorrection":
         """Return what corrected poses mean for the frames of a map.
 
-        Args:
-            stamps_s: (k,) when, rising, on the clock of the frames.
-            poses: (k, 4, 4) world_from_camera then, of the depth camera.
-            known_s: stamps of the frames.
-            known: the poses that they have now.
+        Both are world_from_camera of the depth camera; ``stamps_s`` rise, on the clock of the frames, which have the
+        poses ``known`` at ``known_s`` now.
         """
         stamps, given = _checked(stamps_s, poses)
         there = Trajectory(known_s, known)

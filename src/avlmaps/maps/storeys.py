@@ -35,19 +35,12 @@ _ORDINALS = ("ground", "first", "second", "third", "fourth", "fifth", "sixth", "
 
 @dataclass(frozen=True, slots=True)
 class Storey:
-    """A floor and what stands on it; heights are z of the level frame, metres.
+    """A floor and what stands on it; heights are z of the level frame, metres."""
 
-    Attributes:
-        number: counted from 0, the lowest of the map.
-        floor_m: height of the floor.
-        low_m: what lies higher than this belongs to the storey,
-        high_m: and lower than this.
-    """
-
-    number: int
+    number: int  # from 0, the lowest of the map
     floor_m: float
-    low_m: float
-    high_m: float
+    low_m: float  # what lies higher belongs to the storey,
+    high_m: float  # if it lies lower than this
 
     @property
     def name(self) -> str:
@@ -57,30 +50,19 @@ class Storey:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stairs:
-    """A flight, or several with landings, from one storey to the next.
+    """A flight, or several with landings, from one storey to the next."""
 
-    Attributes:
-        below: number of the lower storey; the upper one is the next.
-        points: (n, 3) path up, level frame, metres; the first lies on the lower floor, the last on the upper one.
-    """
-
-    below: int
-    points: Float[np.ndarray, "n 3"]
+    below: int  # number of the lower storey; the upper one is the next
+    points: Float[np.ndarray, "n 3"]  # path up, level frame, metres, from the lower floor to the upper one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Storeys:
-    """The storeys of a map, and the stairs between them.
+    """The storeys of a map, and the stairs between them."""
 
-    Attributes:
-        all: lowest first.
-        stairs: those that the map holds.
-        up: unit vector in the recording frame, along which heights are.
-    """
-
-    all: tuple[Storey, ...]
-    stairs: tuple[Stairs, ...] = ()
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    all: tuple[Storey, ...]  # lowest first
+    stairs: tuple[Stairs, ...] = ()  # those that the map holds
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)  # unit vector in the recording frame, along which heights are
 
     @classmethod
     def single(cls, floor_m: float) -> "Storeys":
@@ -135,19 +117,12 @@ class Storeys:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Columns:
-    """Occupied cells (i, j, k) as rising numbers: one column after the other, each from below.
-
-    Attributes:
-        keys: (n,) one for each occupied cell.
-        span: extents of the grid, margins included.
-        low: (3,) index of its first cell.
-        cell_m: edges of a cell along x and y, and along z.
-    """
+    """Occupied cells (i, j, k) as rising numbers: one column after the other, each from below."""
 
     keys: Int[np.ndarray, " n"]
-    span: tuple[int, int, int]
-    low: Int[np.ndarray, "3"]
-    cell_m: tuple[float, float]
+    span: tuple[int, int, int]  # extents of the grid, margins included
+    low: Int[np.ndarray, "3"]  # index of its first cell
+    cell_m: tuple[float, float]  # edges of a cell along x and y, and along z
 
     @classmethod
     def of(cls, level: Float[np.ndarray, "n 3"], voxel_size_m: float) -> "_Columns | None":
@@ -213,10 +188,8 @@ def find_storeys(
 ) -> Storeys | None:
     """Find the storeys of a map; None for a map that has one, or that has none at all.
 
-    Args:
-        level: middles of its voxels, level frame, metres.
-        voxel_size_m: their edge.
-        cameras: where its cameras were, level frame; a storey is where one was carried.
+    ``level`` is the middles of its voxels, and ``cameras`` where its cameras were, level frame, metres; a storey is
+    where one was carried.
     """
     cameras = np.asarray(cameras, np.float64).reshape(-1, 3)
     columns = None if not len(level) or stayed_on_one(cameras[:, 2]) else _Columns.of(level, voxel_size_m)
@@ -235,9 +208,8 @@ def find_storeys(
 def one_storey(floors_m: Sequence[tuple[float, float]], cameras_m: Float[np.ndarray, " k"]) -> Storeys:
     """Return the storey of a map that has one: its floor is the one that most cameras looked at.
 
-    Args:
-        floors_m: height and weight of every floor, step and landing that is known; may be empty.
-        cameras_m: level z of the cameras, from which the floor is guessed where none is known.
+    ``floors_m`` is height and weight of every floor, step and landing that is known. Where none is, the floor is
+    guessed from the level z of the cameras.
     """
     if floors_m:
         return Storeys.single(min(floors_m, key=lambda floor: (-floor[1], floor[0]))[0])

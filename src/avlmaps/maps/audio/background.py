@@ -95,15 +95,10 @@ _BIAS_DB = 2.2
 
 @dataclass(frozen=True, slots=True)
 class NoiseFloor:
-    """The background's mean power, for the middle of each half second.
+    """The background's mean power, for the middle of each half second."""
 
-    Attributes:
-        power: one row a block of half a second; at least a million times less than the loudest frame.
-        loudest: mean power over the bands of the track's loudest frame.
-    """
-
-    power: Float32[np.ndarray, "blocks bands"]
-    loudest: float
+    power: Float32[np.ndarray, "blocks bands"]  # a row a half second; a millionth of the loudest frame at least
+    loudest: float  # mean power over the bands of the track's loudest frame
 
     def at(self, begin: int, count: int) -> Float32[np.ndarray, "count bands"]:
         """Return the background for frames ``begin`` to ``begin + count``, interpolated between blocks."""
@@ -119,14 +114,10 @@ class NoiseFloor:
 def find_noise_floor(
     power: Float32[np.ndarray, "frames bands"], rate_hz: int, window_s: float, range_db: float
 ) -> NoiseFloor:
-    """Find the background of a track.
+    """Find the background of a track by its band powers, over the ``window_s`` around each moment.
 
-    Args:
-        power: its band powers.
-        rate_hz: samples a second of the track.
-        window_s: how many seconds around a moment determine its background.
-        range_db: the background is never put lower than this below the track's loudest frame, so that in digital
-            silence not every whisper is a sound.
+    It is never put more than ``range_db`` below the track's loudest frame, so that in digital silence not every whisper
+    is a sound.
     """
     loudest = float(power.mean(axis=1).max(initial=0.0))
     lowest = max(loudest * 10.0 ** (-range_db / 10.0), 1e-30)
@@ -171,24 +162,16 @@ _LEAST_COLOUR_DB = 4.0
 
 @dataclass(frozen=True, slots=True)
 class NoiseProfile:
-    """The spectrum of a background.
+    """The spectrum of a background."""
 
-    Attributes:
-        power: mean power of each bin of a windowed short-time spectrum.
-        rate_hz: samples a second that it holds for.
-    """
-
-    power: Float32[np.ndarray, " bins"]
-    rate_hz: int
+    power: Float32[np.ndarray, " bins"]  # mean power of each bin of a windowed short-time spectrum
+    rate_hz: int  # that it holds for
 
 
 def noise_profile(quiet: Iterable[Sound]) -> NoiseProfile | None:
-    """Learn the background's spectrum from stretches in which nothing else sounds.
+    """Learn the background's spectrum from stretches of 0.2 s in all or more, in which nothing else sounds; else None.
 
     Each bin's median over time, scaled to a mean as for noise, so that a stray click does not count.
-
-    Returns:
-        The profile, or None where the stretches are too short (less than 0.2 s in all).
     """
     powers: list[np.ndarray] = []
     rate_hz = 0

@@ -27,17 +27,9 @@ _EDGE_S = 0.05  # quiet is only what is this far from a sound
 def detect_events(
     track: AudioTrack, walk: Trajectory, encoder: SoundEncoder, settings: HearingSettings, clips_folder: Path
 ) -> HeardSounds:
-    """Find the sounds of a track, encode each whole, and return the robot's path during each.
+    """Find the sounds of a track in the order of time, encode each whole, and return the robot's path during each.
 
-    Args:
-        track: the sound.
-        walk: where the robot was.
-        encoder: gives a sound one feature or more, one for each window or step of it.
-        settings: how.
-        clips_folder: where each sound is written as FLAC, as it was heard, named by its onset; made if need be.
-
-    Returns:
-        The sounds in the order of their onset; ``clips`` are files in ``clips_folder``.
+    Each is written as FLAC, as it was heard, into ``clips_folder``, named by its onset.
     """
     heard = SoundFinder(encoder, settings, clips_folder).find(track, walk)
     _tell_outside(walk, [one.segment for one in heard])
@@ -85,7 +77,6 @@ class SoundFinder:
 def _cut_by_changes(
     track: AudioTrack, encoder: FrameSoundEncoder, settings: SoundChangeSettings
 ) -> tuple[list[Segment], list[Float32[np.ndarray, "steps d"]]]:
-    """Return the stretches of a track between changes, and the features of their steps."""
     features = frames_of_track(track, encoder)
     edges = split_at_changes(features, encoder.hop_s, settings)
     edges_s = np.minimum(track.start_s + edges * encoder.hop_s, track.end_s)

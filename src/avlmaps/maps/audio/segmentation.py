@@ -32,12 +32,7 @@ _USUAL = SegmentationSettings()
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A stretch of the track in which something sounds.
-
-    Attributes:
-        onset_s: where it begins, the recording's time.
-        offset_s: where it ends.
-    """
+    """A stretch of the track in which something sounds, the recording's time."""
 
     onset_s: float
     offset_s: float
@@ -57,11 +52,7 @@ class _Run:
 
 
 def segment(track: AudioTrack, settings: SegmentationSettings = _USUAL) -> list[Segment]:
-    """Find the sounds in a track.
-
-    Returns:
-        Segments in the order of time, disjoint and within the track; none for a silent track.
-    """
+    """Find the sounds in a track: disjoint segments in the order of time; none for a silent track."""
     if settings.method == "silence":
         return _padded(list(_loud_runs(track, settings)), settings, 1.0 / track.rate_hz, track)
     powers, step_s = band_powers(track.blocks(_BLOCK_S)), hop_samples(track.rate_hz) / track.rate_hz

@@ -32,21 +32,17 @@ class PixelLookup:
 
     Where the two cameras share their centre and axes, the colour pixel depends on the depth pixel's column and row
     alone, and tables hold it; else each point is projected.
-
-    Attributes:
-        x: camera-frame direction of each column at z = 1.
-        y: camera-frame direction of each row at z = 1.
-        tables: colour column of each depth column, first colour pixel of each depth row, and the same for the cells
-            of the feature map; -1 where that is outside.
-        projection: whether to project instead, rgb_from_depth, colour camera's fx fy cx cy, its rows and columns,
-            rows and columns of the feature map.
     """
 
-    x: Float64[np.ndarray, " wd"]
-    y: Float64[np.ndarray, " hd"]
+    x: Float64[np.ndarray, " wd"]  # camera-frame direction of each column at z = 1
+    y: Float64[np.ndarray, " hd"]  # and of each row
+    # colour column of each depth column, first colour pixel of each depth row, and likewise for the cells of the
+    # feature map; -1 where that is outside
     tables: tuple[
         Int32[np.ndarray, " wd"], Int32[np.ndarray, " hd"], Int32[np.ndarray, " wd"], Int32[np.ndarray, " hd"]
     ]
+    # whether to project instead, rgb_from_depth, colour camera's fx fy cx cy, its rows and columns, rows and columns of
+    # the feature map
     projection: tuple[
         bool, Float64[np.ndarray, "4 4"], tuple[float, float, float, float], tuple[int, int], tuple[int, int]
     ]
@@ -124,10 +120,10 @@ class _Scratch:
 class VoxelAccumulator(VoxelTable):
     """Adds up frames, or the sums of parts, into sparse voxels without bounds.
 
-    Weights are float64 and never fall below 1e-30 (which exp(−d² / 1.2) reaches at 9.1 m), so that what was only
-    ever seen from afar has a feature in float32; it counts for nothing beside a nearer look. Memory is that of
-    the voxels, 4·dim + 70 bytes each, however many frames there are. Kernels release the interpreter's lock:
-    two accumulators on two threads map two parts at once.
+    Weights are float64 and never fall below 1e-30 (which exp(−d² / 1.2) reaches at 9.1 m), so that what was only ever
+    seen from afar has a feature in float32; it counts for nothing beside a nearer look. Memory is that of the voxels,
+    4·dim + 70 bytes each, however many frames there are. Kernels release the interpreter's lock: two accumulators on
+    two threads map two parts at once.
     """
 
     def __init__(
@@ -139,14 +135,10 @@ class VoxelAccumulator(VoxelTable):
         *,
         with_spread: bool = False,
     ) -> None:
-        """Begin an empty map.
+        """Begin an empty map: ``dim`` is the length of a feature, 0 where no pixel features will come.
 
-        Args:
-            grid: the voxels' size.
-            dim: length of a feature; 0 where no pixel features will come.
-            settings: depth limits and the weight's width.
-            sensor: error of the depths; by default every depth within the limits is used as it is.
-            with_spread: note how the points lie within their voxels, for ``spread``.
+        By default every depth within the limits is used as it is. ``with_spread`` notes how points lie within their
+        voxels.
         """
         if dim < 0:
             raise ValueError(f"dim is {dim}; a feature cannot have fewer than 0 numbers")
@@ -160,19 +152,12 @@ class VoxelAccumulator(VoxelTable):
         self._scratch = _Scratch(1, 1, with_spread=with_spread)
 
     def add(self, frame: Frame, features: Float[np.ndarray, "hf wf d"] | None = None) -> int:
-        """Add a frame: every pixel with a depth within the limits counts, once.
+        """Add a frame: every pixel with a depth within the limits counts, once. Return how many those are.
 
-        The colour and the feature of a point are those of the colour pixel that it projects to. A point outside of
-        the colour picture adds to the geometry only (an occupied voxel, hits, last seen), and so does a feature
-        that is all zero, but for the colour.
-
-        Args:
-            frame: colour, depth and pose.
-            features: (hf, wf, dim), covering the colour picture evenly, at any resolution; None adds colour and
-                geometry only.
-
-        Returns:
-            How many pixels were added.
+        The colour and the feature of a point are those of the colour pixel that it projects to. A point outside of the
+        colour picture adds to the geometry only (an occupied voxel, hits, last seen), and so does a feature that is all
+        zero, but for the colour. Features cover the colour picture evenly, at any resolution; None adds colour and
+        geometry only.
         """
         cells, (feature_rows, feature_columns) = self._cells(features)
         lookup = self._lookup_for(frame.rig, feature_rows, feature_columns)

@@ -1,9 +1,8 @@
 """Where cameras saw freely, and which voxels are therefore no surface, beside smears of noisy depth and specks.
 
-A frame leaves one small picture, of how far all rays of each block of pixels are free.
-
-It costs some 10 KB, parts of a recording put theirs one after the other, and all that is decided on are whole numbers
-that add up over frames in any order: that is how parts of a map can be carved as one.
+A frame leaves one small picture (10 KB), of how far all rays of each block of pixels are free. Parts of a recording put
+theirs one after the other, and all that is decided on are whole numbers that add up over frames in any order: that is
+how parts of a map can be carved as one.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,16 +28,11 @@ _SPARSE = 4  # frames
 
 @dataclass(frozen=True, slots=True)
 class FreeViews:
-    """How far the frames of one part see freely.
+    """How far the frames of one part see freely."""
 
-    Attributes:
-        clear_mm: for each block of pixels the depth, in millimetres, up to which all its rays are free; 0 where a pixel
-            has no depth.
-        clear_pose: world_from_camera of each frame.
-    """
-
+    # of each block of pixels the depth, millimetres, up to which all its rays are free; 0 where a pixel has no depth
     clear_mm: UInt16[np.ndarray, "k rows columns"]
-    clear_pose: Float64[np.ndarray, "k 4 4"]
+    clear_pose: Float64[np.ndarray, "k 4 4"]  # world_from_camera of each frame
 
     def __len__(self) -> int:
         return len(self.clear_mm)
@@ -79,9 +73,7 @@ class ThroughCounts:
     def count(self, index: Int32[np.ndarray, "n 3"], views: FreeViews) -> Int32[np.ndarray, " n"]:
         """Return how many frames see through each voxel.
 
-        Args:
-            index: voxels, sorted; all those of the last call are among them.
-            views: of all frames, those of the last call first.
+        Those of the last call are among the voxels, which are sorted, and come first among the views.
         """
         row = np.empty(len(self._index), np.int32)
         find_rows(self._index, hash_of(index), np.ascontiguousarray(index), len(index), False, row)
@@ -103,10 +95,8 @@ def count_through(
     """Return how many frames see through each voxel.
 
     A frame does when every ray that may meet the voxel is free for a voxel's edge behind it; a pixel without depth in
-    the block of such a ray makes that unknown, and the frame does not count.
-
-    A frame sees a small part of a map. Voxels are grouped into cubes, and a cube whose sphere lies outside of the
-    picture, or farther than anything that the frame sees, is passed over.
+    the block of such a ray makes that unknown, and the frame does not count. Voxels are grouped into cubes, and a cube
+    whose sphere lies outside of the picture, or farther than anything that the frame sees, is passed over.
     """
     intrinsics = (float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy), camera.width, camera.height)
     cube = np.asarray(index, np.int32) >> _CUBE_SHIFT
@@ -156,16 +146,10 @@ def _visible(
 def count_where_it_matters(
     evidence: VoxelViews, grid: GridSpec, camera: Pinhole, views: FreeViews
 ) -> Int32[np.ndarray, " n"]:
-    """Return how many frames see through each voxel as `count_through` does, or 0 sooner.
+    """Return how many frames see through each voxel as `count_through` does, or 0 sooner; the views are in order.
 
-    A voxel is no surface when half as many frames see through it as hit it. Where more than eight hit it, that is
-    more than four, and one of every fourth is nearly always among them; where none is, the others are not tried.
-
-    Args:
-        evidence: of the voxels.
-        grid: their size.
-        camera: of the frames.
-        views: of the frames, in the order in which they were taken.
+    A voxel is no surface when half as many frames see through it as hit it. Where more than eight hit it, that is more
+    than four, and one of every fourth is nearly always among them; where none is, the others are not tried.
     """
     first = np.arange(len(views)) % _SPARSE == 0
     some, others = (FreeViews(views.clear_mm[part], views.clear_pose[part]) for part in (first, ~first))
@@ -193,13 +177,8 @@ def clean(
 ) -> tuple[Bool[np.ndarray, " n"], dict[str, int]]:
     """Return which voxels are a surface, and how many are not: ``seen_through``, ``smeared``, ``specks``.
 
-    Args:
-        evidence: of all voxels.
-        views: where the frames saw freely.
-        camera: of the frames, for depth.
-        grid: the voxels' size.
-        sensor: the camera's error.
-        count: returns how many frames see through each voxel, where that is known already; the views do not count then.
+    ``views`` says where the frames of a depth camera saw freely. It does not count where ``count`` gives how many
+    frames see through each of some voxels.
     """
     count = count or (lambda index: count_through(index, grid, camera, views))
     kept = np.ones(len(evidence), bool)
@@ -224,9 +203,10 @@ def seen_through(through: Int32[np.ndarray, " n"], views: Int32[np.ndarray, " n"
 
 
 def smear_reach(evidence: VoxelViews, sensor: SensorModel) -> Float64[np.ndarray, " n"]:
-    """Return the error of the depths that fell into each voxel, times ``smear_sigmas``, in voxels.
+    """Return how far off the surface that was measured in each voxel may lie, in voxels.
 
-    The surface that was measured there may lie as far off; a voxel nearer than that which is much better seen is it.
+    It is ``smear_sigmas`` times the mean error of the depths that fell into the voxel. A much better seen voxel within
+    that distance is the surface itself, and this one its smear.
     """
     # sharp / hits is the mean of 1 / (1 + (σ / half a voxel)²)
     exact = np.clip(evidence.sharp / (SHARP_UNITS * evidence.hits), 1.0 / SHARP_UNITS, 1.0)

@@ -51,7 +51,6 @@ Pairs = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.nda
 
 @njit(**OPTIONS)
 def _slot_of(i: Whole, j: Whole, k: Whole, slots: Int32[np.ndarray, " slots"], index: Int32[np.ndarray, "rows 3"]):
-    """Return the slot of a voxel in a hash table of rows, or the free one where it is to go."""
     mask = np.int64(slots.shape[0] - 1)
     mixed = i * np.int64(73856093) ^ j * np.int64(19349669) ^ k * np.int64(83492791)
     mixed = mixed * np.int64(-7046029254386353131)
@@ -72,15 +71,10 @@ def find_rows(
     enter: bool,
     found: Int32[np.ndarray, " n"],
 ):
-    """Write the row of each voxel, -1 where it is not in the table; return how many voxels the table has.
+    """Write the row of each voxel into ``found``, -1 where it is not in the table; return how many voxels that has.
 
-    Args:
-        wanted: which voxels.
-        slots: hash table of rows, -1 free; its length is a power of two.
-        index: of the rows.
-        count: how many there are.
-        enter: give a voxel that is not there the next row; there is room.
-        found: filled in.
+    ``slots`` is a hash table of rows, -1 free, of a power of two. With ``enter`` a voxel that is not there gets the
+    next row; there is room.
     """
     count = np.int64(count)
     for n in range(wanted.shape[0]):
@@ -113,8 +107,8 @@ def trace(
         depth: metres.
         rays: (x (w,), y (h,)), camera-frame direction of each column and row at z = 1.
         pose: (rotation (3, 3), translation (3,), the camera's voxel (3,) int64).
-        limits: (voxel size, least and greatest depth in metres, 1 / (2 variance), error of a depth in half voxels at
-            0 m and its growth with the depth's square).
+        limits: (voxel size, least and greatest depth in metres, 1 / (2 variance), error of a depth in half voxels at 0
+            m and its growth with the depth's square).
         rgb: colours of the picture's pixels.
         tables: see `accumulator.PixelLookup`.
         projection: likewise.
@@ -249,15 +243,9 @@ def add_features(
 ):
     """Add the features of a traced frame to the map; return how many voxels were left out as theirs are not finite.
 
-    Each sum is formed in the first-level cache before its row is touched: reading a frame's features from memory, and
-    reading and writing rows of 2 KB, is what limits fusion.
-
-    Args:
-        rows: of the map, for each of the frame's voxels.
-        pairs: as `trace` left them.
-        features: of the cells; one that is all zero adds neither itself nor weight.
-        feature_sum: added to.
-        weight: added to.
+    ``rows`` are the map's for the frame's voxels, ``pairs`` as `trace` left them. A cell that is all zero adds neither
+    itself nor weight. Each sum is formed in the first-level cache before its row is touched: reading a frame's features
+    from memory, and reading and writing rows of 2 KB, is what limits fusion.
     """
     pair_cell, pair_weight, pair_before, last_pair = pairs[:4]
     dim, most, faults = features.shape[1], pair_cell.shape[0], 0
@@ -308,13 +296,9 @@ def commit(
 ):
     """Add what a traced frame brings to its voxels to the map's table; return how many voxels that has then.
 
-    Args:
-        frame: how many voxels it has, its number in its submap, and its stamp in seconds.
-        origin: the camera's voxel.
-        voxels: as `trace` left them.
-        table: added to; there is room.
-        count: how many voxels it has.
-        rows: of each voxel of the frame in the table, filled in.
+    ``frame`` is how many voxels it has, its number in its submap, and its stamp in seconds; ``origin`` the camera's
+    voxel; ``voxels`` are as `trace` left them. The table has ``count`` voxels, and room. The row of each voxel is
+    filled in.
     """
     _, _, voxel_key, voxel_sum, voxel_spread = voxels
     slots, index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s, spread = table
@@ -355,13 +339,9 @@ def drop_flying(
 ):
     """Copy a depth picture without the pixels that lie between a nearer and a farther surface; those become 0.
 
-    Args:
-        depth: metres.
-        slope: by how much the depth changes from one column, and from one row, to the next on the most grazing surface
-            at 1 m, metres.
-        noise: (σ at 0 m, its growth with z²).
-        edge_sigmas: a neighbour is on another surface when it is this many σ off.
-        out: filled in.
+    ``slope`` is by how much the depth changes from one column, and from one row, to the next on the most grazing
+    surface at 1 m; ``noise`` is σ at 0 m and its growth with z². A neighbour is on another surface when it is
+    ``edge_sigmas`` σ off.
     """
     height, width = depth.shape
     for v in range(height):
@@ -452,14 +432,9 @@ def fall_into_cells(
 ):
     """Write into which voxels samples of voxels that move fall, in pairs; return how many pairs there are.
 
-    Args:
-        lies: mean and factor of the covariance of the points within each voxel, see `submaps`.
-        turn: rotation of each.
-        middle: where its middle falls, voxels.
-        hits: pixels in each; what gets less than half of one gets nothing, unless all do.
-        cell: of each pair the voxel, filled in; at most 27 of each source.
-        source: the voxel that moves.
-        share: of it.
+    ``lies`` is mean and factor of the covariance of the points within each voxel (see `submaps`), ``turn`` its
+    rotation, ``middle`` where its middle falls, in voxels. What gets less than half a pixel of its ``hits`` gets
+    nothing, unless all do. Of each pair are filled in the cell, the source, which has 27 at most, and the share of it.
     """
     even, within = 12.0**0.5, 0.4999  # an even spread over a length has a standard deviation of the length over this
     count, steps, pairs = np.zeros(64, np.int64), np.zeros(3, np.int64), np.int64(0)

@@ -4,8 +4,8 @@ The error of a camera that measures depth as a shift between two views (structur
 of the depth: σ(z) = noise_m + noise_per_m · z².
 
 * kinect: σ = 0.0012 + 0.0019 (z − 0.4)² m, measured by Nguyen, Izadi and Lovell, Modeling Kinect Sensor Noise for
-  Improved 3D Reconstruction and Tracking (3DIMPVT 2012); rounded up here to 0.0019 z². Khoshelham and Elberink
-  (Sensors 2012) measured 0.0014 z².
+  Improved 3D Reconstruction and Tracking (3DIMPVT 2012); rounded up here to 0.0019 z². Khoshelham and Elberink (Sensors
+  2012) measured 0.0014 z².
 * realsense: σ = s z² / (f b), with a subpixel error s = 0.08 px, the focal length f = 424 px of a D435 at 848 columns
   and its baseline b = 0.05 m: 0.0038 z² (the formula and s are from Intel's tuning guide of the D400 family).
 """

@@ -60,11 +60,8 @@ def in_steps(
 ) -> tuple[Int8[np.ndarray, "n d"], Float32[np.ndarray, " n"]]:
     """Return mean features in 254 steps from minus to plus their largest magnitude, and how large a step of each is.
 
-    What is rounded is at most half a step, 1/254 of the largest number, and differs from submap to submap.
-
-    Args:
-        feature_sum: sums of weight times feature.
-        weight: of each; a voxel without one has no feature.
+    What is rounded is at most half a step, 1/254 of the largest number, and differs from submap to submap. A voxel
+    without weight has no feature.
     """
     most = np.abs(feature_sum).max(axis=1, initial=0.0).astype(np.float32)
     known = (most > 0.0) & (weight > 0.0)
@@ -121,11 +118,7 @@ class MovedSubmaps:
         return self._table.evidence()
 
     def voxels(self, kept: Bool[np.ndarray, " n"] | None = None) -> Voxels:
-        """Return the means, sorted by index: features of unit length, colours.
-
-        Args:
-            kept: which voxels of `evidence` to return; all by default.
-        """
+        """Return the means of the ``kept`` of `evidence`, sorted by index: features of unit length, colours."""
         plain, rows = self._table.voxels(kept=kept), self._order if kept is None else self._order[kept]
         feature = np.empty((len(rows), self._submaps.feature.shape[1]), np.float16)
         for block in blocks(len(rows), feature.shape[1]):
@@ -137,7 +130,6 @@ class MovedSubmaps:
         total.merge(replace(self._table.sums(), feature_sum=self._features(self._order)))
 
     def _move(self, number: int, moved: Float64[np.ndarray, "f 3 4"]) -> tuple[np.ndarray, ...]:
-        """Note how many frames of a submap saw each voxel, and return its pairs with their hits."""
         submaps, table = self._submaps, self._table
         frames = slice(*(int(at) for at in submaps.frame_offsets[number : number + 2]))
         rows = slice(*(int(at) for at in submaps.row_offsets[number : number + 2]))
@@ -165,7 +157,6 @@ class MovedSubmaps:
 
     @cached_property
     def _shares(self) -> Any:
-        """A sparse array: of each voxel the rows that move there, by what their features weigh."""
         from scipy.sparse import csr_array
 
         submaps, (to, row, share) = self._submaps, self._pairs

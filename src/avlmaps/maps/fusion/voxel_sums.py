@@ -19,29 +19,19 @@ class VoxelSums:
     """The sums of one part of a recording, sorted by index (x, then y, then z); parts add up to the whole.
 
     The arrays may be memory-mapped.
-
-    Attributes:
-        index: which voxel.
-        feature_sum: sum of weight times feature.
-        weight: sum of the weights of the pixels with a feature; 0 where there was none.
-        rgb_sum: sum of weight times colour (0 to 255).
-        rgb_weight: sum of the weights of the pixels with a colour.
-        hits: how many pixels fell into it, with a feature and a colour or without.
-        views: how many frames have a pixel in it.
-        sharp: sum over its pixels of how exact their depths are, 1 / (1 + (σ / half a voxel)²), in units of 1/256.
-        last_seen_s: when a pixel last fell into it.
-        spread: sums of where its points lie in it, see `kernels.FrameVoxels`; no columns where that is not needed.
     """
 
     index: Int32[np.ndarray, "n 3"]
-    feature_sum: Float32[np.ndarray, "n d"]
-    weight: Float64[np.ndarray, " n"]
-    rgb_sum: Float64[np.ndarray, "n 3"]
-    rgb_weight: Float64[np.ndarray, " n"]
-    hits: Int64[np.ndarray, " n"]
-    views: Int32[np.ndarray, " n"]
+    feature_sum: Float32[np.ndarray, "n d"]  # of weight times feature
+    weight: Float64[np.ndarray, " n"]  # of the pixels with a feature
+    rgb_sum: Float64[np.ndarray, "n 3"]  # of weight times colour (0 to 255)
+    rgb_weight: Float64[np.ndarray, " n"]  # of the pixels with a colour
+    hits: Int64[np.ndarray, " n"]  # how many pixels fell into it, with a feature and a colour or without
+    views: Int32[np.ndarray, " n"]  # how many frames have a pixel in it
+    # over its pixels how exact their depths are, 1 / (1 + (σ / half a voxel)²), in units of 1/256
     sharp: Int64[np.ndarray, " n"]
-    last_seen_s: Float64[np.ndarray, " n"]
+    last_seen_s: Float64[np.ndarray, " n"]  # when a pixel last fell into it
+    # where its points lie in it, see `kernels.FrameVoxels`; no columns where that is not needed
     spread: Float64[np.ndarray, "n_or_0 s"] = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __len__(self) -> int:
@@ -75,12 +65,8 @@ class VoxelTable:
     """Sums over an unbounded set of voxels, in the order in which they were first met, found by a hash of the index.
 
     Rows are added in place: the arrays grow by an eighth through ``realloc``, which moves pages, not bytes, so that
-    memory stays at the size of the map.
-
-    Attributes:
-        dim: length of a feature.
-        count: number of voxels already.
-        slots: hash table of rows, -1 free; its length is a power of two and at least twice the count.
+    memory stays at the size of the map. ``slots`` is a hash table of rows, -1 free, of a power of two that is at least
+    twice ``count``.
     """
 
     def __init__(self, dim: int, *, with_spread: bool = False) -> None:
@@ -166,11 +152,7 @@ class VoxelTable:
         return VoxelViews(self.index[rows], self.hits[rows], self.views[rows], self.sharp[rows])
 
     def voxels(self, kept: Bool[np.ndarray, " n"] | None = None) -> Voxels:
-        """Return the means, sorted by index: features of unit length, colours.
-
-        Args:
-            kept: which voxels of `evidence` to return; all by default.
-        """
+        """Return the means of the ``kept`` of `evidence`, sorted by index: features of unit length, colours."""
         rows = self.sort_rows()
         rows = rows if kept is None else rows[kept]
         feature = np.empty((len(rows), self.dim), np.float16)

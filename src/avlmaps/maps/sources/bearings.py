@@ -35,19 +35,12 @@ _GRID = tuple(product(_SPREADS_DEG, _OUTLIERS))
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """What is known of a device that says directions.
+    """What is known of a device that says directions."""
 
-    Attributes:
-        offset_rad: by how much its azimuths are too great, in (-pi, pi].
-        offset_sd_rad: circular standard deviation of that.
-        outliers: share of its azimuths that say nothing.
-        sounds: how many sounds that was found by.
-    """
-
-    offset_rad: float
-    offset_sd_rad: float
-    outliers: float
-    sounds: int
+    offset_rad: float  # by how much its azimuths are too great, in (-pi, pi]
+    offset_sd_rad: float  # circular standard deviation of that
+    outliers: float  # share of its azimuths that say nothing
+    sounds: int  # that it was found by
 
     @property
     def row(self) -> Float[np.ndarray, "4"]:
@@ -78,19 +71,12 @@ class Device:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bearings:
-    """The directions that were said while one sound lasted.
-
-    Attributes:
-        said: those directions.
-        weight: (k,) how much each counts.
-        ear_m: (k, 3) where the device was, level frame.
-        heading_rad: (k,) where the camera looked on the plan.
-    """
+    """The directions that were said while one sound lasted."""
 
     said: DirectionTrack
-    weight: Float[np.ndarray, " k"]
-    ear_m: Float[np.ndarray, "k 3"]
-    heading_rad: Float[np.ndarray, " k"]
+    weight: Float[np.ndarray, " k"]  # how much each counts
+    ear_m: Float[np.ndarray, "k 3"]  # where the device was, level frame
+    heading_rad: Float[np.ndarray, " k"]  # where the camera looked on the plan
 
     @classmethod
     def of(cls, track: DirectionTrack, walk: Trajectory, span_s: tuple[float, float]) -> "Bearings":
@@ -147,15 +133,10 @@ def _log_density(spread_deg: float, outliers: float) -> Float[np.ndarray, "b o"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BearingEvidence:
-    """What the directions of some sounds say.
+    """What the directions of some sounds say."""
 
-    Attributes:
-        heard: for each sound the log-likelihood of each candidate.
-        device: what all of them say of the device; None without directions.
-    """
-
-    heard: list[Float[np.ndarray, " c"]]
-    device: Device | None
+    heard: list[Float[np.ndarray, " c"]]  # for each sound the log-likelihood of each candidate
+    device: Device | None  # what all of them say of it; None without directions
 
 
 def evidence_of_bearings(

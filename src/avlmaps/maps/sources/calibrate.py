@@ -48,38 +48,25 @@ LEAST_EXPLAINED = 0.9  # of the clear delays: 1.0 in rooms with one source, 0.3 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArrayCalibration:
-    """A refined array.
+    """A refined array."""
 
-    Attributes:
-        microphones: the array.
-        source_m: (3,) where the source is, world.
-        before_s: residual of the delays with the given array, 1.48 times the median of its size.
-        after_s: with the refined one.
-        place_sd_m: (m,) standard deviation of each place along the axis that is known least; held axes are left out.
-        delay_sd_s: (m,) of each channel's delay.
-        moved_m: (m,) how far each microphone is from where it was given.
-        frames: how many had a measured delay.
-        held_heights: whether the walk does not show heights, so that z stays as given.
-        turned: channels that are wired the other way round, which is taken back here as where sources are found.
-    """
-
-    microphones: Microphones
-    source_m: Float[np.ndarray, "3"]
-    before_s: float
-    after_s: float
-    place_sd_m: Float[np.ndarray, " m"]
-    delay_sd_s: Float[np.ndarray, " m"]
-    moved_m: Float[np.ndarray, " m"]
-    frames: int
-    held_heights: bool
-    turned: tuple[int, ...] = ()
+    microphones: Microphones  # the array
+    source_m: Float[np.ndarray, "3"]  # where the source is, world
+    before_s: float  # residual of the delays with the given array, 1.48 times the median of its size
+    after_s: float  # with the refined one
+    place_sd_m: Float[np.ndarray, " m"]  # of each place along the axis that is known least; held axes are left out
+    delay_sd_s: Float[np.ndarray, " m"]  # of each channel's delay
+    moved_m: Float[np.ndarray, " m"]  # how far each microphone is from where it was given
+    frames: int  # how many had a measured delay
+    held_heights: bool  # the walk does not show heights, so that z stays as given
+    turned: tuple[int, ...] = ()  # channels that are wired the other way round, which is taken back
 
 
 def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float] | None = None) -> ArrayCalibration:
-    """Refine the places of the microphones and the delays of the channels.
+    """Refine the places of the microphones, measured to centimetres, and the delays of the channels.
 
     Args:
-        track: with its microphones as they were measured, off by centimetres.
+        track: with its microphones.
         walk: the camera's poses.
         between_s: when the one source sounds, the recording's time; None for all of the track.
 
@@ -190,19 +177,12 @@ _Delays = Float[np.ndarray, "f p"]  # that were measured, of each frame and pair
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fit:
-    """The unknowns are, in this order: places (m - 1, 3) and delays (m - 1) over ``basis``, and the source (3).
-
-    Attributes:
-        found: the frames.
-        array: as given.
-        world_from_robot: (f, 4, 4) of each frame.
-        basis: (m, m - 1) orthonormal changes that leave the mean as it is.
-    """
+    """The unknowns are, in this order: places (m - 1, 3) and delays (m - 1) over ``basis``, and the source (3)."""
 
     found: Correlations
-    array: Microphones
-    world_from_robot: Float[np.ndarray, "f 4 4"]
-    basis: Float[np.ndarray, "m n"]
+    array: Microphones  # as given
+    world_from_robot: Float[np.ndarray, "f 4 4"]  # of each frame
+    basis: Float[np.ndarray, "m n"]  # orthonormal changes that leave the mean as it is
 
     @classmethod
     def of(cls, found: Correlations, array: Microphones, walk: Trajectory) -> "_Fit":

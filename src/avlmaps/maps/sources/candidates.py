@@ -27,17 +27,11 @@ _HIGHEST_OVER_EAR_M = 1.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidates:
-    """Places that a sound may have come from.
+    """Places that a sound may have come from."""
 
-    Attributes:
-        place_m: (c, 3) middles, level frame.
-        prior: (c,) probabilities that sum up to 1.
-        in_air: (c,) whether nothing is there.
-    """
-
-    place_m: Float32[np.ndarray, "c 3"]
-    prior: Float[np.ndarray, " c"]
-    in_air: Bool[np.ndarray, " c"]
+    place_m: Float32[np.ndarray, "c 3"]  # middles, level frame
+    prior: Float[np.ndarray, " c"]  # probabilities that sum up to 1
+    in_air: Bool[np.ndarray, " c"]  # whether nothing is there
 
     def __len__(self) -> int:
         return len(self.place_m)
@@ -46,9 +40,8 @@ class Candidates:
 def candidates_of(voxel_m: Float[np.ndarray, "n 3"], ear_m: Float[np.ndarray, "k 3"]) -> Candidates:
     """Return the candidates of a map: surfaces by cells of ``CELL_M``, and the air over the floor.
 
-    Args:
-        voxel_m: middles of the surface's voxels, level frame.
-        ear_m: where the robot listened, level frame; what is far above or below all of these is another storey's.
+    Voxels and the ears, where the robot listened, are in the level frame; what is far above or below all ears is
+    another storey's.
     """
     low, high = ear_m[:, 2].min() - _FLOOR_BELOW_EAR_M[1], ear_m[:, 2].max() + _HIGHEST_OVER_EAR_M
     here = voxel_m[(voxel_m[:, 2] > low) & (voxel_m[:, 2] < high)]
@@ -132,15 +125,10 @@ _PASS_CELLS = 2  # of the plan in one of the path
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Walls:
-    """The walls of a storey on a plan.
+    """The walls of a storey on a plan."""
 
-    Attributes:
-        solid: (nx, ny) cells of ``_CELL_M`` that are walls.
-        origin_m: (2,) lowest corner.
-    """
-
-    solid: Bool[np.ndarray, "nx ny"]
-    origin_m: Float[np.ndarray, "2"]
+    solid: Bool[np.ndarray, "nx ny"]  # cells of ``_CELL_M`` that are walls
+    origin_m: Float[np.ndarray, "2"]  # lowest corner
 
     @classmethod
     def of(cls, voxel_m: Float[np.ndarray, "n 3"], ear_height_m: float) -> "Walls":
@@ -245,19 +233,12 @@ def _graph(number: Int[np.ndarray, "nx ny"], step_m: float) -> Any:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Legs:
-    """The robot's path in pieces, with what it saw from each.
+    """The robot's path in pieces, with what it saw from each."""
 
-    Attributes:
-        rows: the frames of each piece.
-        gate: of each piece, where the path to each candidate is last in sight.
-        rest_m: (l, c) length of the path from there; 0 of what is in sight.
-        away_m: (l, c) length of the whole path.
-    """
-
-    rows: list[np.ndarray]
-    gate: list[Float[np.ndarray, "c 2"]]
-    rest_m: Float[np.ndarray, "l c"]
-    away_m: Float[np.ndarray, "l c"]
+    rows: list[np.ndarray]  # the frames of each piece
+    gate: list[Float[np.ndarray, "c 2"]]  # of each piece, where the path to each candidate is last in sight
+    rest_m: Float[np.ndarray, "l c"]  # length of the path from there; 0 of what is in sight
+    away_m: Float[np.ndarray, "l c"]  # length of the whole path
 
     @classmethod
     def of(cls, ear: Float[np.ndarray, "k 3"], walls: Walls, place: Float[np.ndarray, "c 3"]) -> "Legs":
@@ -304,19 +285,12 @@ _BEST, _MOST = 64, 1500  # cells that may be the answer, and that it is compared
 
 @dataclass(frozen=True, eq=False)
 class CandidateGrid:
-    """The cells of ``CELL_M`` over and under the candidates, level frame.
+    """The cells of ``CELL_M`` over and under the candidates, level frame."""
 
-    Attributes:
-        low: (2,) number of the lowest cell.
-        shape: how many there are along x and y.
-        cell: (c,) flat cell of each candidate.
-        is_held: (nx, ny) whether a candidate lies there.
-    """
-
-    low: Int[np.ndarray, "2"]
-    shape: tuple[int, int]
-    cell: Int[np.ndarray, " c"]
-    is_held: Bool[np.ndarray, "nx ny"]
+    low: Int[np.ndarray, "2"]  # number of the lowest cell
+    shape: tuple[int, int]  # how many there are along x and y
+    cell: Int[np.ndarray, " c"]  # flat cell of each candidate
+    is_held: Bool[np.ndarray, "nx ny"]  # whether a candidate lies there
 
     @classmethod
     def of(cls, place_m: Float[np.ndarray, "c 3"]) -> "CandidateGrid":
@@ -345,17 +319,11 @@ class CandidateGrid:
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """How well the place of a source is known.
+    """How well the place of a source is known: by circles, level, round its likeliest place."""
 
-    Attributes:
-        right: probability that the source lies within ``RIGHT_M`` of its likeliest place.
-        within_50_m: radius round that place, level, which holds it with a probability of 0.5.
-        within_90_m: of 0.9.
-    """
-
-    right: float
-    within_50_m: float
-    within_90_m: float
+    right: float  # probability that the source lies within ``RIGHT_M``
+    within_50_m: float  # radius that holds it with a probability of 0.5
+    within_90_m: float  # of 0.9
 
     def around(self, place: str) -> str:
         """Return in words how near to a place the source lies."""
@@ -364,15 +332,10 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Density:
-    """How likely a sound came from each cell of a plan.
-
-    Attributes:
-        plan: the cells.
-        share: (nx, ny) probabilities that sum up to 1.
-    """
+    """How likely a sound came from each cell of a plan."""
 
     plan: CandidateGrid
-    share: Float[np.ndarray, "nx ny"]
+    share: Float[np.ndarray, "nx ny"]  # probabilities that sum up to 1
 
     @classmethod
     def of(
@@ -385,12 +348,8 @@ class Density:
     ) -> "Density":
         """Return the density of a source.
 
-        Args:
-            plan: of the candidates.
-            prior: of each candidate.
-            evidence: log-likelihood of each, sound and expectation together.
-            expected: log-likelihood without the sound: near the robot, in sight.
-            settings: the errors.
+        Of each candidate, ``evidence`` is the log-likelihood by sound and expectation together, ``expected`` that
+        without the sound: near the robot, in sight.
         """
         from scipy.ndimage import gaussian_filter
 
@@ -445,9 +404,9 @@ class Density:
 
     @cached_property
     def spread(self) -> Spread:
-        """How likely the source lies within ``RIGHT_M`` of the position, and within which radii.
+        """How far from ``position_m`` the source may be: circles round it that hold it with a probability.
 
-        Of a cell on the edge of that circle the part inside counts.
+        Of a cell on the edge of the circle of ``RIGHT_M`` the part inside counts.
         """
         away, share = self._away_and_share
         inside = np.clip((RIGHT_M - away) / CELL_M + 0.5, 0.0, 1.0)

@@ -31,24 +31,16 @@ _DECAY_DB_PER_S = 120.0  # of rooms that fall by 60 dB in half a second
 
 @dataclass(frozen=True, slots=True)
 class Correlations:
-    """The frames of a sound, each with the correlation of every pair of microphones.
+    """The frames of a sound, each with the correlation of every pair of microphones."""
 
-    Attributes:
-        at_s: (f,) middle of each frame, the recording's time.
-        pair: (p, 2) channels.
-        curve: (f, p, l) sum over the bins of weight times cosine, at delays of ``first + i·step`` seconds: by how much
-            the first channel is later than the second.
-        first_s: delay of the first.
-        step_s: between two.
-        weight: (f,) sum of the bins' weights: how many bins count.
-    """
-
-    at_s: Float[np.ndarray, " f"]
-    pair: Int[np.ndarray, "p 2"]
+    at_s: Float[np.ndarray, " f"]  # middle of each frame, the recording's time
+    pair: Int[np.ndarray, "p 2"]  # of channels
+    # sum over the bins of weight times cosine, at delays of ``first + i·step`` seconds: by how much the first channel
+    # is later than the second
     curve: Float32[np.ndarray, "f p l"]
-    first_s: float
-    step_s: float
-    weight: Float[np.ndarray, " f"]
+    first_s: float  # delay of the first
+    step_s: float  # between two
+    weight: Float[np.ndarray, " f"]  # sum of the bins' weights: how many bins count
 
     def take(self, frames: Int[np.ndarray, " k"]) -> "Correlations":
         """Return some of the frames."""
@@ -96,14 +88,8 @@ def correlate(
 ) -> Correlations:
     """Correlate every pair of channels in short frames.
 
-    Args:
-        samples: a sound, with what was heard before it.
-        rate_hz: samples a second.
-        start_s: the recording's time of the first sample.
-        quiet_s: how much of it, from its beginning, is before the sound: its noise.
-        longest_m: distance of the farthest two microphones.
-        delay_s: by how much each channel is late, which is taken back; None where none is.
-        high_hz: highest frequency that counts.
+    The first ``quiet_s`` of the samples, which begin at ``start_s``, are before the sound: its noise. ``longest_m`` is
+    the distance of the farthest two microphones; by ``delay_s`` each channel is late, which is taken back.
     """
     spectrum = spectra(samples, rate_hz)
     size = round(FRAME_S * rate_hz)
@@ -134,32 +120,21 @@ def correlate(
 
 @dataclass(frozen=True, slots=True)
 class SourceSettings:
-    """From correlations to probabilities.
+    """From correlations to probabilities."""
 
-    Attributes:
-        concentration: how much a steered sum counts, after it was divided by its greatest possible value to the power
-            ``saturation``: bins of neighbouring frames repeat one another.
-        saturation: see above.
-        smoothing: of the correlations, in steps of their delay: half a cell of the candidates.
-        level_noise_db: by how much a sound's own loudness changes while it sounds (one microphone).
-        reverberant_m: distance at which rooms return as much sound as comes straight (one microphone).
-        hidden: log-odds against a place behind a wall.
-        reach_m: distance from the robot by which a place becomes e times less likely.
-        blur_m: standard deviations of the errors of place that most and some events have.
-        wide: share of those of the second.
-        astray: share of the events whose evidence says nothing.
-    """
-
+    # how much a steered sum counts, after it was divided by its greatest possible value to the power ``saturation``:
+    # bins of neighbouring frames repeat one another
     concentration: float = 9.0
     saturation: float = 0.7
-    smoothing: float = 5.0
-    level_noise_db: float = 8.0
-    reverberant_m: float = 0.6
-    hidden: float = 1.5
-    reach_m: float = 2.5
+    smoothing: float = 5.0  # of the correlations, in steps of their delay: half a cell of the candidates
+    level_noise_db: float = 8.0  # by how much a sound's own loudness changes while it sounds (one microphone)
+    reverberant_m: float = 0.6  # where rooms return as much sound as comes straight (one microphone)
+    hidden: float = 1.5  # log-odds against a place behind a wall
+    reach_m: float = 2.5  # distance from the robot by which a place becomes e times less likely
+    # standard deviations of the errors of place that most and some events have
     blur_m: tuple[float, float] = (0.075, 0.35)
-    wide: float = 0.15
-    astray: float = 0.03
+    wide: float = 0.15  # share of those of the second
+    astray: float = 0.03  # share of the events whose evidence says nothing
 
     def weighed(self, steered: Float[np.ndarray, " c"], found: Correlations) -> Float[np.ndarray, " c"]:
         """Return the log-likelihood of steered sums, but for a constant."""
@@ -225,10 +200,8 @@ def steer_pairs(
 ) -> Float[np.ndarray, "p c"]:
     """Return for each pair the sum over frames of the correlation at the delays of each place.
 
-    Args:
-        found: the frames.
-        ear_m: where the microphones were in each frame.
-        place_m: where the sound seems to come from, the same frame of reference.
+    ``ear_m`` is where the microphones were in each frame, ``place_m`` where the sound seems to come from, in one frame
+    of reference.
     """
     total = np.zeros((len(found.pair), len(place_m)), np.float32)
     place = np.ascontiguousarray(place_m.T, np.float32)
@@ -259,11 +232,7 @@ def levels_db(
 ) -> tuple[Float[np.ndarray, " w"], Float[np.ndarray, " w"]]:
     """Return times and levels of the loud frames of a sound, one for each ``_WINDOW_S`` in which it stands out.
 
-    Args:
-        samples: a sound, with what was heard before it.
-        rate_hz: samples a second.
-        start_s: the recording's time of the first sample.
-        quiet_s: how much of it, from its beginning, is before the sound.
+    The first ``quiet_s`` of the samples, which begin at ``start_s``, are before the sound.
     """
     spectrum = spectra(samples[None], rate_hz)[0]
     hz = np.linspace(0.0, rate_hz / 2.0, spectrum.shape[1])
@@ -285,13 +254,10 @@ def unknown_offset(
     noise_db: float,
     reverberant_m: float = np.inf,
 ) -> Float[np.ndarray, " c"]:
-    """Return the log-likelihood of each place, the loudness integrated out.
+    """Return the log-likelihood of each place by levels, or ratios of direct to reverberant sound, measured at others.
 
-    Args:
-        measured_db: levels, or ratios of direct to reverberant sound, at several places.
-        distance_m: from each of these to each candidate.
-        noise_db: standard deviation of what was measured.
-        reverberant_m: distance at which a level is that of the reverberant field; inf for ratios.
+    The loudness is integrated out. Distances are from each measurement to each candidate; at ``reverberant_m`` a level
+    is that of the reverberant field, inf for ratios.
     """
     rest = measured_db[:, None] - against_1_m_db(distance_m, reverberant_m)
     return -0.5 * ((rest - rest.mean(axis=0)) ** 2).sum(axis=0) / noise_db**2
@@ -312,9 +278,7 @@ def signs_of(
 ) -> Float[np.ndarray, " m"]:
     """Return 1 or -1 for each channel; 1 for all where nothing speaks clearly for another choice.
 
-    Args:
-        steered: for each sound its correlations, and the steered sum of each pair at each candidate.
-        settings: how much a sum counts.
+    ``steered`` is, for each sound, its correlations, and the steered sum of each pair at each candidate.
     """
     pair = steered[0][0].pair
     count = int(pair.max()) + 1

@@ -40,17 +40,11 @@ _LONGEST_S = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EventEvidence:
-    """What was heard of one sound.
+    """What was heard of one sound."""
 
-    Attributes:
-        heard: (c,) log-likelihood of each candidate by what the microphones say, the greatest 0.
-        halves: (2, c) those of its first and of its second half, where there are frames in both.
-        expected: (c,) log-likelihood without it: near the robot, in sight.
-    """
-
-    heard: Float[np.ndarray, " c"]
-    halves: Float[np.ndarray, "2 c"] | None
-    expected: Float[np.ndarray, " c"]
+    heard: Float[np.ndarray, " c"]  # log-likelihood of each candidate by what the microphones say, the greatest 0
+    halves: Float[np.ndarray, "2 c"] | None  # of its first and of its second half, where there are frames in both
+    expected: Float[np.ndarray, " c"]  # log-likelihood without it: near the robot, in sight
 
 
 def evidence_of(
@@ -152,12 +146,9 @@ def carry_evidence(
 def laid(
     evidence: SourceEvidence, moved: Float[np.ndarray, "4 4"], place: Float[np.ndarray, "c 3"]
 ) -> tuple[Float[np.ndarray, "n c"], Float[np.ndarray, "n c"]]:
-    """Return what sounds say of other candidates: their log-likelihoods with what was heard, and without.
+    """Return the log-likelihoods of other candidates by sounds: with what was heard, and without.
 
-    Args:
-        evidence: of the sounds.
-        moved: from its world to that of the candidates.
-        place: the candidates.
+    ``moved`` is from the evidence's world to that of the candidates' places.
     """
     from scipy.spatial import KDTree
 
@@ -347,7 +338,6 @@ def _taken(evidence: SourceEvidence, row: Int[np.ndarray, " n"]) -> SourceEviden
 
 
 def _joined(new: SourceEvidence, before: SourceEvidence) -> SourceEvidence:
-    """Return the evidence of all sounds, on the candidates of the new ones."""
     carried = laid(before, np.eye(4), new.place.astype(np.float64))
     heard, expected = (np.maximum(values, LEAST).astype(np.float16) for values in carried)
     return replace(

@@ -40,22 +40,15 @@ Order = tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """What was found about the order of the channels.
+    """What was found about the order of the channels."""
 
-    Attributes:
-        order: the microphone (its position's number, from 0) of each channel that fits best; of several that fit as
-            well, that which moves fewest channels.
-        turned: the channels whose sign is turned; sources are found with it taken back (``polarity``).
-        fit: share of the greatest possible correlation that the order of the recording reaches, mean over the sounds.
-        best_fit: that of ``order``.
-        sounds: how many were heard well enough.
-    """
-
+    # the microphone (its position's number, from 0) of each channel that fits best; of several that fit as well, that
+    # which moves fewest channels
     order: Order
-    turned: tuple[int, ...]
-    fit: float
-    best_fit: float
-    sounds: int
+    turned: tuple[int, ...]  # channels whose sign is turned; sources are found with it taken back
+    fit: float  # share of the greatest possible correlation with the order of the recording, mean over the sounds
+    best_fit: float  # that of ``order``
+    sounds: int  # how many were heard well enough
 
     @property
     def is_right(self) -> bool:
@@ -122,15 +115,11 @@ def _orders(count: int) -> list[Order]:
 
 @dataclass(frozen=True, eq=False)
 class _Heard:
-    """One sound: how well each pair of channels fits each pair of microphones, over places round the robot.
+    """One sound: how well each pair of channels fits each pair of microphones, over places round the robot."""
 
-    Attributes:
-        found: the correlations.
-        fits: (p, m, m, c) sums over the frames of the correlation of a pair of channels, at the delays of a pair of
-            microphones and a place; as a share of the greatest possible.
-    """
-
-    found: Correlations
+    found: Correlations  # the correlations
+    # sums over the frames of the correlation of a pair of channels, at the delays of a pair of microphones and a place;
+    # as a share of the greatest possible
     fits: Float[np.ndarray, "p m m c"]
 
     @classmethod

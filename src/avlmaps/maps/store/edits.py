@@ -39,21 +39,13 @@ class SeenFrom(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class EditedSpot(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What an edit is about: a thing, a room, an area or a place.
+    """What an edit is about: a thing, a room, an area or a place; metres, the map's world."""
 
-    Attributes:
-        name: what it was called then; empty for a place.
-        middle: of its box, metres, the map's world.
-        size: extent along the axes of the level frame, metres.
-        corners: of a room or an area, on its floor, metres, the map's world.
-        seen_from: by which it follows corrected poses; None of a map without keyframes.
-    """
-
-    middle: Vector
-    name: str = ""
-    size: Vector = (0.0, 0.0, 0.0)
-    corners: tuple[Vector, ...] = ()
-    seen_from: SeenFrom | None = None
+    middle: Vector  # of its box
+    name: str = ""  # what it was called then; empty for a place
+    size: Vector = (0.0, 0.0, 0.0)  # extent along the axes of the level frame
+    corners: tuple[Vector, ...] = ()  # of a room or an area, on its floor
+    seen_from: SeenFrom | None = None  # by which it follows corrected poses; None of a map without keyframes
 
     def now(self, keyframes: Keyframes) -> "EditedSpot":
         """Return it in the world as it is now: it moved with the keyframe that looked at it; itself if that did not."""
@@ -102,32 +94,20 @@ class World(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Edit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """One correction by a person.
+    """One correction by a person."""
 
-    Attributes:
-        schema: of the line.
-        id: by which it is undone.
-        does: what it does.
-        at: what it is about: one thing or room, or the two and more that are merged.
-        name: the new name; of a forbidden area and of a pinned place, its own.
-        cut: how a thing is split: two points of an upright plane, the four corners of a box from above, or none for
-            its connected pieces.
-        of: the edit that is undone.
-        by: who made it; empty for a person who did not say.
-        made: when, ISO 8601, UTC.
-        world: that its places are in.
-    """
-
-    schema: Literal[1]
-    id: str
+    schema: Literal[1]  # of the line
+    id: str  # by which it is undone
     does: Does
-    made: str
-    at: tuple[EditedSpot, ...] = ()
-    name: str = ""
+    made: str  # when, ISO 8601, UTC
+    at: tuple[EditedSpot, ...] = ()  # one thing or room, or the two and more that are merged
+    name: str = ""  # the new name; of a forbidden area and of a pinned place, its own
+    # of a thing that is split: two points of an upright plane, the four corners of a box from above, or none for its
+    # connected pieces
     cut: tuple[Vector, ...] = ()
-    of: str = ""
-    by: str = ""
-    world: World | None = None
+    of: str = ""  # the edit that is undone
+    by: str = ""  # who made it; empty for a person who did not say
+    world: World | None = None  # that its places are in
 
     @classmethod
     def new(
@@ -187,21 +167,13 @@ def read_edits(folder: Path) -> tuple[Edit, ...]:
 
 
 def append_edit(folder: Path, edit: Edit) -> None:
-    """Add an edit to a map's folder. A kill at any instant leaves the log without it, or whole with it.
-
-    Raises:
-        MapError: the log is damaged, another process edits the map, or the folder cannot be written.
-    """
+    """Add an edit to a map's folder. A kill at any instant leaves the log without it, or whole with it."""
     with lock_folder(folder, EDITING):
         write_edits(folder, (*read_edits(folder), edit))
 
 
 def write_edits(folder: Path, edits: Sequence[Edit]) -> None:
-    """Make these the edits of a map's folder, in one step.
-
-    Raises:
-        MapError: the folder cannot be written.
-    """
+    """Make these the edits of a map's folder, in one step."""
     content = b"".join(msgspec.json.encode(edit) + b"\n" for edit in edits)
     with explain_write_errors(folder, TO_EDIT):
         write_bytes_atomically(folder / EDITS, content)

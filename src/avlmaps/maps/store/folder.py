@@ -72,11 +72,7 @@ class _Files(msgspec.Struct):
 
 
 def files_of(content: bytes, where: Path) -> dict[str, FileInfo]:
-    """Return the files that a ``map.json`` of schema 1 lists, by their places in the folder.
-
-    Raises:
-        MapError: it is no such JSON, or one lies outside of the folder.
-    """
+    """Return the files that a ``map.json`` of schema 1 lists, by their places in the folder, which are inside of it."""
     try:
         files: _Files = decode_json(content, _Files)
     except msgspec.DecodeError as fault:
@@ -88,11 +84,7 @@ def files_of(content: bytes, where: Path) -> dict[str, FileInfo]:
 
 
 def read_schema1(path: Path, content: bytes) -> tuple[dict[str, tuple[Path, dict[str, np.ndarray]]], tuple[Path, ...]]:
-    """Return the arrays of a map of schema 1, by the sections of schema 2 with their folders, and its clips.
-
-    Raises:
-        MapError: a file is missing or damaged.
-    """
+    """Return the arrays of a map of schema 1, by the sections of schema 2 with their folders, and its clips."""
     listed: _Files = decode_json(content, _Files)
     tables = {section: (path / section, dict[str, np.ndarray]()) for section in ("voxels", "keyframes", "sounds")}
     clips: list[Path] = []
@@ -171,11 +163,7 @@ def read(path: Path | str) -> MapData:
 
 
 def read_info(path: Path) -> MapInfo | None:
-    """Return what ``map.json`` in a folder says; None where there is none.
-
-    Raises:
-        MapError: it is damaged, or of another schema.
-    """
+    """Return what ``map.json`` in a folder says; None where there is none, ``MapError`` where it is damaged."""
     try:
         return _info(path, read_regular(path / MANIFEST, MANIFEST_BYTES))
     except (FileNotFoundError, NotADirectoryError):
@@ -183,11 +171,7 @@ def read_info(path: Path) -> MapInfo | None:
 
 
 def damaged_files(path: Path) -> list[str]:
-    """Return a sentence for each file of a map that is missing, or not what was written.
-
-    Raises:
-        MapError: there is no map, or ``map.json`` itself is damaged.
-    """
+    """Return a sentence for each file of a map that is missing, or not what was written."""
     info, faults = _info(path, _manifest(path)), list[str]()
     for name, file in info.files.items():
         try:
@@ -201,13 +185,9 @@ def damaged_files(path: Path) -> list[str]:
 
 
 def write(path: Path, data: MapData) -> MapInfo:
-    """Make a folder, whose lock the caller holds, this map; what it held as a map is replaced.
+    """Make a folder, whose lock the caller holds, this map; return what ``map.json`` says now.
 
-    Returns:
-        What ``map.json`` says now.
-
-    Raises:
-        MapError: the disk is full, or the folder cannot be written; the old map is then still there.
+    What the folder held as a map is replaced. Where it cannot be written (``MapError``), the old map is still there.
     """
     files, taken = dict[str, FileInfo](), _listed(path)
     with explain_write_errors(path):
@@ -361,11 +341,7 @@ def _read(path: Path, content: bytes) -> MapData:
 def assembled(
     info: MapInfo, tables: Mapping[str, tuple[Path, Mapping[str, np.ndarray]]], clips: tuple[Path, ...]
 ) -> MapData:
-    """Return the map of the arrays of each section, which come with the file that an error names.
-
-    Raises:
-        MapError: some are missing, or of other types or sizes.
-    """
+    """Return the map of the arrays of each section, which come with the file that an error names."""
     (at_voxels, voxels), (at_keyframes, keyframes), (at_sounds, sounds) = (tables[section] for section in SECTIONS)
     life = {name.removeprefix(_LIFE): array for name, array in voxels.items() if name.startswith(_LIFE)}
     return MapData(

@@ -18,41 +18,24 @@ PEOPLE = ("person",)
 
 
 class Stay(msgspec.Struct, frozen=True, kw_only=True):
-    """One thing at one place. Days are numbers of the map's visits, from 0.
+    """One thing at one place. Days are numbers of the map's visits, from 0."""
 
-    Attributes:
-        name: the word of the vocabulary.
-        confidence: that it is one, in [0, 1], when it was seen first.
-        position: its voxel nearest to its middle, metres, the map's world.
-        size: extent along the axes of the level frame, metres.
-        color: mean RGB.
-        first: the visit that saw it first.
-        last: the visit that saw it last.
-        last_seen_s: the last stamp of its surface, the map's time.
-        looked: the last visit that looked at its place; later ones know nothing of it.
-        gone: the first visit that looked through its place; None while nothing speaks against it.
-        appeared: its place was looked through before it was there; False says only that it was seen first then.
-        moved_to: the stay that follows where it was carried to.
-        moved_from: the stay before.
-        there_on: the visits that saw it, or its surface; none of a map of before.
-        absent_on: the visits that looked through its place, before it came and after it went; likewise.
-    """
-
-    name: str
-    confidence: float
-    position: tuple[float, float, float]
-    size: tuple[float, float, float]
-    color: tuple[int, int, int]
-    first: int
-    last: int
-    last_seen_s: float
-    looked: int
-    gone: int | None = None
+    name: str  # the word of the vocabulary
+    confidence: float  # that it is one, in [0, 1], when it was seen first
+    position: tuple[float, float, float]  # its voxel nearest to its middle, metres, the map's world
+    size: tuple[float, float, float]  # along the axes of the level frame, metres
+    color: tuple[int, int, int]  # mean RGB
+    first: int  # the visit that saw it first
+    last: int  # the visit that saw it last
+    last_seen_s: float  # the last stamp of its surface, the map's time
+    looked: int  # the last visit that looked at its place; later ones know nothing of it
+    gone: int | None = None  # the first visit that looked through its place; None while nothing speaks against it
+    # its place was looked through before it was there; False says only that it was seen first then
     appeared: bool = False
-    moved_to: int | None = None
-    moved_from: int | None = None
-    there_on: tuple[int, ...] = ()
-    absent_on: tuple[int, ...] = ()
+    moved_to: int | None = None  # the stay that follows where it was carried to
+    moved_from: int | None = None  # the stay before
+    there_on: tuple[int, ...] = ()  # visits that saw it, or its surface; none of a map of before
+    absent_on: tuple[int, ...] = ()  # visits that looked through its place, before it came and after it went; likewise
 
     @property
     def days_there(self) -> frozenset[int]:
@@ -79,17 +62,11 @@ class Stay(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Life:
-    """The stays of a map's things, and their voxels. Ragged: stay i has rows ``offsets[i]:offsets[i + 1]``.
+    """The stays of a map's things, and their voxels. Ragged: stay i has rows ``offsets[i]:offsets[i + 1]``."""
 
-    Attributes:
-        stays: in the order in which they began.
-        offsets: (s + 1,) into ``index``.
-        index: voxels of each stay, of the map's grid, whether anything is there still or not.
-    """
-
-    stays: tuple[Stay, ...]
-    offsets: Int64[np.ndarray, " s1"]
-    index: Int32[np.ndarray, "m 3"]
+    stays: tuple[Stay, ...]  # in the order in which they began
+    offsets: Int64[np.ndarray, " s1"]  # into ``index``
+    index: Int32[np.ndarray, "m 3"]  # voxels of each stay, of the map's grid, whether anything is there still or not
 
     @classmethod
     def of(cls, stays: "tuple[Stay, ...] | list[Stay]", voxels: "list[np.ndarray]") -> "Life":

@@ -24,19 +24,17 @@ Vector = tuple[float, float, float]
 class ModelInfo(msgspec.Struct, frozen=True, kw_only=True):
     """A model that made features of this map: its card, and the backend's name in the profile.
 
-    ``backend`` is ``name@model`` where a backend can run several. Of a model that was given as a path only the name is
-    stored, here and in ``id``; its folder is private. ``normalisation`` is that of the stored features; there
-    is one as yet.
+    Of a model that was given as a path only the name is stored; its folder is private.
     """
 
-    backend: str
+    backend: str  # ``name@model`` where a backend can run several
     id: str
     dim: int
     licence: str
     checksum: str
     prompts: tuple[str, ...]
     note: str = ""
-    normalisation: str = "unit length"
+    normalisation: str = "unit length"  # of the stored features; there is one as yet
 
     @classmethod
     def of(cls, backend: str, card: ModelCard) -> "ModelInfo":
@@ -82,43 +80,25 @@ class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Visit(msgspec.Struct, frozen=True, kw_only=True):
-    """One day that a map of several days was seen on, in the order of time.
+    """One day that a map of several days was seen on, in the order of time."""
 
-    Attributes:
-        day: as ``2026-11-25``; empty where nobody said.
-        recording: what was recorded; its name only.
-        begin_s: first stamp, the map's time.
-        end_s: last stamp, likewise.
-        shift_s: the map's time less the recording's own.
-        map_from_recording: 4x4, row by row; the first day's is the identity.
-        rig: the recording's cameras.
-        frames: how many were fused.
-        checks: by what it was recognised as the same place; empty of the first day.
-    """
-
-    day: str = ""
+    day: str = ""  # as ``2026-11-25``; empty where nobody said
     recording: RecordingInfo
-    begin_s: float
-    end_s: float
-    shift_s: float
-    map_from_recording: tuple[tuple[float, float, float, float], ...]
+    begin_s: float  # first stamp, the map's time
+    end_s: float  # last stamp, likewise
+    shift_s: float  # the map's time less the recording's own
+    map_from_recording: tuple[tuple[float, float, float, float], ...]  # row by row; the first day's is the identity
     rig: RigInfo
-    frames: int
-    checks: dict[str, float] = {}
+    frames: int  # how many were fused
+    checks: dict[str, float] = {}  # by what it was recognised as the same place; empty of the first day
 
 
 class UpInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """The up direction in the recording's world, and how that is known.
+    """The up direction in the recording's world, and how that is known."""
 
-    Attributes:
-        direction: unit vector.
-        known_from: the recording's word, the planes in view, or (a guess) how the camera was held.
-        support: for planes the share of the surface that agrees, in [0, 1]; 1 for a known one, 0 for a guess.
-    """
-
-    direction: Vector
-    known_from: Literal["recording", "planes", "camera"]
-    support: float
+    direction: Vector  # unit vector
+    known_from: Literal["recording", "planes", "camera"]  # camera: a guess by how it was held
+    support: float  # of planes the share of the surface that agrees; 1 for a known one, 0 for a guess
 
     @classmethod
     def of(
@@ -134,15 +114,10 @@ class UpInfo(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class GroundInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """The floors under the cameras, lowest first, and how they are known.
+    """The floors under the cameras, lowest first, and how they are known."""
 
-    Attributes:
-        known_from: the surfaces in view, a height that the user gave, or the recording's own (a robot's frames).
-        floors: every floor, step and landing that a camera stood over.
-    """
-
-    known_from: Literal["surfaces", "user", "recording"]
-    floors: tuple[FloorInfo, ...]
+    known_from: Literal["surfaces", "user", "recording"]  # recording: a robot's frames
+    floors: tuple[FloorInfo, ...]  # every floor, step and landing that a camera stood over
 
     def main(self) -> FloorInfo:
         """Return the floor that most cameras stood over."""
@@ -150,33 +125,20 @@ class GroundInfo(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SensorInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """Which depth camera was assumed.
+    """Which depth camera was assumed."""
 
-    Attributes:
-        name: of the model; ``custom`` for one that was given.
-        known_from: the settings, or what the frames show.
-        noise_per_m: measured growth of the error with the square of the depth, 1/m; None where it was not measured.
-        model: all its numbers.
-    """
-
-    name: str
+    name: str  # ``custom`` for one that was given
     known_from: Literal["settings", "frames"]
-    noise_per_m: float | None
+    noise_per_m: float | None  # measured growth of the error with the square of the depth, 1/m
     model: SensorModel
 
 
 class Removed(msgspec.Struct, frozen=True, kw_only=True):
-    """How many voxels were removed.
+    """How many voxels were removed."""
 
-    Attributes:
-        seen_through: frames see through them.
-        smeared: a much better seen voxel is within their error.
-        specks: in small groups that stand alone and that hardly a frame hit.
-    """
-
-    seen_through: int = 0
-    smeared: int = 0
-    specks: int = 0
+    seen_through: int = 0  # frames see through them
+    smeared: int = 0  # a much better seen voxel is within their error
+    specks: int = 0  # in small groups that stand alone and that hardly a frame hit
 
 
 class BadFrame(msgspec.Struct, frozen=True, kw_only=True):
@@ -187,19 +149,12 @@ class BadFrame(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Counts(msgspec.Struct, frozen=True, kw_only=True):
-    """How much there is of everything.
+    """How much there is of everything."""
 
-    Attributes:
-        frames: fused frames.
-        keyframes: stored pictures.
-        voxels: occupied voxels.
-        sounds: heard sounds.
-    """
-
-    frames: int
-    keyframes: int
-    voxels: int
-    sounds: int
+    frames: int  # fused frames
+    keyframes: int  # stored pictures
+    voxels: int  # occupied voxels
+    sounds: int  # heard sounds
 
     @classmethod
     def of(cls, frames: int, keyframes: Sized, voxels: Sized, sounds: Sized) -> "Counts":
@@ -236,56 +191,29 @@ class Timings(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """The whole of ``map.json``.
-
-    Attributes:
-        format: says that this is a map.
-        schema_version: of the folder's layout.
-        avlmaps_version: which release built it.
-        build_key: hash of everything that went in (recording, settings, models); another build has another one.
-        voxel_size_m: the grid.
-        up: the up direction.
-        ground: where the floors are; None in maps of older releases and in imported ones.
-        rig: the recording's cameras.
-        profile: which models perceived.
-        models: their cards, by module.
-        settings: resolved, defaults included.
-        seed: of everything that was drawn at random.
-        sensor: which depth camera was assumed; None in maps that use every depth as it is.
-        removed: voxels that were no surface.
-        recording: what was recorded.
-        counts: how much there is.
-        bounding_box_m: where the voxels are.
-        bad_frames: frames that were left out: they could not be read, or an encoder failed on them.
-        notices: a sentence for each thing worth knowing.
-        doubts: those of them that say why the map may be wrong; every answer repeats them.
-        files: every file by its place in the folder; nothing else in it is part of the map.
-        bytes: size of all files.
-        timings: when it was built and how long it took; the only part that differs when a build is repeated.
-        visits: the days of a map that was merged; none of one that was seen once.
-    """
+    """The whole of ``map.json``."""
 
     format: Literal["avlmap"] = "avlmap"
-    schema_version: int = SCHEMA_VERSION
-    avlmaps_version: str
-    build_key: str
+    schema_version: int = SCHEMA_VERSION  # of the folder's layout
+    avlmaps_version: str  # which release built it
+    build_key: str  # hash of recording, settings and models; another build has another one
     voxel_size_m: float
     up: UpInfo
-    ground: GroundInfo | None = None
-    rig: RigInfo
-    profile: str
-    models: dict[str, ModelInfo]
-    settings: BuildSettings
-    seed: int
+    ground: GroundInfo | None = None  # where the floors are; None in maps of older releases and in imported ones
+    rig: RigInfo  # the recording's cameras
+    profile: str  # which models perceived
+    models: dict[str, ModelInfo]  # their cards, by module
+    settings: BuildSettings  # resolved, defaults included
+    seed: int  # of everything that was drawn at random
     recording: RecordingInfo
     counts: Counts
-    bounding_box_m: MapBounds
+    bounding_box_m: MapBounds  # where the voxels are
     bad_frames: tuple[BadFrame, ...] = ()
-    notices: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
-    files: dict[str, FileInfo] = {}
-    bytes: int = 0
-    timings: Timings
-    sensor: SensorInfo | None = None
-    removed: Removed = Removed()
-    visits: tuple[Visit, ...] = ()
+    notices: tuple[str, ...] = ()  # a sentence for each thing worth knowing
+    doubts: tuple[str, ...] = ()  # those of them that say why the map may be wrong; every answer repeats them
+    files: dict[str, FileInfo] = {}  # every file by its place in the folder; nothing else in it is part of the map
+    bytes: int = 0  # size of all files
+    timings: Timings  # the only part that differs when a build is repeated
+    sensor: SensorInfo | None = None  # None in maps that use every depth as it is
+    removed: Removed = Removed()  # voxels that were no surface
+    visits: tuple[Visit, ...] = ()  # the days of a map that was merged; none of one that was seen once

@@ -25,30 +25,19 @@ from avlmaps.perception.models import public_choice, public_name
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
 class MapData:
-    """A map of one moment. Of a map on the disk, large arrays are read when they are used.
+    """A map of one moment. Of a map on the disk, large arrays are read when they are used."""
 
-    Attributes:
-        info: what ``map.json`` says.
-        voxels: occupied voxels.
-        keyframes: stored pictures.
-        sounds: what was heard.
-        place_state: what the place encoder learned from the keyframes.
-        sources: what the microphones say of where each sound began; None where their places are not known.
-        sources_wait: of how many sounds the source is looked for still, in a map that grows.
-        submaps: by which it can follow corrected poses; None where it cannot.
-        life: what became of its things over several days; None of one day.
-        findings: what was found when it was built: the names closest to each voxel, things, rooms (``query.findings``).
-    """
-
-    info: MapInfo
+    info: MapInfo  # what ``map.json`` says
     voxels: Voxels
     keyframes: Keyframes
     sounds: HeardSounds
+    # what the place encoder learned from the keyframes
     place_state: dict[str, np.ndarray] = field(default_factory=dict[str, np.ndarray])
-    sources: SourceEvidence | None = None
-    sources_wait: int = 0
-    submaps: Submaps | None = None
-    life: Life | None = None
+    sources: SourceEvidence | None = None  # where each sound began; None without known microphones
+    sources_wait: int = 0  # of how many sounds the source is looked for still, in a map that grows
+    submaps: Submaps | None = None  # by which it can follow corrected poses; None where it cannot
+    life: Life | None = None  # what became of its things over several days; None of one day
+    # of the build: the names closest to each voxel, things, rooms (``query.findings``)
     findings: dict[str, np.ndarray] = field(default_factory=dict[str, np.ndarray])
 
     def __repr__(self) -> str:

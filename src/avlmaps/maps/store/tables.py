@@ -211,11 +211,9 @@ def _grab_patiently(descriptor: int, patience_s: float) -> None:
 
 @contextmanager
 def lock_folder(folder: Path, name: str = LOCK) -> Generator[None]:
-    """Hold one of the folder's locks; the folder is made if it is not there.
+    """Hold a folder's ``LOCK``, of a build, or ``EDITING``, of its edits, which need not wait for a build.
 
-    Args:
-        folder: the map's.
-        name: ``LOCK`` of a build, ``EDITING`` of its edits, which need not wait for a build.
+    The folder is made if it is not there.
     """
     refuse_links(folder)
     with explain_write_errors(folder, _UNWRITTEN[name]):
