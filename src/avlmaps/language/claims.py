@@ -226,19 +226,4 @@ def _facts(intents: Sequence[act.Intent], targets: Sequence[act.Target]) -> Iter
     if len(steps) == 1:
         yield "one step"
     for step in steps:
-        match step:
-            case act.StopAt() | act.Face(side=act.Side.BEHIND):
-                yield "kept"
-            case act.Beside(of=target, side=side, metres=metres):
-                yield from ("beside", str(side), *(["kept"] if metres is not None else []))
-                yield "beside room" if target.kind is act.TargetKind.AREA else "beside"
-            case act.Face(side=side):
-                yield str(side)
-            case act.Move(metres=metres):
-                yield from ("forward",) if metres > 0 else ("back", "kept")
-            case act.Turn(degrees=degrees) if degrees and degrees % 180.0:
-                yield from ("turn", "left" if degrees < 0 else "right")
-            case act.VisitEach():
-                yield "each"
-            case _:
-                pass
+        yield from act.facts_of(step)

@@ -1,16 +1,22 @@
 """The intents of a command or a question: plain, typed values between the words and the program.
 
 `Target` names one thing, sound, area or file of the map. An `Intent` is one step of a command. Angles are in degrees,
-clockwise (positive is to the right); distances are in metres.
+clockwise (positive is to the right); distances are in metres. Their words, their programs and what they do are rows of
+`intents.toml`.
 """
 
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cache
+from string import Formatter
 from typing import Any, ClassVar
 
+import msgspec
+
 from avlmaps.core.question import HeardAt
+from avlmaps.language.word_classes import table
 
 
 class TargetKind(StrEnum):
@@ -325,6 +331,63 @@ def blocks_of(intent: Intent) -> tuple[Intent, ...]:
             return (*intent.body, *intent.otherwise)
         case _:
             return ()
+
+
+class Filled(Formatter):
+    """Fills the braces of a row, see `intents.toml`."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        """Return the text of a value."""
+        if not isinstance(value, float | int):
+            return str(value)
+        positive, by_sign, negative = format_spec.partition("|")
+        if by_sign:
+            return positive if value > 0 else negative
+        return f"{abs(value) if format_spec == '+' else -value if format_spec == '-' else value:g}"
+
+
+class Row(msgspec.Struct, frozen=True):
+    """A row of `intents.toml`, where its fields are explained."""
+
+    do: str
+    words: str
+    program: str
+    where: dict[str, list[str | float]] = {}
+    facts: tuple[str, ...] = ()
+    head: str = ""
+
+    def fits(self, intent: Intent) -> bool:
+        """Return whether an intent has the values of the row, and one for each field that the row speaks of."""
+        values = values_of(intent)
+        names = (re.split(r"[.\[]", path)[0] for path in paths_in(self.words + self.program))
+        if any(values.get(name, True) in (None, ()) for name in names):
+            return False
+        return all(Filled().get_field(path, (), values)[0] in among for path, among in self.where.items())
+
+
+def paths_in(text: str) -> list[str]:
+    """Return what each brace of a row's text stands for: a field, such as ``of``, or a part of one: ``of[0]``."""
+    return [path for _, path, _, _ in Filled().parse(text) if path]
+
+
+def values_of(intent: Intent) -> dict[str, Any]:
+    """Return the fields of an intent by their names."""
+    return {name: getattr(intent, name) for name in intent.__slots__}
+
+
+@cache
+def _rows() -> Sequence[Row]:
+    return msgspec.convert(table("intents")["row"], list[Row])
+
+
+def row_of(intent: Intent) -> Row:
+    """Return the row of an intent that is no refusal and no question."""
+    return next(row for row in _rows() if row.do == intent.do and row.fits(intent))
+
+
+def facts_of(intent: Intent) -> list[str]:
+    """Return what an intent does, in the words of `claims.toml`."""
+    return [Filled().vformat(fact, (), values_of(intent)) for fact in row_of(intent).facts]
 
 
 class Ask(StrEnum):

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 from avlmaps.language import intents as act
 from avlmaps.language.claims import claimed_words, lacking
-from avlmaps.language.intents import Clarify, Intent, Pick, Refuse, Side, Target, TargetKind
+from avlmaps.language.intents import Clarify, Intent, Pick, Refuse, Target, TargetKind
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import class_words, is_known, may_name, near_names
-from avlmaps.language.word_classes import listed
+from avlmaps.language.word_classes import listed, table
 from avlmaps.perception.embedded.words import is_word
 
 _FILES = {
@@ -16,14 +17,13 @@ _FILES = {
     TargetKind.CLIP: "Which recording? Attach it, or name its file in the sentence.",
 }
 _SHORT = 3  # letters; shorter words are spelt like too many others
-_COMPASS = {0: "north", 45: "north-east", 90: "east", 135: "south-east", 180: "south", 225: "south-west", 270: "west",
-            315: "north-west"}  # fmt: skip
 _ORDINALS = {2: "second", 3: "third", 4: "fourth", 5: "fifth"}
-_TIMES = {1: "once", 2: "twice"}
-_SIDES = {
-    Side.LEFT: "to the left of", Side.RIGHT: "to the right of", Side.FRONT: "in front of", Side.BEHIND: "behind",
-    Side.NORTH: "to the north of", Side.SOUTH: "to the south of", Side.EAST: "to the east of",
-    Side.WEST: "to the west of",
+_HEARD = {
+    TargetKind.SOUND: "where {} was heard", TargetKind.CLIP: "where a sound like {} was heard",
+    TargetKind.IMAGE: "where the picture {} was taken", TargetKind.HERE: "here",
+}  # fmt: skip
+_MADE = {
+    TargetKind.SOUND: "where the sound of {} comes from", TargetKind.CLIP: "where a sound like {} comes from"
 }  # fmt: skip
 
 
@@ -38,79 +38,30 @@ def verbalise(intents: Sequence[Intent]) -> str:
     return f"I will {_steps(intents)}.".replace(" ,", ",")
 
 
+class _Words(act.Filled):
+    def format_field(self, value: Any, format_spec: str) -> str:
+        if isinstance(value, Target):
+            return phrase(value).removeprefix("the ") if format_spec == "bare" else phrase(value)
+        if isinstance(value, tuple):
+            return _steps(value)
+        names = table("intents")["names"].get(format_spec)
+        if names is None:
+            return super().format_field(value, format_spec)
+        key = str(value) if isinstance(value, str) else str(round(value))
+        return names.get(key, names.get("other")).format(super().format_field(value, ""))
+
+
 def _steps(intents: Sequence[Intent]) -> str:
-    return ", then ".join(map(_step, intents)).replace(" ,", ",")
-
-
-def _step(intent: Intent) -> str:
-    match intent:
-        case act.Go(to=target):
-            return f"go to {phrase(target)}"
-        case act.Face(to=target, side=Side.AHEAD):
-            return f"face {phrase(target)}"
-        case act.Face(to=target, side=side):
-            where = "behind me" if side is Side.BEHIND else f"on my {side}"
-            return f"turn until {phrase(target)} is {where}"
-        case act.Turn(degrees=None, heading=heading):
-            return f"turn to {_COMPASS.get(round(heading or 0), f'{heading:g} degrees on the compass')}"
-        case act.Turn(degrees=degrees):
-            return _turn(degrees or 0.0)
-        case act.Move(metres=metres):
-            return f"move {'forward' if metres > 0 else 'back'} {abs(metres):g} m"
-        case act.Between(of=(a, b)):
-            return f"stop between {phrase(a)} and {phrase(b)}"
-        case act.Beside(of=target, side=side, metres=metres):
-            return f"stop {'' if metres is None else f'{metres:g} m '}{_SIDES[side]} {phrase(target)}"
-        case act.StopAt(of=target, metres=metres):
-            return f"stop {metres:g} m from {phrase(target)}"
-        case _:
-            return _other(intent)
-
-
-def _other(intent: Intent) -> str:
-    match intent:
-        case act.Circle(of=target, views=None, way=way):
-            return f"drive around {phrase(target)} {way}".rstrip()
-        case act.Circle(of=target, views=views, way=way):
-            return f"look at {phrase(target)} from {views} points around it {way}".rstrip()
-        case act.VisitEach(of=target):
-            return f"go to each of these, the nearest first: {phrase(target)}"
-        case act.Wait(seconds=seconds):
-            return "stay there" if seconds is None else f"wait {seconds:g} seconds"
-        case act.Return():
-            return "come back here"
-        case act.Repeat(times=times, body=body):
-            return f"{_TIMES.get(times, f'{times} times')}: {_steps(body)}"
-        case act.If(of=target, body=body, otherwise=otherwise):
-            there = phrase(target).removeprefix("the ")
-            if not body:
-                return f", if there is no {there}, {_steps(otherwise)}"
-            also = f"; otherwise {_steps(otherwise)}" if otherwise else ""
-            return f", if there is a {there}, {_steps(body)}{also}"
-        case _:
-            return str(intent)
-
-
-def _turn(degrees: float) -> str:
-    if abs(degrees) == 180.0:
-        return "turn around"
-    return f"turn {'right' if degrees > 0 else 'left'} {abs(degrees):g} degrees"
+    steps = (_Words().vformat(act.row_of(intent).words, (), act.values_of(intent)).rstrip() for intent in intents)
+    return ", then ".join(steps).replace(" ,", ",")
 
 
 def phrase(target: Target) -> str:
     """Return a target in words: "the chair nearest to where breathing was heard"."""
-    match target.kind:
-        case TargetKind.OBJECT | TargetKind.AREA:
-            own = f"the {_picked(target)}"
-        case TargetKind.SOUND:
-            at_source = target.at == "source"
-            own = f"where the sound of {target.name} comes from" if at_source else f"where {target.name} was heard"
-        case TargetKind.IMAGE:
-            own = f"where the picture {target.name} was taken"
-        case TargetKind.CLIP:
-            own = f"where a sound like {target.name} {'comes from' if target.at == 'source' else 'was heard'}"
-        case TargetKind.HERE:
-            return "here"
+    if target.kind in (TargetKind.OBJECT, TargetKind.AREA):
+        own = f"the {_picked(target)}"
+    else:
+        own = (_MADE if target.at == "source" else _HEARD)[target.kind].format(target.name)
     areas = [one for one in target.near if one.kind is TargetKind.AREA]
     others = [one for one in target.near if one.kind is not TargetKind.AREA]
     beside = "near" if target.pick is Pick.NEAREST else "nearest to"
