@@ -27,6 +27,7 @@ from avlmaps.query.changes import (
 from avlmaps.query.edits import means
 from avlmaps.query.goals import Goal
 from avlmaps.query.lists import lies
+from avlmaps.query.voxel_space import Space
 
 CAMERA = Pinhole(fx=1.0, fy=1.0, cx=0.5, cy=0.5, width=1, height=1)
 ROWS = tuple(tuple(float(value) for value in row) for row in np.eye(4))
@@ -141,8 +142,8 @@ def test_what_a_map_of_colours_calls_red_is_the_red_thing() -> None:
 
 @pytest.mark.parametrize(("names", "count"), [(None, 4), (["couch"], 1), (["sofa", "bag"], 2), (["piano"], 0)])
 def test_things_of_a_day_are_meant_by_other_words_as_well(names: list[str] | None, count: int) -> None:
-    space = SimpleNamespace(index=np.zeros((0, 3), np.int32), grid=GridSpec(0.05))
-    assert len(things_at(space, days(), 1, names, 0.5)) == count  # pyright: ignore[reportArgumentType]
+    space = Space(GridSpec(0.05), np.zeros((0, 3), np.int32), np.array([0.0, 0.0, 1.0]))
+    assert len(things_at(space, days(), 1, names, 0.5)) == count
 
 
 @pytest.mark.parametrize(

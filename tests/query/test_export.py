@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from query_fakes import furnished_map
 
 from avlmaps.core.errors import QueryError
+from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.perception.embedded.colours import COLOURS, memberships
 from avlmaps.query.export import (
@@ -25,16 +26,23 @@ from avlmaps.query.export import (
     write_ply,
     write_table,
 )
+from avlmaps.query.voxel_space import Space
+
+
+def _space(index: np.ndarray) -> Space:
+    return Space(GridSpec(0.05), index, np.array([0.0, 0.0, 1.0]))
+
 
 CELLS = st.sets(st.tuples(*[st.integers(-4, 4)] * 3), min_size=1, max_size=40)
 
 
 def test_a_ply_holds_the_points_colours_and_columns(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
-    points, colors = rng.normal(size=(50, 3)), rng.integers(0, 256, (50, 3)).astype(np.uint8)
-    write_ply(tmp_path / "a.ply", points, colors, {"heat": np.linspace(0, 1, 50)})
+    space = _space(np.argwhere(rng.random((8, 8, 8)) < 0.1))
+    colors = rng.integers(0, 256, (len(space), 3)).astype(np.uint8)
+    write_ply(tmp_path / "a.ply", space, colors, {"heat": np.linspace(0, 1, len(space))})
     read = trimesh.load(tmp_path / "a.ply")
-    np.testing.assert_allclose(np.asarray(read.vertices), points, atol=1e-6)
+    np.testing.assert_allclose(np.asarray(read.vertices), space.centres, atol=1e-6)
     np.testing.assert_array_equal(np.asarray(read.colors)[:, :3], colors)
     assert b"property float heat" in (tmp_path / "a.ply").read_bytes()
 
@@ -42,7 +50,7 @@ def test_a_ply_holds_the_points_colours_and_columns(tmp_path: Path) -> None:
 @given(CELLS)
 def test_the_mesh_of_voxels_is_closed_and_has_their_volume(cells: set[tuple[int, int, int]]) -> None:
     index = np.array(sorted(cells))
-    vertices, triangles, _ = voxel_mesh(index, 0.05, np.zeros((len(index), 3), np.uint8))
+    vertices, triangles, _ = voxel_mesh(_space(index), np.zeros((len(index), 3), np.uint8))
     a, b, c = (vertices[triangles[:, k]].astype(np.float64) for k in range(3))
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0
     assert volume == pytest.approx(len(index) * 0.05**3, rel=1e-4)
@@ -50,13 +58,13 @@ def test_the_mesh_of_voxels_is_closed_and_has_their_volume(cells: set[tuple[int,
 
 
 def test_no_face_lies_between_two_voxels() -> None:
-    _, two, _ = voxel_mesh(np.array([[0, 0, 0], [1, 0, 0]]), 1.0, np.zeros((2, 3), np.uint8))
+    _, two, _ = voxel_mesh(_space(np.array([[0, 0, 0], [1, 0, 0]])), np.zeros((2, 3), np.uint8))
     assert len(two) == 2 * (6 + 6 - 2)
 
 
 def test_a_glb_has_the_maps_extent_and_colours(tmp_path: Path) -> None:
     opened = furnished_map()
-    write_glb(tmp_path / "a.glb", opened.data.voxels.index, 0.05, opened.colors)
+    write_glb(tmp_path / "a.glb", opened.space, opened.colors)
     read = trimesh.load(tmp_path / "a.glb", force="mesh")
     np.testing.assert_allclose(read.bounds, [[0.0, 0.0, 0.0], [6.0, 4.0, 0.45]], atol=1e-5)
     assert tuple(np.asarray(read.visual.vertex_colors)[0, :3]) == (120, 90, 60)
@@ -64,7 +72,7 @@ def test_a_glb_has_the_maps_extent_and_colours(tmp_path: Path) -> None:
 
 def test_a_map_without_voxels_has_no_mesh(tmp_path: Path) -> None:
     with pytest.raises(QueryError, match="no voxels"):
-        write_glb(tmp_path / "a.glb", np.zeros((0, 3), int), 0.05, np.zeros((0, 3), np.uint8))
+        write_glb(tmp_path / "a.glb", _space(np.zeros((0, 3), int)), np.zeros((0, 3), np.uint8))
 
 
 def test_the_occupancy_grid_lies_as_map_server_reads_it(tmp_path: Path) -> None:
@@ -105,7 +113,7 @@ def test_colours_tell_things_and_heat_apart() -> None:
 def test_a_file_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(QueryError, match="cannot be written"):
-        write_ply(tmp_path / "file" / "a.ply", np.zeros((1, 3)), np.zeros((1, 3), np.uint8))
+        write_ply(tmp_path / "file" / "a.ply", _space(np.zeros((1, 3), int)), np.zeros((1, 3), np.uint8))
 
 
 def test_the_name_of_a_colour_is_drawn_in_it_and_others_as_before() -> None:

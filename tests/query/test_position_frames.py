@@ -55,11 +55,13 @@ def test_positions_poses_and_sentences_turn_together_and_sizes_stay(up: Any, pla
 @pytest.mark.parametrize("up", [(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (0.2, 0.3, 0.9)])
 def test_a_glb_stands_upright_with_y_up_and_says_so(up: tuple[float, ...], tmp_path: Path) -> None:
     avlmap = tilted(up)
-    index, size_m = avlmap.data.voxels.index, avlmap.space.grid.voxel_size_m
-    write_glb(tmp_path / "a.glb", index, size_m, avlmap.colors, avlmap.space, FrameName.LEVEL)
+    write_glb(tmp_path / "a.glb", avlmap.space, avlmap.colors, FrameName.LEVEL)
     read = trimesh.load_scene(tmp_path / "a.glb")
     level = avlmap.space.level(avlmap.space.centres)
-    corners = np.array([[a, b, c] for a in (-0.5, 0.5) for b in (-0.5, 0.5) for c in (-0.5, 0.5)]) * size_m
+    corners = (
+        np.array([[a, b, c] for a in (-0.5, 0.5) for b in (-0.5, 0.5) for c in (-0.5, 0.5)])
+        * avlmap.space.grid.voxel_size_m
+    )
     reach = np.abs(avlmap.space.level_from_world @ corners.T).max(axis=1)
     low, high = level.min(axis=0) - reach, level.max(axis=0) + reach
     np.testing.assert_allclose(read.bounds, [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]], atol=1e-4)
@@ -71,7 +73,7 @@ def test_ply_and_csv_say_their_frame(tmp_path: Path) -> None:
     avlmap = tilted((0.2, 0.3, 0.9))
     things = avlmap.things(least_confidence=0.0)
     for frame, at in ((FrameName.RECORDING, avlmap.points), (FrameName.LEVEL, avlmap.space.level(avlmap.points))):
-        write_ply(tmp_path / "a.ply", avlmap.points, avlmap.colors, None, avlmap.space, frame)
+        write_ply(tmp_path / "a.ply", avlmap.space, avlmap.colors, None, frame)
         head = (tmp_path / "a.ply").read_bytes().partition(b"end_header")[0].decode().splitlines()
         assert f"comment metres, {frame} frame" in head
         (matrix,) = [line.split()[2:] for line in head if "level_from_recording" in line]

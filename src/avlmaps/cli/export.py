@@ -151,9 +151,9 @@ def _write_voxels(verb: Export, opened: "AVLMap", kind: str, frame: "FrameName")
         if heat is not None:
             colors, columns = heat_colors(heat.shown), {"heat": heat.values}
     if kind == ".ply":
-        write_ply(verb.out, opened.points, colors, columns, opened.space, frame)
+        write_ply(verb.out, opened.space, colors, columns, frame)
     else:
-        write_glb(verb.out, opened.data.voxels.index, opened.space.grid.voxel_size_m, colors, opened.space, frame)
+        write_glb(verb.out, opened.space, colors, frame)
 
 
 def _write_layers(verb: Export, opened: "AVLMap", kind: str, frame: "FrameName") -> None:

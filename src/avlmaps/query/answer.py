@@ -69,7 +69,7 @@ class Answer:
     # Whether the first goal is likely enough to be right: its probability is at least ``QuerySettings.found_at``.
     found: bool
     parts: tuple[PartAnswer, ...]  # one for each part of the question
-    elapsed_ms: float  # from the question to the goals
+    elapsed_ms: float = 0.0  # from the question to the goals
     heat: Heatmap | None = field(default=None, repr=False, compare=False)  # the fused heatmap, for plots
     probability: float = 0.0  # that the first goal is right, all parts together, in [0, 1]; 0 where there is no goal
     count: int | None = None  # number of likely things, where a sentence asks how many there are

@@ -1,7 +1,6 @@
 """One function answers every query: a sentence or parts, from Python, the command line, the server and the viewer.
 
-``KINDS`` are the kinds of question: each reads what is asked and answers, or leaves it to the next. The questions that
-a sentence may mean are alternatives: the likeliest answer counts, and the others are named beside it.
+``KINDS`` are the kinds of question, tried in turn; of what a sentence may mean, the likeliest answer counts.
 """
 
 import itertools
@@ -25,7 +24,7 @@ from avlmaps.core.wording import coordinates, option
 from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.answer import UNDERSTOOD_ONLY, Alternative, Answer, PartAnswer, absent_text, found_text, placed
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
-from avlmaps.query.goals import Goal, alike
+from avlmaps.query.goals import MOST_GOALS, Goal, alike
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities.image import Attachment, Photo, read_picture
 from avlmaps.query.places import distance_m, lies_between, place_given
@@ -38,8 +37,6 @@ if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
 
 _MOST_ALIKE = 10  # goals that are looked at for others that fit as well
-MOST_GOALS = 200
-"""For a count, up to this many instances are taken; those that are found count."""
 # Each way to name a storey has one of these: floor, storey, story, stories, level, upstairs.
 _STOREY_STEMS = ("floor", "stor", "level", "stair")
 _AS_NEAR = "distance counts, the side does not."
@@ -52,7 +49,6 @@ _STATED = re.compile(
     re.IGNORECASE,
 )
 _AND = " and "
-_SEVERAL = ("parts", "notes", "alternatives")
 # A name that ends so is that of a file.
 _FILE = re.compile(r"\.(?:wav|flac|ogg|mp3|m4a|aac|opus|aiff?|png|jpe?g|webp|heic|heif|avif|tiff?|bmp)$", re.IGNORECASE)
 _EXAMPLE = "the red cabinet near the sound of a dog barking"
@@ -83,6 +79,8 @@ class Asked:
     def __post_init__(self) -> None:
         if not isinstance(self.sentence, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise AskError(f"A query is a sentence, such as: {_EXAMPLE}; not {type(self.sentence).__name__}.")
+        if self.top < 1:
+            raise AskError(f"At most {self.top} goals are wanted; the number must be 1 or more.")
         named = any(part is not None for part in (self.object, self.sound, self.area))
         if self.question is not None:
             if named or self.files or self.primary is not None:
@@ -116,10 +114,7 @@ class Asked:
         return tuple(Part(modality, query, is_file=is_file) for modality, query, is_file in named if query is not None)
 
     def camera_of(self, question: Question) -> Pinhole | None:
-        """Return the camera of a question's picture.
-
-        ``AskError``: the question has no picture, or no camera has such numbers.
-        """
+        """Return the camera of a question's picture. ``AskError``: there is no picture, or no such camera."""
         if self.camera is None or isinstance(self.camera, Pinhole):
             return self.camera
         picture = next((part.query for part in question.parts if part.modality is Modality.IMAGE), "")
@@ -168,18 +163,15 @@ def ask(avlmap: "AVLMap", asked: Asked) -> Answer:
     ``AskError``: the sentence does not speak of a file that was given, or intrinsics come without a photo.
     ``QueryError``: the sentence is not understood, or a part of it cannot be used.
     """
-    begin, asking = time.perf_counter(), _Asking(avlmap, asked)
-    place = None if asked.near is None else place_given(asked.near)
-    answer = asking.answer() if place is None else asking.but(top=MOST_GOALS).answer()
-    if place is not None and any(goal.name for goal in answer.goals):
-        answer = asking.answer()
-        answer = replace(answer, notes=(*answer.notes, _OF_A_LIST))
-    elif place is not None:
-        answer = nearest_first(avlmap, answer, place, asked.top)
-    return on_storey(replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin)), avlmap.storeys)
+    begin, place = time.perf_counter(), None if asked.near is None else place_given(asked.near)
+    answer = _Asking(avlmap, asked if place is None else replace(asked, top=MOST_GOALS)).answer()
+    if place is not None:
+        answer = _nearest_first(avlmap, answer, place, asked.top)
+    answer = on_storey(_with_corrections(avlmap, answer), avlmap.storeys)
+    return replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin))
 
 
-def nearest_first(avlmap: "AVLMap", answer: Answer, place: Float[np.ndarray, " n"], top: int) -> Answer:
+def _nearest_first(avlmap: "AVLMap", answer: Answer, place: Float[np.ndarray, " n"], top: int) -> Answer:
     """Return an answer whose goals are those that count as found, the nearest to a place first.
 
     One that is less than half as likely as the best is left behind them, as when a robot goes to the nearest. Of what
@@ -187,7 +179,9 @@ def nearest_first(avlmap: "AVLMap", answer: Answer, place: Float[np.ndarray, " n
     """
     from avlmaps.language.questions import FROM_NOWHERE
 
-    _require_some(top)
+    if any(goal.name for goal in answer.goals):
+        when, usual = answer.when[:top], answer.usual[:top]
+        return replace(answer, goals=answer.goals[:top], when=when, usual=usual, notes=(*answer.notes, _OF_A_LIST))
     if not answer.found or not answer.goals:
         return replace(answer, goals=answer.goals[:top])
     least = max(avlmap.settings.found_at, answer.goals[0].probability / 2.0)
@@ -205,8 +199,17 @@ def nearest_first(avlmap: "AVLMap", answer: Answer, place: Float[np.ndarray, " n
     return replace(answer, goals=goals, text=text, notes=notes)
 
 
+def _with_corrections(avlmap: "AVLMap", answer: Answer) -> Answer:
+    # Says who corrected what the answer is about.
+    listed = [goal.name for goal in answer.goals if goal.name]
+    places = [goal.position for goal in answer.goals] if answer.found or listed else []
+    named = {kind: [one.part.query for one in answer.parts if one.part.modality is kind] for kind in Modality}
+    said = avlmap.edited.said_of(places, named[Modality.OBJECT], [*named[Modality.AREA], *listed])
+    return replace(answer, notes=(*answer.notes, *said))
+
+
 def on_storey(answer: Answer, storeys: "Storeys | None") -> Answer:
-    """Return an answer of a map of several storeys with the storey of each goal, and that of the first in its text."""
+    """Return an answer of a map of several storeys with each goal's storey, and that of the first in its text."""
     if storeys is None:
         return answer
     text = answer.text
@@ -246,9 +249,10 @@ def _of_both(asking: _Asking) -> Answer | None:
 
 
 def _together(answers: Sequence[Answer], top: int) -> Answer:
-    # What is asked of several things is answered of each, the best goal of each first; found where all are.
+    # The best goal of each comes first; found where all are.
     lasting = sorted(((rank, number) for number, one in enumerate(answers) for rank in range(len(one.goals))))[:top]
-    parts, notes, others = ([value for one in answers for value in getattr(one, name)] for name in _SEVERAL)
+    several = ("parts", "notes", "alternatives")
+    parts, notes, others = ([value for one in answers for value in getattr(one, name)] for name in several)
     counts = [one.count for one in answers if one.count is not None]
     return replace(
         answers[0], goals=tuple(answers[number].goals[rank] for rank, number in lasting),
@@ -264,7 +268,7 @@ def _of_parts(asking: _Asking) -> Answer | None:
     question = asked.question or thing_alone(asked, asking.avlmap)
     if question is None and asked.parts and not asked.sentence.strip():
         question = Question.of(asked.parts, asked.primary)
-    return None if question is None else answer_question(asking.avlmap, question.heard_at(asked.at), asked)
+    return None if question is None else _answered(asking.avlmap, question.heard_at(asked.at), asked)
 
 
 def _of_sources(asking: _Asking) -> Answer | None:
@@ -280,20 +284,15 @@ def _of_sources(asking: _Asking) -> Answer | None:
 
 
 def _of_lists(asking: _Asking) -> Answer | None:
-    from avlmaps.query.lists import answer_list
-
-    listed = _read_list(asking)
-    if listed is None:
-        return None
-    return answer_list(
-        asking.avlmap, listed, asking.asked.top, lambda words: _about(asking, words), asking.asked.at
-    )  # fmt: skip
-
-
-def _read_list(asking: _Asking):
     from avlmaps.language.list_questions import read_list
 
-    return read_list(asking.asked.sentence, own_names(asking.avlmap, asking.asked.sentence))
+    avlmap, asked = asking.avlmap, asking.asked
+    listed = read_list(asked.sentence, own_names(avlmap, asked.sentence))
+    if listed is None:
+        return None
+    from avlmaps.query.lists import answer_list
+
+    return answer_list(avlmap, listed, asked.top, partial(_about, asking), asked.at)
 
 
 def _about(asking: _Asking, words: str) -> Answer:
@@ -302,7 +301,7 @@ def _about(asking: _Asking, words: str) -> Answer:
     asked = asking.asked
     if asked.image is not None and asked.clip is None and speaks_of_photo(words):
         photo = Part(Modality.IMAGE, asked.image, is_file=True)
-        return answer_question(asking.avlmap, Question.of([photo]), asked)
+        return _answered(asking.avlmap, Question.of([photo]), asked)
     return _read(asking.but(sentence=words, primary=None))
 
 
@@ -343,7 +342,7 @@ def _read(asking: _Asking) -> Answer:
                 "this recording' in it, or take the sentence or the file away."
             )
         wanted = replace(asked, top=MOST_GOALS) if counted else asked
-        answers.append((question, answer_question(avlmap, question, wanted, counted=counted)))
+        answers.append((question, _answered(avlmap, question, wanted, counted=counted)))
     answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
     best, others = answers[0][1], answers[1:]
     alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)
@@ -363,10 +362,9 @@ KINDS: tuple[_Kind, ...] = (_of_storeys, _of_both, _of_parts, _of_sources, _of_l
 
 
 def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
-    """Return the question where a query is the name of one thing and nothing else; None for others.
+    """Return the question where a query is the name of one thing and nothing else: read without loading the grammar.
 
-    A sentence that is one of the encoder's names is read as the grammar reads it, without loading that. Stairs are a
-    thing and an area; the grammar decides which is meant.
+    Stairs are a thing and an area; the grammar decides which is meant.
     """
     if asked.files or asked.primary not in (None, Modality.OBJECT):
         return None
@@ -422,20 +420,9 @@ def _related(sentence: str, question: Question) -> Question:
     return Question(tuple(replace(part, relation=named.get(id(part), rooms)) for part in question.parts))
 
 
-def _require_some(top: int) -> None:
-    if top < 1:
-        raise AskError(f"At most {top} goals are wanted; the number must be 1 or more.")
-
-
-def answer_question(avlmap: "AVLMap", question: Question, asked: Asked, *, counted: bool = False) -> Answer:
-    """Answer a question whose parts are known.
-
-    ``counted``: only the number of things is sought; of an area, those that lists have in it.
-
-    ``AskError``: intrinsics come without a photo, or no goal is wanted. ``QueryError``: a part cannot be used.
-    """
-    begin = time.perf_counter()
-    _require_some(asked.top)
+def _answered(avlmap: "AVLMap", question: Question, asked: Asked, *, counted: bool = False) -> Answer:
+    # Of what is counted in an area, the things that lists have in it count.
+    camera, question = asked.camera_of(question), _related(asked.sentence, question)
     camera, question = asked.camera_of(question), _related(asked.sentence, question)
     heats = [avlmap.heat(replace(part, relation=""), camera, asked.attachments) for part in question.parts]
     heat, factors = _fused(avlmap, question, heats, counted=counted)
@@ -446,13 +433,9 @@ def answer_question(avlmap: "AVLMap", question: Question, asked: Asked, *, count
     parts = tuple(_part_answer(*both, heat) for both in zip(question.parts, factors, strict=True))
     alone = () if found or len(heats) == 1 else (_alone(question, heats),)
     text = found_text(parts, goals[0], alike=equal) if found else absent_text(parts, goals, next(iter(alone), None))
-    elapsed_ms = 1e3 * (time.perf_counter() - begin)
-    named = {kind: [part.query for part in question.parts if part.modality is kind] for kind in Modality}
-    places = [goal.position for goal in goals] if found else []
-    notes = avlmap.edited.said_of(places, named[Modality.OBJECT], named[Modality.AREA])
     return Answer(
-        goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone,
-        notes=(*avlmap.data.info.doubts, *notes), alike=len(equal) if found else 0,
+        goals, found, parts, heat=heat, probability=heat.probability, text=text, alternatives=alone,
+        notes=avlmap.data.info.doubts, alike=len(equal) if found else 0,
     )  # fmt: skip
 
 

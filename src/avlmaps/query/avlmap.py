@@ -59,12 +59,7 @@ class AVLMap:
     """A map that can be queried. Heatmaps of one map multiply: ``m.object("chair", primary=True) * m.sound("dog")``.
 
     Questions raise ``QueryError`` where a word is empty or not understood, and ``BackendError`` where the map was made
-    without the model that they need.
-
-    Attributes:
-        data: the map as a value.
-        path: its folder; of a map in memory a name.
-        settings: how to query.
+    without the model that they need. ``data`` is the map as a value, ``path`` its folder, or a name of a map in memory.
     """
 
     def __init__(
@@ -79,9 +74,8 @@ class AVLMap:
     ) -> None:
         """Take a map.
 
-        ``encoders``: the models to ask with; by default those that it names. ``path``: its folder, where people's edits
-        are; None of a map in memory. ``edits``: what people corrected; None for those in the map's folder, none for
-        what the encoders say alone.
+        ``encoders``: the models to ask with; by default those that it names. ``edits``: what people corrected; None for
+        those in the map's folder, none for what the encoders say alone.
         """
         self.data, self.path = data, path or Path("a map in memory")
         self._encoders = encoders
@@ -92,10 +86,7 @@ class AVLMap:
 
     @classmethod
     def open(cls, path: str | Path, settings: QuerySettings | None = None) -> "AVLMap":
-        """Open a map's folder; the features stay on the disk until a query needs them.
-
-        ``MapError``: it is not a map, damaged, or of another schema or profile.
-        """
+        """Open a map's folder. ``MapError``: it is not a map, damaged, or of another schema or profile."""
         from avlmaps.maps.store.folder import read
 
         path = lasting_path(path)
@@ -235,11 +226,10 @@ class AVLMap:
 
     @checked(QueryError)
     def sound(self, text: str, primary: bool = False, *, at: HeardAt | None = None) -> Heatmap:
-        """Return the heat of a sound of that name: where the robot was when it heard it, or where it came from.
+        """Return the heat of where the robot was when it heard a sound of that name, or of where that came from.
 
-        ``primary``: whether that place is what is sought. ``at``: ``robot`` or ``source``; by default as
-        ``settings.sounds.at`` says, else ``robot``. ``QueryError``: the text is empty, or the map does not know where
-        its sounds came from.
+        ``at``: ``robot`` or ``source``; by default as ``settings.sounds.at`` says, else ``robot``. ``QueryError``: the
+        text is empty, or the map does not know where its sounds came from.
         """
         return self._sound_heat(Part(Modality.SOUND, text, _role(primary)), self.sound_scores(text), at)
 
@@ -290,9 +280,8 @@ class AVLMap:
     ) -> Heatmap:
         """Return the heat of where a picture was taken; if it is not located, of the best guess.
 
-        ``picture``: a file, or RGB uint8, or that with what its EXIF says. ``intrinsics``: of the camera that took it;
-        by default by its EXIF, else the map's own. ``primary``: whether that place is what is sought. ``QueryError``:
-        the picture is missing, no picture, or does not fit the camera.
+        ``picture``: a file, or RGB uint8, or that with what its EXIF says. ``intrinsics``: by default by its EXIF, else
+        the map's own. ``QueryError``: the picture is missing, no picture, or does not fit the camera.
         """
         called = str(picture) if isinstance(picture, str | Path) else "a picture"
         part = Part(Modality.IMAGE, called, _role(primary), is_file=True)
@@ -308,9 +297,8 @@ class AVLMap:
     ) -> "Located":
         """Return the pose of the camera that took a picture, or that it was not located; see ``locate.locate``.
 
-        ``picture``: a file, or RGB uint8. ``intrinsics``: of the camera that took it; by default by a file's EXIF, else
-        the map's own. ``focal_35mm``: of that camera, as if for 35 mm film; by default by a file's EXIF.
-        ``QueryError``: the picture is missing, no picture, or does not fit the camera.
+        ``intrinsics``, ``focal_35mm`` (as if for 35 mm film): of the camera that took it; by default by a file's EXIF,
+        else the map's own. ``QueryError``: the picture is missing, no picture, or does not fit the camera.
         """
         if focal_35mm is not None and not 0.0 < focal_35mm < np.inf:
             raise QueryError(f"focal_35mm is a length over 0 mm, not {focal_35mm:g}.")
@@ -347,28 +335,18 @@ class AVLMap:
     ) -> "Answer":
         """Answer a query with places, as the command line, the server and the viewer do.
 
-        Args:
-            question: a sentence, such as "the chair near the sound of glass breaking" or "how many chairs are there";
-                or a question, whose parts are known. Without it the parts are those that are named below.
-            top: number of goals at most.
-            intrinsics: of the camera that took the question's pictures: a camera, or fx, fy, cx, cy in pixels; by
-                default of its EXIF, else the map's own.
-            attachments: pictures and sounds by the name that the parts have for them. Where given, no file is opened: a
-                part of a file that is not among them is an error.
-            object: instead of a sentence, the name of an object.
-            sound: the name of a sound.
-            area: the name of an area, such as a kitchen.
-            image: a photo; with a sentence, what "this photo" in it means.
-            clip: a sound clip; with a sentence, what "this recording" in it means.
-            primary: which part is sought; the others say where it is.
-            at: the place of a sound: ``robot``, where it was heard, or ``source``, where it came from; by default as
-                ``settings.sounds.at`` says, else as the words do.
-            near: x, y, z in metres of the recording frame, or x, y of the level one: the goals nearest to it come
-                first, of those that are found.
+        ``question``: a sentence, such as "the chair near the sound of glass breaking" or "how many chairs are there",
+        or parts. Without it the parts are an ``object``, a ``sound`` and an ``area`` by name, and files: a photo
+        (``image``) and a sound (``clip``); with a sentence they are what "this photo" and "this recording" in it mean.
+        ``top``: number of goals at most. ``intrinsics``: of the photo's camera: a camera, or fx, fy, cx, cy in pixels;
+        by default of its EXIF, else the map's own. ``attachments``: pictures and sounds by the name that the parts have
+        for them; then no file is opened. ``primary``: which part is sought; the others say where it is. ``at``: the
+        place of a sound: ``robot``, where it was heard, or ``source``, where it came from; by default as
+        ``settings.sounds.at`` says, else as the words do. ``near``: x, y, z in metres of the recording frame, or x, y
+        of the level one: of the goals that are found the nearest to it come first.
 
-        Raises:
-            AskError: there is nothing to ask, both a sentence and parts, or a file that the sentence does not speak of.
-            QueryError: the sentence is not understood, or a part of the query cannot be used.
+        ``AskError``: there is nothing to ask, both a sentence and parts, or a file that the sentence does not speak of.
+        ``QueryError``: the sentence is not understood, or a part of the query cannot be used.
         """
         from avlmaps.query.asking import Asked, AskError, ask
 
@@ -432,11 +410,9 @@ class AVLMap:
     ) -> list["Thing"]:
         """Return the things of the map, most confident first; see ``contents.find_things``.
 
-        With ``room``, those in a room by its name, or in all rooms of a kind, as ``rooms`` lists them.
-
-        With ``at``, of a map of several days, those that were there on that day: a date, or the number of a visit from
-        1. What moved or went since is where it was; ``rows`` holds what is left of it, ``heard`` what was heard from
-        it on that day, where the map knows where its sounds came from.
+        ``at``: those that were there on a day: a date, or the number of a visit from 1. What moved or went since is
+        where it was; ``rows`` holds what is left of it, ``heard`` what was heard from it on that day. ``room``: those
+        in a room by its name, or in all rooms of a kind.
 
         ``QueryError``: there is no such room, or the map was not seen on such a day, or on one day alone.
         """
@@ -473,10 +449,7 @@ class AVLMap:
         return find_things(self, self._names.search, names, least_confidence, structure, watch)
 
     def things_to_edit(self, name: str | None) -> "Sequence[Thing]":
-        """Return the things that an edit may be about, as the encoder sees them: of a name, or of its vocabulary.
-
-        They are looked for once, for the edits of now and of later.
-        """
+        """Return the things that an edit may be about, as the encoder sees them: of a name, or of its vocabulary."""
         if name not in self._to_edit:
             is_seen = self.has(Kind.PIXELS) and (name is None or self.sees(name))
             self._to_edit[name] = (
@@ -504,9 +477,7 @@ class AVLMap:
     ) -> "Contents":
         """Return the things, sounds and rooms of the map; none of a kind that the map has no model for.
 
-        ``least_confidence``: things below it are left out, in [0, 1]. ``names``: list these things only; by default the
-        pixel encoder's vocabulary. ``QueryError``: ``least_confidence`` lies outside [0, 1], or the pixel encoder does
-        not know a name.
+        ``QueryError``: ``least_confidence`` lies outside [0, 1], or the pixel encoder does not know a name.
         """
         from avlmaps.query.contents import Contents, require_known
         from avlmaps.query.sound_sources import with_heard
@@ -522,10 +493,7 @@ class AVLMap:
 
     @checked(QueryError)
     def sources(self, names: Sequence[str] = (), *, prior: bool = True, least: float = 0.0) -> "list[SoundSource]":
-        """Return the places that sounds came from, as regions with probabilities; see ``sound_sources.list_sources``.
-
-        ``QueryError``: the map does not know where its sounds came from.
-        """
+        """Return the places that sounds came from; see ``sound_sources.list_sources``."""
         from avlmaps.query.sound_sources import list_sources
 
         return list_sources(self, names, prior, least=least)
@@ -533,9 +501,8 @@ class AVLMap:
     def changes(self, since: str | int = 1, *, first_seen: bool = False) -> "ChangesAnswer":
         """Return what is new, moved and gone after a day: a date, or the number of a visit from 1.
 
-        With ``first_seen``, also what was seen first where nobody had looked before.
-
-        ``QueryError``: the map was not seen on such a day, or on one day alone.
+        ``first_seen``: also what was seen first where nobody had looked before. ``QueryError``: the map was not seen on
+        such a day, or on one day alone.
         """
         from avlmaps.query.changes import Days, changes_answer
 
@@ -545,7 +512,7 @@ class AVLMap:
 
     @checked(QueryError)
     def last_seen(self, name: str) -> "LastSeenAnswer":
-        """Return where things of a name were last seen, and when: those that are there still first, then the latest.
+        """Return where things of a name were last seen, those that are there still first, then the latest.
 
         ``QueryError``: the map was seen on one day alone.
         """
@@ -627,10 +594,7 @@ class AVLMap:
     def room_field(self) -> "RoomField | None":
         """How likely each place is each kind of room that the view encoder knows or a person named.
 
-        None where there are no votes.
-
-        ``BackendError``: the map's profile has no view encoder. ``MapError``: the map was built with another encoder
-        than is installed.
+        None without votes. ``BackendError``: there is no view encoder. ``MapError``: it is another than the map's.
         """
         seen = self._rooms.field
         return None if seen is None else self._settled(seen)
@@ -655,10 +619,7 @@ class AVLMap:
     # Pictures and other libraries.
 
     def plot(self, path: str | Path | None = None, *, names: bool = True) -> "Path | Figure":
-        """Draw the map from above with its walk and sounds, and by default the names of its things and rooms.
-
-        ``QueryError``: the picture cannot be written there.
-        """
+        """Draw the map from above with its walk and sounds, and by default the names of its things and rooms."""
         from avlmaps.query.plots import draw_map, save
 
         things = self.things() if names and self.has(Kind.PIXELS) else ()
@@ -672,7 +633,6 @@ class AVLMap:
         return png_of(draw_map(self))
 
     def __dir__(self) -> list[str]:
-        """Return the names that a person uses; the others serve answers, lists and fronts."""
         return [name for name in super().__dir__() if not name.startswith("_") and name not in _INSIDE]
 
     def to_trimesh(self) -> Any:

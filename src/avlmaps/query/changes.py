@@ -49,19 +49,17 @@ class Days:
 
     @property
     def last(self) -> int:
-        """The number of the last visit."""
+        """The last visit."""
         return len(self.visits) - 1
 
     def name(self, visit: int) -> str:
-        """Return the name of a visit for people: its day, or its number from 1."""
-        day = self.visits[visit].day
-        return day or f"visit {visit + 1}"
+        """Return the day of a visit, or its number from 1, for people."""
+        return self.visits[visit].day or f"visit {visit + 1}"
 
     def visit_of(self, said: str | int) -> int:
         """Return the number of the visit that a day names: a number from 1, or the last one up to a date.
 
-        ``said``: "2", "visit 2" or "day 2", as lists name it; "2026-11-25", "yesterday" or "today". ``QueryError``:
-        there is no such visit, or the days are not known.
+        ``said``: "2", "visit 2", "day 2", "2026-11-25", "yesterday" or "today". ``QueryError``: there is none.
         """
         text = str(said).strip().lower()
         text = text.removeprefix("visit ").removeprefix("day ").strip()
@@ -89,8 +87,7 @@ class Days:
     def changes(self, since: int = 0) -> "list[Change]":
         """Return what changed after a visit, in the order of time.
 
-        What was seen first on a later day is ``new`` only where its place had been looked through before; else it is
-        ``first seen``.
+        What was seen first on a later day is ``new`` only where its place had been looked through before.
         """
         found: list[Change] = []
         stays = self.life.stays
@@ -165,22 +162,14 @@ def last_seen(days: Days, name: str, same: Callable[[str], bool], room_of: RoomO
     stays = days.life.stays
     own = [stay for stay in stays if same(stay.name) and stay.moved_to is None]
     own.sort(key=lambda stay: (stay.gone is not None, -stay.last_seen_s, -stay.confidence))
-    return {
-        "name": name,
-        "frame": FRAME,
-        "last_day": when(days, days.last),
-        "seen": [
-            row_of(
-                stay,
-                LastSeenPlace,
-                room=room_of(stay.position),
-                last_seen=when(days, stay.last, stay.last_seen_s),
-                gone=None if stay.gone is None else when(days, stay.gone),
-                looked=when(days, stay.looked),
-            )
-            for stay in own
-        ],
-    }
+
+    def row(stay: "Stay") -> LastSeenPlace:
+        return row_of(
+            stay, LastSeenPlace, room=room_of(stay.position), last_seen=when(days, stay.last, stay.last_seen_s),
+            gone=None if stay.gone is None else when(days, stay.gone), looked=when(days, stay.looked),
+        )  # fmt: skip
+
+    return {"name": name, "frame": FRAME, "last_day": when(days, days.last), "seen": list(map(row, own))}
 
 
 def things_at(
@@ -190,19 +179,15 @@ def things_at(
     from avlmaps.query.contents import Thing
     from avlmaps.query.edits import means
 
-    voxels: list[list[int]] = np.asarray(space.index).tolist()
-    row_of = {(x, y, z): row for row, (x, y, z) in enumerate(voxels)}
     meant = None if names is None else [means(name) for name in names]
     found: list[Thing] = []
     for number in days.at(days.visit_of(at)):
         stay, index = days.life.stays[number], days.life.voxels(number)
         if stay.confidence < least_confidence or not (meant is None or any(one(stay.name) for one in meant)):
             continue
-        own: list[list[int]] = index.tolist()
-        left = sorted(row for x, y, z in own if (row := row_of.get((x, y, z))) is not None)
-        rows = np.array(left, np.int64)
-        points = space.grid.centre_of(index)
-        found.append(Thing(stay.name, stay.confidence, stay.position, stay.size, stay.color, rows, points))
+        rows, points = space.rows_of(index), space.grid.centre_of(index)
+        left = np.sort(rows[rows >= 0])
+        found.append(Thing(stay.name, stay.confidence, stay.position, stay.size, stay.color, left, points))
     return sorted(found, key=lambda thing: -thing.confidence)
 
 
@@ -233,9 +218,8 @@ def last_seen_text(answer: "LastSeenAnswer") -> str:
     if not answer["seen"]:
         return f"No {answer['name']} was seen on any day."
     one = answer["seen"][0]
-    x, y, z = one["position"]
     room = f"in {the_room(one['room'])}, " if one["room"] else ""
-    text = f"The {one['name']} was last seen on {said(one['last_seen'])}, {room}at ({x:.2f}, {y:.2f}, {z:.2f}) m."
+    text = f"The {one['name']} was last seen on {said(one['last_seen'])}, {room}at {place_text(one['position'])}."
     if one["gone"] is not None:
         return f"{text} On {said(one['gone'])} it was gone from there."
     if one["last_seen"]["visit"] == answer["last_day"]["visit"]:
@@ -285,8 +269,7 @@ class Usual:
 def usual(days: Days, wanted: "Callable[[Stay], bool]") -> list[Usual]:
     """Return things of some stays, each at its place, the most usual first.
 
-    Stays of one name whose places lie within a metre are one thing that came and went. A day that looked at the place
-    while one of them was there counts as one on which it was there.
+    Stays of one name within a metre are one thing that came and went. It was there on each day that saw one of them.
     """
     groups: list[list[Stay]] = []
     for stay in sorted(days.life.stays, key=lambda one: (one.last, one.last_seen_s), reverse=True):

@@ -1,8 +1,7 @@
 """A map for other programs: point clouds and meshes (PLY, GLB, PCD), occupancy grids (PGM, YAML) and tables (CSV).
 
 A file says in which frame its coordinates are, metres: the recording's, or the level one, which shares its origin and
-whose z is up. An occupancy grid is a floor plan and is always level; a GLB file is level by default, and then y is up,
-as viewers of GLB expect.
+whose z is up. An occupancy grid is always level.
 """
 
 import csv
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float32, Int, UInt8
+from avlmaps.core.arrays import Float32, Int, UInt8
 from avlmaps.core.errors import QueryError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.poses import FrameName
@@ -73,10 +72,8 @@ def shades_of(names: "Sequence[str]") -> UInt8[np.ndarray, "k 3"]:
 
 
 def palette(count: int) -> UInt8[np.ndarray, "k 3"]:
-    """Return colours far apart to the eye, and from gray; the first of them are the same for any count.
-
-    Each is the one of some hundred colours that lies farthest from those before it, in CIELAB.
-    """
+    """Return colours far apart to the eye, and from gray; the first of them are the same for any count."""
+    # Each is the one of some hundred colours that lies farthest from those before it, in CIELAB.
     import cv2
     from matplotlib.colors import hsv_to_rgb
 
@@ -94,47 +91,41 @@ def palette(count: int) -> UInt8[np.ndarray, "k 3"]:
 
 def write_ply(
     path: Path,
-    points: Float[np.ndarray, "n 3"],
+    space: "Space",
     colors: UInt8[np.ndarray, "n 3"],
     columns: dict[str, np.ndarray] | None = None,
-    space: "Space | None" = None,
     frame: FrameName = FrameName.RECORDING,
 ) -> Path:
-    """Write a binary PLY point cloud; comments in its head name the frame, and turn it into the other one.
+    """Write the voxels as a binary PLY point cloud; comments in its head name the frame, and turn it into the other.
 
-    ``points``: metres, recording frame. ``colors``: RGB. ``columns``: more numbers for each point (``heat``,
-    ``weight``), written as float32. ``space``: of the map; needed for the level frame. ``QueryError``: the file cannot
-    be written.
+    ``colors``: RGB. ``columns``: more numbers for each voxel (``heat``, ``weight``), written as float32.
+    ``QueryError``: the file cannot be written.
     """
-    columns = columns or {}
-    points = _in_frame(points, space, frame)
-    fields = [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")]
-    rows = np.zeros(len(points), np.dtype(fields + [(name, "<f4") for name in columns]))
-    for k, axis in enumerate("xyz"):
-        rows[axis] = points[:, k]
-    for k, color in enumerate(("red", "green", "blue")):
-        rows[color] = colors[:, k]
-    for name, values in columns.items():
-        rows[name] = values
-    kinds = {"<f4": "float", "u1": "uchar"}
-    described = [f"property {kinds[kind]} {name}" for name, kind in fields] + [f"property float {n}" for n in columns]
+    points = space.level_centres() if frame is FrameName.LEVEL else space.centres
+    fields = {name: ("<f4", "float", column) for name, column in zip("xyz", points.T, strict=True)}
+    fields |= {name: ("u1", "uchar", column) for name, column in zip(("red", "green", "blue"), colors.T, strict=True)}
+    fields |= {name: ("<f4", "float", column) for name, column in (columns or {}).items()}
+    rows = np.zeros(len(space), np.dtype([(name, kind) for name, (kind, _, _) in fields.items()]))
+    for name, (_, _, column) in fields.items():
+        rows[name] = column
+    matrix = " ".join(f"{value:.9g}" for value in space.level_from_recording.ravel())
+    described = [f"property {kind} {name}" for name, (_, kind, _) in fields.items()]
     header = ["ply", "format binary_little_endian 1.0", f"comment metres, {frame} frame",
-              *([] if space is None else [f"comment level_from_recording {_matrix_text(space)}"]),
-              f"element vertex {len(rows)}", *described, "end_header", ""]  # fmt: skip
+              f"comment level_from_recording {matrix}", f"element vertex {len(rows)}", *described, "end_header",
+              ""]  # fmt: skip
     return _write(path, "\n".join(header).encode("ascii") + rows.tobytes())
 
 
 def voxel_mesh(
-    index: Int[np.ndarray, "n 3"], voxel_size_m: float, colors: UInt8[np.ndarray, "n 3"]
+    space: "Space", colors: UInt8[np.ndarray, "n 3"]
 ) -> tuple[Float32[np.ndarray, "v 3"], Int[np.ndarray, "t 3"], UInt8[np.ndarray, "v 3"]]:
     """Return the outer faces of voxels as vertices, triangles and vertex colours, without those between two voxels."""
-    index = np.asarray(index, np.int64)
-    known = _keys(index, index)
+    index = np.asarray(space.index, np.int64)
     vertices: list[Float32[np.ndarray, "v 3"]] = []
     shades: list[UInt8[np.ndarray, "v 3"]] = []
     for step, corners in _FACES:
-        outer = ~np.isin(_keys(index + np.array(step), index), known)
-        quads = (index[outer][:, None, :] + np.array(corners)) * voxel_size_m
+        outer = space.rows_of(index + np.array(step)) < 0
+        quads = (index[outer][:, None, :] + np.array(corners)) * space.grid.voxel_size_m
         vertices.append(quads.reshape(-1, 3).astype(np.float32))
         shades.append(np.repeat(colors[outer], 4, axis=0))
     every = np.concatenate(vertices) if vertices else np.zeros((0, 3), np.float32)
@@ -143,64 +134,35 @@ def voxel_mesh(
     return every, triangles, np.concatenate(shades)
 
 
-def _keys(index: Int[np.ndarray, "m 3"], of: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " m"]:
-    if not len(of):
-        return np.zeros(len(index), np.int64)
-    low = of.min(axis=0) - 1
-    span = of.max(axis=0) - low + 2
-    shifted = index - low
-    return (shifted[:, 0] * span[1] + shifted[:, 1]) * span[2] + shifted[:, 2]
-
-
 def write_glb(
-    path: Path,
-    index: Int[np.ndarray, "n 3"],
-    voxel_size_m: float,
-    colors: UInt8[np.ndarray, "n 3"],
-    space: "Space | None" = None,
-    frame: FrameName = FrameName.RECORDING,
+    path: Path, space: "Space", colors: UInt8[np.ndarray, "n 3"], frame: FrameName = FrameName.RECORDING
 ) -> Path:
     """Write the voxels as blocks into a GLB file; its ``extras`` name the frame.
 
-    ``colors``: RGB of each. ``space``: of the map; needed for the level frame. ``frame``: level: x of the level frame
-    to the right, its z up along the file's y, its y away along −z. ``QueryError``: the map is empty, or the file cannot
-    be written.
+    In the level frame its z is along the file's y, as viewers of GLB expect, and its y along −z. ``QueryError``: the
+    map is empty, or the file cannot be written.
     """
     import trimesh
     from trimesh.exchange.gltf import export_glb  # pyright: ignore[reportUnknownVariableType]
 
-    if not len(index):
+    if not len(space):
         raise QueryError("The map holds no voxels, so that there is no mesh to export.")
-    vertices, triangles, shades = voxel_mesh(index, voxel_size_m, colors)
+    vertices, triangles, shades = voxel_mesh(space, colors)
     if frame is FrameName.LEVEL:
-        level = _in_frame(vertices, space, frame)
+        level = space.level(np.asarray(vertices, np.float64))
         vertices = np.stack([level[:, 0], level[:, 2], -level[:, 1]], axis=1).astype(np.float32)
     mesh = trimesh.Trimesh(vertices, triangles, vertex_colors=shades, process=False)
     scene = trimesh.Scene({"map": mesh})
     scene.metadata["frame"] = "level, y up" if frame is FrameName.LEVEL else str(frame)
-    if space is not None:
-        scene.metadata["level_from_recording"] = space.level_from_recording.round(9).tolist()
+    scene.metadata["level_from_recording"] = space.level_from_recording.round(9).tolist()
     return _write(path, bytes(export_glb(scene)))
 
 
-def _in_frame(points: Float[np.ndarray, "n 3"], space: "Space | None", frame: FrameName) -> Float[np.ndarray, "n 3"]:
-    if frame is FrameName.RECORDING:
-        return points
-    if space is None:
-        raise ValueError("points are turned into the level frame by the space of their map")
-    return space.level(np.asarray(points, np.float64))
-
-
-def _matrix_text(space: "Space") -> str:
-    return " ".join(f"{value:.9g}" for value in space.level_from_recording.ravel())
-
-
 def write_occupancy(path: Path, obstacles: "Obstacles") -> tuple[Path, Path]:
-    """Write a PGM picture and the YAML file that Nav2's ``map_server`` reads.
+    """Write a PGM picture and the YAML file that Nav2's ``map_server`` reads, and return both.
 
     The grid is in the level frame: x to the right, y up, the first row of the picture at the largest y.
-
-    Returns both files. ``QueryError``: a file cannot be written.
+    ``QueryError``: a file cannot be written.
     """
     from avlmaps.maps.obstacles import CellState
 
@@ -231,12 +193,10 @@ def write_occupancy(path: Path, obstacles: "Obstacles") -> tuple[Path, Path]:
 def write_table(
     path: Path, things: "Iterable[ListedThing]", sounds: "Iterable[SoundAnswer]", frame: str = FrameName.RECORDING
 ) -> Path:
-    """Write things and sounds as CSV, one row each, as an answer lists them.
+    """Write things and sounds as CSV, one row each, as an answer lists them, metres.
 
-    The column ``frame`` names that of the positions, metres. Sizes are along the axes of the level frame in either, as
-    the column ``size_frame`` says. Where rows have a storey, a room or a distance, these are columns at the end.
-
-    ``QueryError``: the file cannot be written.
+    Sizes are along the axes of the level frame in either frame. Where rows have a storey, a room or a distance, these
+    are columns at the end. ``QueryError``: the file cannot be written.
     """
     rows: list[dict[str, object]] = []
     for thing in things:
@@ -263,10 +223,7 @@ def _millis(value: float) -> str:
 
 @contextmanager
 def explain_write_errors(path: Path) -> Generator[None]:
-    """Make the folder of a file that is written then; a fault of the disk is one sentence.
-
-    ``QueryError``: it cannot be written.
-    """
+    """Make the folder of a file that is written then. ``QueryError``: it cannot be written."""
     made = [folder for folder in path.parents if not folder.exists()]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -288,10 +245,7 @@ FILES = ("embeddings.npy", "index.npy", "point_cloud.pcd")
 
 
 def write_openlex3d(folder: Path, opened: "AVLMap") -> tuple[Path, ...]:
-    """Write the three files; voxels without a feature are left out.
-
-    ``QueryError``: no voxel has a feature, or a file cannot be written.
-    """
+    """Write the three files, without voxels that have no feature. ``QueryError``: none has any, or of the disk."""
     voxels = opened.data.voxels
     rows = np.flatnonzero(np.asarray(voxels.weight) > 0.0)
     if not len(rows):
@@ -301,17 +255,12 @@ def write_openlex3d(folder: Path, opened: "AVLMap") -> tuple[Path, ...]:
         _npy(np.arange(len(rows), dtype=np.int64)),
         pcd_bytes(opened.points[rows].astype(np.float32), opened.colors[rows]),
     )
-    for name, content in zip(FILES, contents, strict=True):
-        with explain_write_errors(folder / name):
-            write_bytes_atomically(folder / name, content)
-    return tuple(folder / name for name in FILES)
+    return tuple(_write(folder / name, content) for name, content in zip(FILES, contents, strict=True))
 
 
 def pcd_bytes(points: Float32[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"]) -> bytes:
-    """Return a binary PCD file (version 0.7 of its public description) of points with colours, metres.
-
-    A colour is four bytes blue, green, red, 0 that are declared as a float.
-    """
+    """Return a binary PCD file (version 0.7 of its public description) of points with colours, metres."""
+    # A colour is four bytes blue, green, red, 0 that are declared as a float.
     rows = np.zeros(len(points), np.dtype([("xyz", "<f4", 3), ("bgr0", "u1", 4)]))
     rows["xyz"] = points
     rows["bgr0"][:, :3] = colors[:, ::-1]

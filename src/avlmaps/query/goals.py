@@ -132,6 +132,8 @@ def weights() -> Weights:
     return json.loads(Path(__file__).with_name("found.json").read_text(encoding="utf-8"))["weights"]
 
 
+MOST_GOALS = 200
+"""For a count, a list or a place to be near to, up to this many goals are looked through."""
 _ALIKE = 0.05
 """Goals whose probabilities differ by no more fit equally: no calibration tells them apart."""
 # Two sounds heard at one place are one place to go to.

@@ -16,7 +16,7 @@ from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Part, Role
 from avlmaps.query.factors import Factor, lead_of, product_of, times
-from avlmaps.query.goals import Goal, GoalEvidence, Shares, share_voxels, weigh_goals
+from avlmaps.query.goals import MOST_GOALS, Goal, GoalEvidence, Shares, share_voxels, weigh_goals
 from avlmaps.query.settings import FOUND_AT
 from avlmaps.query.voxel_space import Space
 
@@ -176,7 +176,6 @@ class Blend(Heat):
 
 
 _Where = Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, " n"] | Bool[np.ndarray, " n"]]
-_MOST_GOALS = 200  # that are looked through for those that lie where they may
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -311,7 +310,7 @@ class Heatmap(Heat):
     @cached_property
     def _where_it_may(self) -> list[tuple[Goal, GoalEvidence]]:
         assert self.where is not None
-        every = weigh_goals(self.factors, self._shares, _MOST_GOALS)
+        every = weigh_goals(self.factors, self._shares, MOST_GOALS)
         most = self.where(np.array([goal.position for goal, _ in every]).reshape(-1, 3))
         return [
             (replace(goal, probability=round(min(goal.probability, float(sure)), 3)), evidence)

@@ -1,12 +1,9 @@
-"""Answers from the lists of a map: rooms by size, sounds by time, what is in a room, beside a thing or on a storey.
-
-``ANSWERS`` has one function for each kind of list.
-"""
+"""Answers from the lists of a map: rooms by size, sounds by time, what is in a room, beside a thing or on a storey."""
 
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +23,7 @@ from avlmaps.query import changes
 from avlmaps.query.answer import Alternative, Answer, in_words, placed, sentence_of
 from avlmaps.query.changes import ChangeKind, Days
 from avlmaps.query.edits import means
-from avlmaps.query.goals import Goal
+from avlmaps.query.goals import MOST_GOALS, Goal
 from avlmaps.query.places import lies_between
 from avlmaps.query.whereabouts import NOWHERE, Whereabouts
 
@@ -46,16 +43,16 @@ _LEAST_M2 = 1.0  # of a room; less is a corner that views disagree about
 _LIKELY = 0.3  # of a sound's second name
 _ROUND_SOUNDS = frozenset({"the", "a", "an", "of", "sound", "noise", "someone", "somebody", "my", "your", "go", "off"})
 _MOST_SOURCES = 5  # of sounds by time; each costs a density
-_MOST_GOALS = 200
 
 
+@dataclass(frozen=True, slots=True)
 class _Lists:
-    """What a question of lists needs."""
-
-    def __init__(
-        self, avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callable[[str], Answer], at: HeardAt | None
-    ) -> None:
-        self.avlmap, self.question, self.top, self.ask, self.at = avlmap, question, top, ask, at
+    # What a question of lists needs.
+    avlmap: "AVLMap"
+    question: ListQuestion
+    top: int
+    ask: Callable[[str], Answer]
+    at: HeardAt | None
 
     def days(self) -> Days:
         return Days.of(self.avlmap)
@@ -70,8 +67,7 @@ class _Lists:
         probability = goals[0].probability if goals else 0.0
         found = bool(goals) and probability >= self.avlmap.settings.found_at
         parts, heat = ((), None) if subject is None else (subject.parts, subject.heat)
-        said = self.avlmap.edited.said_of([goal.position for goal in goals], areas={goal.name for goal in goals})
-        return Answer(tuple(goals), found, parts, 0.0, heat, probability, count, text=text, notes=said)
+        return Answer(tuple(goals), found, parts, heat=heat, probability=probability, count=count, text=text)
 
 
 def answer_list(
@@ -300,19 +296,19 @@ def lies(avlmap: "AVLMap", how: str, stay: "Stay", mark: Goal) -> bool:
 
 
 class _Box:
-    """The upright box of a thing, level frame, metres."""
+    # The upright box of a thing, level frame, metres.
 
     def __init__(self, avlmap: "AVLMap", thing: "Stay | Goal | Thing") -> None:
         self.middle: Float[np.ndarray, 3] = avlmap.space.level(np.array([thing.position]))[0]
         self.size: Float[np.ndarray, 3] = np.array(thing.size)
 
     def gap_m(self, other: "_Box") -> float:
-        """Return how far apart they are, top-down."""
+        # Top-down.
         apart = np.abs(self.middle - other.middle)[:2] - (self.size + other.size)[:2] / 2.0
         return float(np.linalg.norm(np.maximum(apart, 0.0)))
 
     def overlaps(self, other: "_Box") -> bool:
-        """Return whether each holds the middle of the other: they are one thing."""
+        # Each holds the middle of the other: they are one thing.
         return bool((np.abs(self.middle - other.middle) <= np.minimum(self.size, other.size) / 2.0).all())
 
 
@@ -418,16 +414,13 @@ def how_many(avlmap: "AVLMap") -> Answer:
     """Return how many storeys a map has."""
     storeys = avlmap.storeys
     count, text = 1 if storeys is None else len(storeys), said_storeys(storeys).removeprefix("it ")
-    return Answer((), True, (), 0.0, probability=1.0, count=count, text=f"The map {text}.")
+    return Answer((), True, (), probability=1.0, count=count, text=f"The map {text}.")
 
 
 def answer_on_storey(
     avlmap: "AVLMap", said: Sequence[SaidStorey], top: int, ask: Callable[[str, int], Answer]
 ) -> Answer:
-    """Answer a question that names a storey.
-
-    ``QueryError``: the question names several storeys, or cannot be answered.
-    """
+    """Answer a question that names a storey. ``QueryError``: it names several, or cannot be answered."""
     if len({(one.number, one.above, one.isnt) for one in said}) > 1:
         raise QueryError(f"The question names several storeys ({', '.join(one.said for one in said)}); ask for one.")
     storeys, word = avlmap.storeys, said[0]
@@ -442,12 +435,13 @@ def answer_on_storey(
         things = avlmap.things() if avlmap.has(Kind.PIXELS) else []
         goals = [goal for goal in map(_thing_goal, things) if storeys is None or _storey(storeys, goal) in numbers]
         likely, text = goals[0].probability if goals else 0.0, _list(word, goals)
-        return Answer(tuple(goals[:top]), bool(goals), (), 0.0, None, likely, len(goals), notes, text=text)
-    return _restricted(avlmap, ask(word.rest, _MOST_GOALS), word, numbers, notes, top)
+        goals, found = tuple(goals), bool(goals)
+        return Answer(goals[:top], found, (), probability=likely, count=len(goals), notes=notes, text=text)
+    return _restricted(avlmap, ask(word.rest, MOST_GOALS), word, numbers, notes, top)
 
 
 def _no_such(storeys: Storeys | None, word: SaidStorey, notes: tuple[str, ...], whole: Answer | None) -> Answer:
-    whole = whole or Answer((), False, (), 0.0)
+    whole = whole or Answer((), False, ())
     holds = said_storeys(storeys).replace("it", "the map", 1)
     guess = f"; without that the best guess is at {place_text(whole.goals[0].position)}" if whole.goals else ""
     text = sentence_of(f"{holds}, so that nothing is known to be {at_storey(word)}{guess}")

@@ -236,18 +236,17 @@ class Space:
         index = np.asarray(self.index, np.int64)
         low = index.min(axis=0) if len(index) else np.zeros(3, np.int64)
         span = index.max(axis=0) - low + 1 if len(index) else np.zeros(3, np.int64)
-        shifted = index - low
-        return low, span, (shifted[:, 0] * span[1] + shifted[:, 1]) * span[2] + shifted[:, 2]
+        return low, span, (index - low) @ np.array([span[1] * span[2], span[2], 1])
 
-    def holds(self, cells: Int[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
-        """Return which cells of the grid are occupied voxels."""
+    def rows_of(self, cells: Int[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+        """Return the number of the voxel in each cell of the grid; −1 where there is none."""
         low, span, keys = self._keys
-        shifted = np.asarray(cells, np.int64) - low
-        held = np.all((shifted >= 0) & (shifted < span), axis=1)
-        key: Int[np.ndarray, " k"] = (shifted[held, 0] * span[1] + shifted[held, 1]) * span[2] + shifted[held, 2]
-        at = np.searchsorted(keys, key)
-        held[held] = keys[np.minimum(at, len(keys) - 1)] == key
-        return held
+        shifted, rows = np.asarray(cells, np.int64) - low, np.full(len(cells), -1, np.int64)
+        within = np.flatnonzero(np.all((shifted >= 0) & (shifted < span), axis=1))
+        key: Int[np.ndarray, " k"] = shifted[within] @ np.array([span[1] * span[2], span[2], 1])
+        at = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
+        rows[within] = np.where(keys[at] == key, at, -1)
+        return rows
 
     @cached_property
     def horizontal(self) -> Float[np.ndarray, "n 2"]:

@@ -572,4 +572,5 @@ def _is_free(space: "Space", start: Float[np.ndarray, "3"], end: Float[np.ndarra
     if whole_m <= _OWN_VOXELS * voxel_m:
         return True
     along = np.arange(0.5 * voxel_m, whole_m - _OWN_VOXELS * voxel_m, 0.5 * voxel_m)[:, None] / whole_m
-    return not space.holds(np.floor((start + along * (end - start)) / voxel_m).astype(np.int64)).any()
+    cells = np.floor((start + along * (end - start)) / voxel_m).astype(np.int64)
+    return not (space.rows_of(cells) >= 0).any()
