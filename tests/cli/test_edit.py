@@ -81,4 +81,4 @@ def test_people_who_edit_at_once_lose_nothing(tmp_path: Path) -> None:
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(lambda edit: append_edit(tmp_path, edit), edits))
     assert sorted(edit.name for edit in read_edits(tmp_path)) == sorted(edit.name for edit in edits)
-    assert not list(tmp_path.glob("*.partial"))
+    assert not list(tmp_path.glob("*.part*"))

@@ -2,6 +2,7 @@
 
 import hashlib
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -26,14 +27,16 @@ def test_an_error_while_writing_leaves_the_old_file(tmp_path: Path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["map.json"]
 
 
-def test_until_the_end_readers_see_the_old_file(tmp_path: Path):
+def test_until_the_end_readers_see_what_was_there_and_threads_do_not_mix(tmp_path: Path):
     target = tmp_path / "map.json"
-    target.write_bytes(b"old")
     with replace_atomically(target) as stream:
-        stream.write(b"new")
-        stream.flush()
-        assert target.read_bytes() == b"old"
-    assert target.read_bytes() == b"new"
+        stream.write(b"first")
+        other = Thread(target=write_bytes_atomically, args=(target, b"second"))
+        other.start()
+        other.join()
+        assert target.read_bytes() == b"second"
+    assert target.read_bytes() == b"first"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["map.json"]
 
 
 def test_a_files_hash_does_not_depend_on_the_chunks_it_is_read_in(tmp_path: Path):

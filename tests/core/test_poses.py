@@ -63,7 +63,7 @@ def test_the_length_and_sign_of_a_quaternion_do_not_matter(a: np.ndarray, scale:
 
 
 def test_a_quaternion_of_length_zero_is_no_rotation():
-    with pytest.raises(ValueError, match="norm 0"):
+    with pytest.raises(ValueError, match="zero norm"):
         poses.from_quaternion(np.zeros((1, 3)), np.zeros((1, 4)))
 
 

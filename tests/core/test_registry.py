@@ -17,7 +17,7 @@ def only_for_this_test() -> Iterator[None]:
     yield
     registry._registered.clear()
     registry._registered.update(before)
-    registry._load.cache_clear()
+    registry.forget_loaded()
 
 
 def test_a_registered_backend_is_loaded_once():

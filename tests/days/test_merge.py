@@ -9,7 +9,7 @@ import pytest
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.wording import Spelling, options_as
-from avlmaps.days import merge
+from avlmaps.days import find, merge
 from avlmaps.days.find import require_another_drive, visits_of
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store.folder import read
@@ -66,8 +66,8 @@ def test_clocks_give_the_order(drives: list[AVLMap], tmp_path: Path, monkeypatch
         recording = msgspec.structs.replace(own.recording, begins_s=begins_s)
         return (msgspec.structs.replace(own, day="2023-11-14", recording=recording),)
 
-    monkeypatch.setattr(merge, "visits_of", at_clocks)
-    monkeypatch.setattr(merge, "find_other", lambda *_: pytest.fail("the order is checked before the search"))
+    monkeypatch.setattr(find, "visits_of", at_clocks)
+    monkeypatch.setattr(find, "find_other", lambda *_: pytest.fail("the order is checked before the search"))
     with pytest.raises(MapError, match=r"before the map's last drive, by their clocks .*day=DAY"):
         merge.merge_maps(drives[0], drives[1], tmp_path / "no.avlmap")
 

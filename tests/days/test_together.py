@@ -9,10 +9,9 @@ from typing import Any
 import pytest
 
 from avlmaps.core.errors import MapError
-from avlmaps.days import together
+from avlmaps.days import merge
 from avlmaps.days.find import NotTheSamePlaceError
-from avlmaps.days.merge import merged_key
-from avlmaps.days.together import build_together
+from avlmaps.days.merge import build_together, merged_key
 from avlmaps.perception.encoders import encoders_of
 from avlmaps.query.avlmap import AVLMap
 from helpers.pool_here import Here
@@ -27,7 +26,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Give a folder where each recording has its map already."""
     folder = tmp_path_factory.mktemp("built")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(together, "merge_maps", copied)
+        patch.setattr(merge, "merge_maps", copied)
         build(folder / "all.avlmap")
     return folder / "all-recordings"
 
@@ -79,7 +78,7 @@ def test_recordings_are_merged_in_their_order_and_only_their_maps_stay(
     out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     merges = Merges()
-    monkeypatch.setattr(together, "merge_maps", merges)
+    monkeypatch.setattr(merge, "merge_maps", merges)
     made = build(out)
     assert merges.made == CHAIN and made.path == out
     assert sorted(path.name for path in (out.parent / "all-recordings").iterdir()) == [
@@ -92,17 +91,17 @@ def test_recordings_are_merged_in_their_order_and_only_their_maps_stay(
 @pytest.mark.parametrize("at", range(3))
 def test_a_run_that_was_stopped_merges_nothing_twice(out: Path, monkeypatch: pytest.MonkeyPatch, at: int) -> None:
     stopped, after = Merges(at), Merges()
-    monkeypatch.setattr(together, "merge_maps", stopped)
+    monkeypatch.setattr(merge, "merge_maps", stopped)
     with pytest.raises(KeyboardInterrupt):
         build(out)
-    monkeypatch.setattr(together, "merge_maps", after)
+    monkeypatch.setattr(merge, "merge_maps", after)
     build(out)
     assert stopped.made + after.made == CHAIN
 
 
 def test_another_place_is_refused_and_what_was_merged_stays(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     refused = NotTheSamePlaceError("This is not seen to be the same place: of 12 keyframes 1 were located.")
-    monkeypatch.setattr(together, "merge_maps", Merges(1, refused))
+    monkeypatch.setattr(merge, "merge_maps", Merges(1, refused))
     with pytest.raises(NotTheSamePlaceError, match="of 12 keyframes 1"):
         build(out)
     assert not out.exists() and (out.parent / "all-recordings" / "first-0002.avlmap" / "map.json").is_file()
@@ -110,7 +109,7 @@ def test_another_place_is_refused_and_what_was_merged_stays(out: Path, monkeypat
 
 @pytest.mark.nightly
 def test_another_map_is_replaced_only_where_one_says_so(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(together, "merge_maps", Merges())
+    monkeypatch.setattr(merge, "merge_maps", Merges())
     shutil.copytree(out.parent / "all-recordings" / "0003.avlmap", out)
     with pytest.raises(MapError, match="is a finished map already"):
         build(out)

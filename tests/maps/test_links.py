@@ -4,6 +4,7 @@ import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from threading import get_native_id
 
 import numpy as np
 import pytest
@@ -84,8 +85,9 @@ def test_a_map_may_itself_be_a_link(copied: Path, tmp_path: Path) -> None:
 
 def test_a_link_that_waits_under_a_temporary_name_is_not_written_through(tmp_path: Path, elsewhere: Path) -> None:
     before = content(elsewhere)
-    for partial in (f".voxels.{os.getpid()}.part.safetensors", f".map.json.{os.getpid()}.partial"):
-        (tmp_path / partial).symlink_to(elsewhere / "a.jpg")
+    for name in ("voxels.safetensors", "map.json"):
+        part = f".{name}.{os.getpid()}-{get_native_id()}.part{Path(name).suffix}"
+        (tmp_path / part).symlink_to(elsewhere / "a.jpg")
     write_arrays(tmp_path / "voxels.safetensors", {"rgb": np.arange(3)})
     write_bytes_atomically(tmp_path / "map.json", b"{}")
     assert content(elsewhere) == before and (tmp_path / "map.json").read_bytes() == b"{}"

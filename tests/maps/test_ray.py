@@ -18,7 +18,7 @@ import pytest
 from build_fakes import SETTINGS, content_of, open_walk, register_fakes, write_beeps
 
 from avlmaps.core.errors import AvlmapsError, BackendError, MapError
-from avlmaps.days.together import build_together
+from avlmaps.days.merge import build_together
 from avlmaps.maps.build import build_map
 from avlmaps.maps.cluster import ClusterWorkers, RayPool
 from avlmaps.perception.encoders import encoders_of

@@ -8,9 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.perception.embedded.multi_scale import AUGMENTATIONS, NEAR_M, REACH_CELLS, see_multi_scale, smoothed
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
-from avlmaps.perception.embedded.scene_network import PLAIN, Augmentation, load_network
+from avlmaps.perception.embedded.scene_network import (
+    AUGMENTATIONS,
+    NEAR_M,
+    PLAIN,
+    REACH_CELLS,
+    Augmentation,
+    load_network,
+    see_multi_scale,
+    smoothed,
+)
 from avlmaps.recordings.types import Frame
 from avlmaps_sim.render import Renderer
 from avlmaps_sim.scenes import open_scene

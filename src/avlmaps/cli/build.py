@@ -153,7 +153,7 @@ def build(verb: "Build") -> dict[str, Any]:
     resolved = build_settings(verb.rules, settings)
     with _pool(verb) as pool:
         if pool is not None and verb.more:
-            from avlmaps.days.together import build_together
+            from avlmaps.days.merge import build_together
 
             avlmap = build_together(
                 openings, verb.out, used, pool, resolved, cache=cache, allow=verb.allow, overwrite=verb.overwrite

@@ -8,19 +8,13 @@ types from here.
 import sys
 from typing import TYPE_CHECKING, Any
 
+__all__ = (
+    "Bool", "Complex64", "Float", "Float16", "Float32", "Float64",
+    "Int", "Int8", "Int32", "Int64", "UInt8", "UInt16",
+)  # fmt: skip
+
 if TYPE_CHECKING or "jaxtyping" in sys.modules:
-    from jaxtyping import Bool as Bool
-    from jaxtyping import Complex64 as Complex64
-    from jaxtyping import Float as Float
-    from jaxtyping import Float16 as Float16
-    from jaxtyping import Float32 as Float32
-    from jaxtyping import Float64 as Float64
-    from jaxtyping import Int as Int
-    from jaxtyping import Int8 as Int8
-    from jaxtyping import Int32 as Int32
-    from jaxtyping import Int64 as Int64
-    from jaxtyping import UInt8 as UInt8
-    from jaxtyping import UInt16 as UInt16
+    from jaxtyping import Bool, Complex64, Float, Float16, Float32, Float64, Int, Int8, Int32, Int64, UInt8, UInt16
 else:
 
     class Declared:

@@ -11,6 +11,7 @@ import stat
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import get_native_id
 from typing import Any, BinaryIO, TypeVar
 
 import msgspec
@@ -150,40 +151,32 @@ def sampled_digest(path: Path | str, budget_bytes: int) -> bytes:
 
 
 @contextmanager
-def replace_atomically(path: Path) -> Generator[BinaryIO]:
-    """Open a temporary file beside ``path``; on success sync it and rename it over ``path``.
+def replacing(path: Path) -> Generator[Path]:
+    """Yield the name of a new file beside one, for a library that writes by name; what it wrote then takes its place.
 
-    The folder is synced as well, so that the new name survives a power cut.
+    The new name is of this thread alone and has the same suffix. Nothing is left of it where writing fails. The folder
+    is synced, so that the name survives a power cut; the content is the writer's to sync.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    part = path.with_name(f".{path.name}.{os.getpid()}-{get_native_id()}.part{path.suffix}")
     try:
-        with open_new(partial) as stream:
-            yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-        partial.replace(path)
+        yield part
+        part.replace(path)
         sync_folder(path.parent)
     except OSError as fault:
         if fault.filename is None:  # of a full disk
             fault.filename = str(path)
         raise
     finally:
-        partial.unlink(missing_ok=True)
+        part.unlink(missing_ok=True)
 
 
 @contextmanager
-def replacing(path: Path) -> Generator[Path]:
-    """Yield the name of a new file beside one, for a library that writes by name; what it wrote then takes its place.
-
-    The new name has the same suffix. Nothing is left of it where writing fails.
-    """
-    part = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
-    try:
-        yield part
-        part.replace(path)
-        sync_folder(path.parent)
-    finally:
-        part.unlink(missing_ok=True)
+def replace_atomically(path: Path) -> Generator[BinaryIO]:
+    """Open a new file that takes the place of ``path`` on success, its content and its name synced."""
+    with replacing(path) as part, open_new(part) as stream:
+        yield stream
+        stream.flush()
+        os.fsync(stream.fileno())
 
 
 def open_new(path: Path) -> BinaryIO:

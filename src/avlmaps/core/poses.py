@@ -108,18 +108,10 @@ def from_quaternion(
     translation: Float[np.ndarray, "*n 3"], quaternion_xyzw: Float[np.ndarray, "*n 4"]
 ) -> Float[np.ndarray, "*n 4 4"]:
     """Build poses from translations (metres) and quaternions x y z w of any positive norm (0: ``ValueError``)."""
-    norm = np.linalg.norm(quaternion_xyzw, axis=-1, keepdims=True)
-    if np.any(norm == 0.0):
-        raise ValueError("a quaternion has norm 0")
-    unit = quaternion_xyzw / norm
-    x, y, z, w = np.moveaxis(unit, -1, 0)
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-    )
+    from scipy.spatial.transform import Rotation
+
     pose = np.zeros((*translation.shape[:-1], 4, 4))
-    pose[..., :3, :3] = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    pose[..., :3, :3] = Rotation.from_quat(quaternion_xyzw.reshape(-1, 4)).as_matrix().reshape(*pose.shape[:-2], 3, 3)
     pose[..., :3, 3] = translation
     pose[..., 3, 3] = 1.0
     return pose

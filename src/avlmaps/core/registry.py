@@ -120,7 +120,7 @@ def brought(entry: "EntryPoint", what: str, error: type[AvlmapsError] = BackendE
 def register(backend: Backend) -> None:
     """Add a backend for this process (a notebook's, a test's); packages use the entry point."""
     _registered[backend.kind, backend.name] = backend
-    _load.cache_clear()
+    load.cache_clear()
 
 
 def backends() -> list[Backend]:
@@ -136,19 +136,9 @@ def backends() -> list[Backend]:
     return sorted(found.values(), key=lambda b: (b.kind, b.name))
 
 
-def load(kind: Kind, name: str) -> Any:
-    """Return the backend of a name in a profile, made once in a process; ``name@model`` chooses one of several models.
-
-    Raises:
-        BackendError: there is none of that name, a package or the model that it needs is missing, it cannot be
-            imported, or it has no models to choose from.
-    """
-    return _load(kind, name)
-
-
 def forget_loaded() -> None:
     """Let go of all backends that were made; the next ``load`` makes them again (other files, another device)."""
-    _load.cache_clear()
+    load.cache_clear()
 
 
 def find(kind: Kind, name: str) -> Backend:
@@ -168,7 +158,13 @@ def find(kind: Kind, name: str) -> Backend:
 
 
 @cache
-def _load(kind: Kind, name: str) -> Any:
+def load(kind: Kind, name: str) -> Any:
+    """Return the backend of a name in a profile, made once in a process; ``name@model`` chooses one of several models.
+
+    Raises:
+        BackendError: there is none of that name, a package or the model that it needs is missing, it cannot be
+            imported, or it has no models to choose from.
+    """
     name, _, model = name.partition("@")
     backend = find(kind, name)
     if model and not backend.model:

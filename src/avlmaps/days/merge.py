@@ -1,6 +1,10 @@
-"""A map of another day becomes part of this one: found, laid on it, and what changed is known. ``merge_maps`` is it."""
+"""A map of another day becomes part of this one: found, laid on it, and what changed is known (``merge_maps``).
+
+Several recordings of one place become one map: each is built by itself, then found in the first and merged.
+"""
 
 import math
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, date, datetime, time
@@ -16,33 +20,29 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import apply, inverse, plain_point, rotation_angle_rad
+from avlmaps.core.progress import say
 from avlmaps.core.timeline import DAY_S, is_in_future
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
+from avlmaps.days import find
 from avlmaps.days import life as lives
 from avlmaps.days.evidence import THROUGH_VIEWS, Day, DayViews
-from avlmaps.days.find import (
-    clock_s,
-    features_of,
-    find_other,
-    require_another_drive,
-    thumbnail,
-    views_of,
-    visit_of_stamps,
-    visits_of,
-)
-from avlmaps.days.life import changed_things
 from avlmaps.days.surfaces import Occupied, resampled
+from avlmaps.maps.build import build_map
+from avlmaps.maps.cluster import ClusterWorkers, Pool, Reopen
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.plan import require_place
+from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.sources.find import carry_evidence
 from avlmaps.maps.store.edits import Edit, World, carried_edits, read_edits, write_edits
-from avlmaps.maps.store.folder import read, write
+from avlmaps.maps.store.folder import MANIFEST, read, write
 from avlmaps.maps.store.life import PEOPLE, Life
 from avlmaps.maps.store.manifest import Counts, MapBounds, MapInfo, RecordingInfo, RigInfo, Timings, Visit
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.tables import EDITING, key_of, lock_folder
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Voxels
+from avlmaps.perception.cache import DEFAULT_CACHE, CacheSettings
+from avlmaps.perception.encoders import Encoders
 from avlmaps.query.avlmap import AVLMap, with_findings
 from avlmaps.query.contents import Thing
 
@@ -100,19 +100,19 @@ def merge_maps(
             f"{other.path} is a map of {len(other.data.info.visits)} days; merge its recordings' maps one after the "
             f"other into {avlmap.path}, the earliest first."
         )
-    visits = _dated(visits_of(avlmap), first_day, avlmap)
-    require_another_drive(avlmap, other, visits)
+    visits = _dated(find.visits_of(avlmap), first_day, avlmap)
+    find.require_another_drive(avlmap, other, visits)
     visit = _visit(other, visits[-1], day)  # before the search, which takes long
     known = Occupied.of(np.asarray(avlmap.data.voxels.index), avlmap.data.grid)
-    (moved, checks), number = find_other(avlmap, other, known), len(visits)
+    (moved, checks), number = find.find_other(avlmap, other, known), len(visits)
     visit = msgspec.structs.replace(visit, map_from_recording=_rows(moved), checks=checks)
     visits = (*visits, visit)
     listed = things_of or default_things
     grid = avlmap.data.grid
-    before = views_of(avlmap)
+    before = find.views_of(avlmap)
     laid, *_ = resampled(np.asarray(other.data.voxels.index), grid, moved)
     now = Day(
-        views_of(other)[0].moved(moved),
+        find.views_of(other)[0].moved(moved),
         Occupied.of(np.asarray(other.data.voxels.index), grid),
         inverse(moved),
         Occupied.of(laid, grid),
@@ -180,8 +180,8 @@ def _date(said: str) -> date:
 
 
 def _visit(other: AVLMap, last: Visit, day: str) -> Visit:
-    (own,) = visits_of(other)
-    own_s, last_s = clock_s(own.recording, own.begin_s), clock_s(last.recording, last.begin_s - last.shift_s)
+    (own,) = find.visits_of(other)
+    own_s, last_s = find.clock_s(own.recording, own.begin_s), find.clock_s(last.recording, last.begin_s - last.shift_s)
     if not day and last.day and own_s is not None and last_s is not None and own_s + own.end_s - own.begin_s < last_s:
         raise MapError(
             f"{other.path} was recorded before the map's last drive, by their clocks ({_when(own_s)} and "
@@ -253,26 +253,22 @@ def _with_vanished(
     through: Bool[np.ndarray, " n"],
     visits: Sequence[Visit],
 ) -> Life:
-    things = changed_things(avlmap, ~surface, through, [*_rows_there(life, known).values()])
+    things = lives.changed_things(avlmap, ~surface, through, [*_rows_there(life, known).values()])
     stamps = np.array([float(np.max(np.asarray(avlmap.data.voxels.last_seen_s)[one.rows])) for one in things])
-    seen_on = visit_of_stamps(visits[:-1], stamps).tolist()
+    seen_on = find.visit_of_stamps(visits[:-1], stamps).tolist()
     begun = [lives.begun([_seen(one, avlmap, np.eye(4), 0.0)], on) for one, on in zip(things, seen_on, strict=True)]
     stays = [*life.stays, *(one.stays[0] for one in begun)]
     return Life.of(stays, [*(life.voxels(number) for number in range(len(life))), *(one.voxels(0) for one in begun)])
 
 
 def _unnamed_new(
-    other: AVLMap,
-    things: Sequence[Thing],
-    before: Sequence[DayViews],
-    known: Occupied,
-    moved: Float[np.ndarray, "4 4"],
+    other: AVLMap, things: Sequence[Thing], before: Sequence[DayViews], known: Occupied, moved: Float[np.ndarray, "4 4"]
 ) -> list[Thing]:
     grid = other.data.grid
     points = apply(moved, grid.centre_of(np.asarray(other.data.voxels.index)))
     index = grid.index_of(points)
     through = np.sum([views.through(index, grid) for views in before], axis=0) >= THROUGH_VIEWS
-    return changed_things(other, ~known.near(points), through, [thing.rows for thing in things])
+    return lives.changed_things(other, ~known.near(points), through, [thing.rows for thing in things])
 
 
 def _still_there(
@@ -291,12 +287,7 @@ def _still_there(
 
 
 def _manifest(
-    avlmap: AVLMap,
-    other: AVLMap,
-    content: MapData,
-    visits: tuple[Visit, ...],
-    elapsed_s: float,
-    notice: str,
+    avlmap: AVLMap, other: AVLMap, content: MapData, visits: tuple[Visit, ...], elapsed_s: float, notice: str
 ) -> MapInfo:
     info, grid = avlmap.data.info, avlmap.data.grid
     recording = RecordingInfo(
@@ -400,7 +391,7 @@ def joined_keyframes(avlmap: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 
     ]
     encoder = avlmap.encoders.place
     state = avlmap.data.place_state
-    place = [encoder.encode(thumbnail(other, row), features_of(other, row), state) for row in range(len(new))]
+    place = [encoder.encode(find.thumbnail(other, row), find.features_of(other, row), state) for row in range(len(new))]
     turned = replace(
         new,
         stamp_s=np.asarray(new.stamp_s) + shift_s,
@@ -467,3 +458,65 @@ def joined_sounds(avlmap: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 4"]
     without = np.zeros((0, width), np.float32)
     parts = [each if len(each.feature) else replace(each, feature=without) for each in (old, laid)]
     return concat(parts, clips=(*old.clips, *new.clips))
+
+
+def build_together(
+    recordings: Sequence[Reopen],
+    out: Path | str,
+    encoders: Encoders,
+    pool: Pool,
+    settings: BuildSettings = DEFAULTS,
+    *,
+    cache: CacheSettings = DEFAULT_CACHE,
+    allow: Sequence[str] = (),
+    overwrite: bool = False,
+) -> AVLMap:
+    """Build the map of several recordings of one place with the workers of a pool, or finish one that was begun.
+
+    The maps of the single recordings lie beside it, in ``NAME-recordings``: a recording more costs its own work alone.
+    Their parts are the jobs. Errors are those of ``build_map`` and ``merge_maps``; a recording of another place is
+    refused with the numbers.
+    """
+    out = user_path(out)
+    folder = out.with_name(f"{out.name.removesuffix('.avlmap')}-recordings")
+    paths = [folder / f"{number:04d}.avlmap" for number in range(1, len(recordings) + 1)]
+    for reopen, path in zip(recordings, paths, strict=True):
+        build_map(reopen(), path, encoders, settings, cache=cache, workers=ClusterWorkers(pool, reopen, cache),
+                  allow=allow, overwrite=overwrite, finds=with_findings)  # fmt: skip
+    return merge_in_turn([AVLMap.open(path) for path in paths], folder, out, overwrite=overwrite)
+
+
+def merge_in_turn(days: Sequence[AVLMap], scratch: Path, out: Path, *, overwrite: bool = False) -> AVLMap:
+    """Merge maps in their order, each found in the ones before; what a stopped run had merged is used again.
+
+    Errors as of ``merge_maps``; what was merged before stays in ``scratch``.
+    """
+    keys = [days[0].data.info.build_key]
+    for day in days[1:]:
+        keys.append(merged_key(keys[-1], day.data.info.build_key))
+    paths = [days[0].path, *(scratch / f"first-{number:04d}.avlmap" for number in range(2, len(days))), out]
+    at, merged = next(
+        (number, found)
+        for number in range(len(days) - 1, -1, -1)
+        if (found := _finished(paths[number], keys[number])) is not None
+    )
+    if at == len(days) - 1:
+        say(f"{out} is finished already, of the same recordings with the same settings; nothing to do.")
+    elif (out / MANIFEST).is_file():
+        require_place(out, overwrite)
+    for number in range(at + 1, len(days)):
+        made = merge_maps(merged, days[number], paths[number], overwrite=overwrite or number < len(days) - 1)
+        if number > 1:
+            shutil.rmtree(merged.path, ignore_errors=True)
+        merged = made
+    return merged
+
+
+def _finished(path: Path, key: str) -> AVLMap | None:
+    if not (path / MANIFEST).is_file():
+        return None
+    try:
+        found = AVLMap.open(path)
+    except MapError:
+        return None
+    return found if found.data.info.build_key == key else None

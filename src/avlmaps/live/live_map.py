@@ -23,7 +23,7 @@ from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError
 from avlmaps.core.files import lasting_path
 from avlmaps.core.machine import release_memory, share_heap
 from avlmaps.core.numbers import as_number
-from avlmaps.core.poses import rotation_angle_rad
+from avlmaps.core.poses import apply, rotation_angle_rad
 from avlmaps.core.progress import say
 from avlmaps.core.wording import option
 from avlmaps.live.pose_check import PoseCheck
@@ -83,14 +83,12 @@ class Gates:
 
 def _points(frame: Frame, farthest_m: float) -> Float[np.ndarray, "n 3"]:
     camera = frame.rig.depth
-    row = ((np.arange(_ROWS) + 0.5) * camera.height / _ROWS).astype(np.int64)
+    row = ((np.arange(_ROWS) + 0.5) * camera.height / _ROWS).astype(np.int64)[:, None]
     column = ((np.arange(_COLUMNS) + 0.5) * camera.width / _COLUMNS).astype(np.int64)
-    z = frame.depth_m[row[:, None], column].astype(np.float64)
-    x = (column + 0.5 - camera.cx) / camera.fx * z
-    y = (row[:, None] + 0.5 - camera.cy) / camera.fy * z
+    z = frame.depth_m[row, column].astype(np.float64)
+    x, y = (column + 0.5 - camera.cx) / camera.fx * z, (row + 0.5 - camera.cy) / camera.fy * z
     points = np.stack([x, y, z], axis=-1)[(z > 0.0) & (z < farthest_m)]
-    pose = np.asarray(frame.world_from_camera, np.float64)
-    return points @ pose[:3, :3].T + pose[:3, 3]
+    return apply(np.asarray(frame.world_from_camera, np.float64), points)
 
 
 # A keyframe takes as long as three frames; with gates there are half as many as in a build.
@@ -202,14 +200,7 @@ class LiveMap:
         self._behind.start()
 
     def add_frame(
-        self,
-        rgb: Any,
-        depth_m: Any,
-        camera: Any,
-        world_from_camera: Any,
-        stamp_s: Any = None,
-        *,
-        wait: bool = False,
+        self, rgb: Any, depth_m: Any, camera: Any, world_from_camera: Any, stamp_s: Any = None, *, wait: bool = False
     ) -> None:
         """Add a frame; see ``VoxelMap.add``. It returns at once, unless it is to wait.
 

@@ -163,9 +163,7 @@ class Published:
 
 
 # By the name that a profile or the registry gives them. A model that is not here is looked for by its name.
-PUBLISHED: dict[str, Published] = {
-    "eyes": Published(get="python -m training.pixels --out MODELS/eyes (docs/guides/train-eyes.md)"),
-}
+PUBLISHED = {"eyes": Published(get="python -m training.pixels --out MODELS/eyes (docs/guides/train-eyes.md)")}
 
 
 def published_models() -> dict[str, Published]:

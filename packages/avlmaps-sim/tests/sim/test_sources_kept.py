@@ -116,7 +116,7 @@ def test_sources_move_with_corrected_poses(heard: tuple[Path, Path], copy: AVLMa
 @pytest.fixture
 def another_day(monkeypatch: pytest.MonkeyPatch) -> None:
     """Take a copy of a map for one of another drive."""
-    monkeypatch.setattr("avlmaps.days.merge.require_another_drive", lambda *_: None)
+    monkeypatch.setattr("avlmaps.days.find.require_another_drive", lambda *_: None)
 
 
 @pytest.mark.usefixtures("another_day")

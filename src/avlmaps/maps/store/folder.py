@@ -116,7 +116,7 @@ CLIPS = "clips"
 _LIFE, _SUBMAPS, _STATE, _SOURCES, _FOUND = "life.", "submaps.", "state.", "sources.", "found."
 _TABLE = re.compile(rf"({'|'.join((*SECTIONS, _NAMES))})(\.2)?\.safetensors")
 _CLIP = re.compile(r"\d{6}-[0-9a-f]{16}\.\w+")
-_PARTIAL = re.compile(rf"\.({re.escape(MANIFEST)}|{'|'.join((*SECTIONS, _NAMES))})\..*(partial|part\.safetensors)")
+_PARTIAL = re.compile(rf"\.({re.escape(MANIFEST)}|{'|'.join((*SECTIONS, _NAMES))})\..*\.part(ial|\.safetensors|\.json)")
 _MOST_CLIP_BYTES = 1 << 40
 # Folders and files of a map of schema 1.
 _OLD_SECTIONS = (*SECTIONS, "life", "submaps", "sources", ".derived")
@@ -218,7 +218,7 @@ def sweep(path: Path, info: MapInfo) -> None:
     ours = [file for file in path.glob(f"*{SUFFIX}") if _TABLE.fullmatch(file.name) or file.name[0] == "."]
     ours += [file for file in (path / CLIPS).glob("*") if _CLIP.fullmatch(file.name) or file.name[0] == "."]
     ours += [file for section in _OLD_SECTIONS for file in (path / section).glob("*") if _OLD.fullmatch(file.name)]
-    ours += [*path.glob(f".{MANIFEST}.*.partial"), path / ".checked.json"]
+    ours += [*path.glob(f".{MANIFEST}.*.part*"), path / ".checked.json"]
     for file in ours:
         if file not in kept:
             with suppress(OSError):

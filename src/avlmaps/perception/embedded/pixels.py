@@ -22,6 +22,7 @@ from avlmaps.perception.embedded.scene_network import (
     load_network,
     load_pair,
     read_network,
+    see_multi_scale,
 )
 from avlmaps.perception.embedded.words import Meanings
 from avlmaps.perception.models import PUBLISHED, local_model
@@ -129,8 +130,6 @@ class EmbeddedPixels(NamedEncoder):
 
     def see_multi_scale(self, frame: Frame) -> Seen:
         """Return better probabilities of a frame by itself, ten times slower; a map gains nothing from them."""
-        from avlmaps.perception.embedded.multi_scale import see_multi_scale
-
         return see_multi_scale(self._network, frame)
 
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:

@@ -19,7 +19,7 @@ Up is the data set's. The floor is the median height of the labelled floor where
 more, else the one that ``find_ground`` estimates from the frame alone, as a build does from all frames.
 
 Frames are measured twice: seen once, as maps see each of their many frames, and at several scales and mirrored
-(``perception.embedded.multi_scale``), as single frames are best seen.
+(``see_multi_scale``), as single frames are best seen.
 """
 
 import csv
