@@ -1,8 +1,8 @@
 """What the words of a sentence claim that no reading holds: rows of `claims.toml`, read by one matcher.
 
-The networks point at names and amounts. Words between those can turn the meaning round ("leave the kitchen", "the chair
-farthest from the door"). A row says which words, of which readings, and what is done: a refusal or a question back, so
-that nothing moves on half of a sentence.
+The networks point at names and amounts. Words between those can turn the meaning round ("leave the kitchen"). A row
+says which words, of which readings, and what is done: a refusal or a question back, so that nothing moves on half of a
+sentence.
 """
 
 import re
@@ -189,7 +189,6 @@ def in_direction(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tupl
 
 
 def _sounds(name: str) -> bool:
-    """Return whether a name is that of a sound, or of what is heard."""
     words = name.split()
     known = any(lexicon().find(" ".join(words[at:]), EntryKind.SOUND) for at in range(len(words)))
     told = sounding_words() | claimed_words("ringers")

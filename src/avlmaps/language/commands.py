@@ -35,11 +35,7 @@ ON_ITS_STOREY = (
 
 
 class UnclearError(LanguageError):
-    """A command is refused, or needs an answer before the robot may drive.
-
-    Attributes:
-        choices: answers that would do; empty where any words may.
-    """
+    """A command is refused, or needs an answer: one of ``choices``, or any where there are none."""
 
     def __init__(self, message: str, choices: tuple[str, ...] = ()) -> None:
         super().__init__(message)
@@ -48,20 +44,12 @@ class UnclearError(LanguageError):
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """The meaning of a command.
+    """The meaning of a command."""
 
-    Attributes:
-        intents: what to do; one refusal or question where the robot may not drive.
-        notes: one sentence each: how words were taken, and what has no effect.
-        readings: all readings that were weighed, the likeliest first.
-        why: ``read``, ``danger``, ``stop``, ``unsure``, ``words`` where single words decide, or ``gate``
-            where the sentence may be no order.
-    """
-
-    intents: tuple[act.Intent, ...]
-    notes: tuple[str, ...]
-    readings: tuple[Weighed, ...]
-    why: str
+    intents: tuple[act.Intent, ...]  # one refusal or question where the robot may not drive
+    notes: tuple[str, ...]  # a sentence each: how words were taken, and what has no effect
+    readings: tuple[Weighed, ...]  # the likeliest first
+    why: str  # a key of `translator._WHY`
 
     @property
     def stops(self) -> act.Refuse | act.Clarify | None:
@@ -71,12 +59,9 @@ class Command:
 
 
 def read_command(text: str, given: Attachments | None = None) -> Command:
-    """Return the meaning of a command; the same command always means the same.
+    """Return the meaning of a command; what may be no order, to the robot, now, becomes a question.
 
-    What may be no order, to the robot, now, becomes a question.
-
-    Raises:
-        LanguageError: the command is empty or too long.
+    Raises LanguageError where it is empty or too long.
     """
     _check_length(text)
     branched = _branched(text, given)
@@ -148,12 +133,7 @@ def is_stop(tokens: Sequence[Token]) -> bool:
 
 
 def check_order(text: str) -> None:
-    """Refuse a sentence that is no order, or a danger, before a language model may write a program for it.
-
-    Raises:
-        UnclearError: it is one; the sentence says why or asks back.
-        LanguageError: the command is empty or too long.
-    """
+    """Raise an UnclearError for what is no order, or a danger, before a language model may write for it."""
     read = read_command(text)
     stop = read.stops
     harms = isinstance(stop, act.Refuse) and stop.reason is act.RefusalReason.HARM
@@ -246,7 +226,7 @@ def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | No
 
 
 def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed, ...]:
-    """Return the readings of a command, checked, the likeliest first; none where it has no word or too many."""
+    """Return the checked readings of a command, the likeliest first; none where it has no word or too many."""
     return tuple(weighed(read, NameResolver(sentence)) for read in reader.command(sentence.tokens))
 
 

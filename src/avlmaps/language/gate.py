@@ -30,13 +30,7 @@ _WORD = re.compile(r"[a-z]+|\d+|[^\w\s]")
 
 @dataclass(frozen=True, slots=True)
 class NoOrder:
-    """A sentence that may be no order.
-
-    Attributes:
-        kind: the kind of its row: ``cancelled``, ``postponed``, ``asked``, ``reported``, ``other`` (said to somebody
-            else), ``wished``, ``sarcastic`` or ``crossed``; ``unsure`` where the network says so.
-        answer: one sentence that says why nothing is driven.
-    """
+    """A sentence that may be no order: the kind of its row, or ``unsure``, and a sentence that says why."""
 
     kind: str
     answer: str

@@ -83,29 +83,16 @@ class RefusalReason(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One thing, sound, area, picture or clip.
-
-    Two targets that are equal are the same instance; `Pick.OTHER` is another instance of the same name.
-
-    Attributes:
-        kind: what it is.
-        name: its words as they were said, without the article; the path of a file for an image and a clip.
-        near: what it is near, in, on, or between, in the order of the words; a chain ("the lamp on the table by the
-            sofa") is made flat, since a program multiplies all heats.
-        pick: which one of several.
-        number: of that one, from 1: 2 with `Pick.NEAREST` is the second nearest.
-        at: the place of a sound or a clip that is meant; None: where it was heard, or what the settings say.
-    """
+    """One thing, sound, area, picture or clip; two that are equal are the same instance."""
 
     kind: TargetKind
-    name: str = ""
-    near: "tuple[Target, ...]" = ()
+    name: str = ""  # as said, without the article; the path of an image or a clip
+    near: "tuple[Target, ...]" = ()  # near, in, on or between what; "the lamp on the table by the sofa" is flat
     pick: Pick = Pick.ANY
-    number: int = 1
-    at: HeardAt | None = None
+    number: int = 1  # from 1: 2 with `Pick.NEAREST` is the second nearest
+    at: HeardAt | None = None  # of a sound or a clip; None: where it was heard, or what the settings say
 
     def __post_init__(self) -> None:
-        """Make chains flat."""
         if any(one.near for one in self.near):
             flat = [each for one in self.near for each in (replace(one, near=()), *one.near)]
             object.__setattr__(self, "near", tuple(dict.fromkeys(flat)))
@@ -400,12 +387,7 @@ class Ask(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Inquiry:
-    """A question to the map.
-
-    Attributes:
-        ask: what it wants to know.
-        of: the target; several are alternatives ("where can I sit?"), any of which answers it.
-    """
+    """A question to the map; of several targets ("where can I sit?") any answers it."""
 
     ask: Ask
     of: tuple[Target, ...]

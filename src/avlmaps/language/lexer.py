@@ -15,20 +15,12 @@ from avlmaps.language.word_classes import listed, table, word_list, words_of
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """A word, figure, file name or mark.
+    """A word, figure, file name or mark."""
 
-    Attributes:
-        text: lower case, clitics apart ("don't" is ``do`` and ``not``); the path of a file.
-        raw: as it was written.
-        kind: ``word``, ``number``, ``image``, ``clip`` or ``punct``.
-        start: where it begins in the sentence.
-        end: where it ends.
-    """
-
-    text: str
-    raw: str
-    kind: str
-    start: int
+    text: str  # lower case, clitics apart ("don't" is ``do`` and ``not``); the path of a file
+    raw: str  # as written
+    kind: str  # ``word``, ``number``, ``image``, ``clip`` or ``punct``
+    start: int  # among the sentence's characters
     end: int
 
 
@@ -148,7 +140,7 @@ def _pattern(name: str) -> re.Pattern[str]:
 
 
 def spelled(words: Sequence[str]) -> tuple[int, float] | None:
-    """Return of how many words the number is that some words begin with, and the number; None where none does."""
+    """Return how many words a number takes that some words begin with, and the number; None where none does."""
     found = _pattern("spelled").match(" ".join(words[:_LONGEST_NUMBER]))
     if found is None:
         return None
@@ -217,7 +209,6 @@ def _part_of_a_turn(found: re.Match[str]) -> float:
 
 
 def _turns(tokens: list[Token], at: int) -> tuple[int, float | None]:
-    """Return where an amount of turns ends that begins at a token, and how many; None where none does."""
     numbers = number_at(tokens, at) or [(at + 1, 1.0)] * (tokens[at].text in ("a", "an", "another"))
     for end, turns in sorted(numbers, reverse=True):
         while end < len(tokens) and tokens[end].text in ("full", "complete", "whole", "more", "entire"):

@@ -46,29 +46,18 @@ class Listed(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ListQuestion:
-    """A question to the lists of a map.
-
-    Attributes:
-        of: what is sought.
-        name: of the room or the thing; what is listed for ``NAMES``; words for ``ROOM_OF``, as a query has them.
-        first: the smallest room or the first sound, instead of the largest and the last.
-        counts: whether only the number is sought.
-        since: the day after which changes count, as it was said; "" for the first.
-        change: ``new``, ``gone`` or ``moved``; "" for any change.
-        how: of ``USUAL``, ``on``, ``in`` or ``near`` the name; "" where the thing of that name usually is. Of ``HEARD``
-            ``before`` or ``after`` another sound, ``in`` the room of that name; "" for a sound's times. Of ``BESIDE``
-            ``rooms`` where these are sought.
-        other: of ``HEARD``, the other sound; of ``BESIDE``, the other of two things between which all are sought.
-    """
+    """A question to the lists of a map."""
 
     of: Listed
-    name: str = ""
-    first: bool = False
-    counts: bool = False
-    since: str = ""
-    change: str = ""
+    name: str = ""  # of the room or thing; for ``NAMES`` of the list; for ``ROOM_OF`` words, as a query has them
+    first: bool = False  # the smallest or first, instead of the largest or last
+    counts: bool = False  # whether only the number is sought
+    since: str = ""  # the day after which changes count, as it was said; "" for the first
+    change: str = ""  # ``new``, ``gone`` or ``moved``; "" for any change
+    # Of ``USUAL`` ``on``, ``in`` or ``near`` the name ("": where it usually is); of ``HEARD`` ``before`` or ``after``
+    # another sound, or ``in`` the room of that name; of ``BESIDE`` ``rooms`` where these are sought.
     how: str = ""
-    other: str = ""
+    other: str = ""  # the other sound, or the other of two things between which all are sought
 
 
 _TABLE = "list_questions"
@@ -88,8 +77,7 @@ def _rows() -> Sequence[tuple[Listed, re.Pattern[str]]]:
 def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
     """Return the question to the lists that a sentence is; None where it is another one.
 
-    Raises:
-        QueryError: it asks for several sounds at once.
+    Raises a QueryError where it asks for several sounds at once.
     """
     stand = stand_ins(text, own)
     if stand.own:
@@ -102,7 +90,6 @@ def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
 
 
 def _listed(of: Listed, said: dict[str, str | None]) -> ListQuestion | None:
-    """Return the question of a row; None where it names no room or thing that a list has."""
     how = _how_of(said.get("how") or "")
     if of is Listed.CHANGES or how == "in":
         said["room"] = said.pop("place")
@@ -126,7 +113,6 @@ def _listed(of: Listed, said: dict[str, str | None]) -> ListQuestion | None:
 
 
 def _heard(said: Mapping[str, str | None]) -> ListQuestion | None:
-    """Return the question about a sound, or about the sounds of a room; None where it is about neither."""
     room = said.get("room")
     if room:
         known = lexicon().find(mended(room) or room, EntryKind.ROOM) is not None
@@ -189,10 +175,9 @@ def said_alternatives(text: str) -> tuple[str, ...]:
 
 
 def said_both(text: str) -> tuple[str, ...]:
-    """Return the questions of a sentence that asks the same of two things: "when did you hear the dog and the phone".
+    """Return the questions of a sentence that asks the same of two things; () where it names one, placed or not.
 
-    What is asked comes first, in words that name nothing; () for a sentence that names one thing, or places one by
-    others.
+    "When did you hear the dog and the phone": what is asked comes first, in words that name nothing.
     """
     words = _plain(text).replace(",", "").split()
     articles, asks_for = (frozenset(words_of(_TABLE)[name].split()) for name in ("articles", "asks_for"))

@@ -58,10 +58,7 @@ _UNSAID: Mapping[str, tuple[str, Sequence[float]]] = {
 
 
 def grammar(tokens: Sequence[Token]) -> str:
-    """Return the grammar of the programs that a model may write for a sentence.
-
-    A program ends with an empty line, behind which nothing can follow.
-    """
+    """Return the grammar of the programs that a model may write for a sentence; an empty line ends them."""
     calls = " | ".join(_call(skill) for skill in skills().values() if skill.moves)
     said = (token.text for token in tokens if token.kind in ("word", "number") and '"' not in token.text)
     words = dict.fromkeys(word for word in said if word not in _ARTICLES)
@@ -218,7 +215,6 @@ def _shown(numbers: Iterable[int]) -> str:
 
 
 def _form(text: str) -> frozenset[str]:
-    """Return the words and the pairs of words of a sentence, all names and all numbers taken as one word."""
     words = [
         "<name>" if is_known(token.text) else "<number>" if token.kind == "number" else token.text
         for token in tokenise(text)
@@ -242,30 +238,17 @@ def _weights() -> Mapping[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What a model wrote.
-
-    Attributes:
-        program: its text.
-        tokens: how many were read and written.
-    """
+    """What a model wrote, and how many tokens it read and wrote."""
 
     program: str
     tokens: tuple[int, int] = (0, 0)
 
 
 class LocalModel:
-    """A model of llama.cpp: a GGUF file, served in this process, or the address of a server that runs.
-
-    Args:
-        model: the file, or an address such as http://localhost:8080.
-    """
+    """A model of llama.cpp: a GGUF file, served in this process, or the address of a server that runs."""
 
     def __init__(self, model: str) -> None:
-        """Load the model, or take its address.
-
-        Raises:
-            BackendError: the file is missing or no GGUF, or xllamacpp is not installed.
-        """
+        """Load the model, or take its address; raises BackendError for no GGUF file and without xllamacpp."""
         self.shown = model
         self._server: Any = None
         self.url = model.rstrip("/")
@@ -282,11 +265,7 @@ class LocalModel:
             self._post("/slots/0?action=save", {"filename": state})
 
     def write(self, command: str, tokens: Sequence[Token]) -> Written:
-        """Return the program that the model writes for a command.
-
-        Raises:
-            LanguageError: it does not answer.
-        """
+        """Return the program that the model writes for a command; raises LanguageError where it does not answer."""
         said = self._post("/completion", {
             "prompt": prompt(command), "grammar": grammar(tokens), "temperature": 0.0, "n_predict": _MOST_TOKENS,
             "cache_prompt": True,
@@ -332,13 +311,7 @@ def _served(file: Path) -> Any:
 
 
 class LocalTranslator(LearnedTranslator):
-    """Translates with the reader and a language model together.
-
-    Args:
-        model: the language model.
-        given: files and words that came along.
-        choose: the number of the meaning to take where a command has several, from 1.
-    """
+    """Translates with the reader and a language model together."""
 
     name = "local"
 
@@ -347,11 +320,7 @@ class LocalTranslator(LearnedTranslator):
         self._model = model
 
     def read(self, command: str) -> Command:
-        """Return the meaning of a command; the model is asked where the reader is not sure of an order.
-
-        Raises:
-            LanguageError: the command is empty or too long, or the model does not answer.
-        """
+        """Return the meaning of a command; the model is asked where the reader is not sure of an order."""
         read = read_command(command, self.given)
         settled = is_settled(read) or (read.stops is not None and no_order(command))  # the reader asks it of all else
         return read if settled else both(read, self.proposed(command))

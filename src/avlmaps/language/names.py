@@ -66,10 +66,7 @@ def is_other_form(word: str, other: str) -> bool:
 
 @cache
 def may_name(name: str) -> bool:
-    """Return whether the head of a name is an English word that can name a thing, whether or not a map can find it.
-
-    "Hedge", "footstool", "coffee stand" and "theatre two" are; "tabel" and "frobnicator" are misspelt or no words.
-    """
+    """Return whether the head of a name is an English word that can name a thing: "footstool" is, "tabel" is not."""
     words = name.lower().split()
     while len(words) > 1 and (words[-1] in WORDS or words[-1].isdigit()):
         words.pop()
@@ -92,7 +89,6 @@ def is_place(name: str) -> bool:
 
 @cache
 def _words_of(name: str) -> frozenset[str]:
-    """Return the words of a file that `training.language.nouns` writes."""
     return frozenset(files("avlmaps.language").joinpath(f"{name}.txt").read_text(encoding="utf-8").split())
 
 
@@ -288,7 +284,6 @@ def _heard() -> dict[str, str]:
 
 
 def _neighbours(word: str) -> set[str]:
-    """Return the words that are one letter away: one more, one less, one other, or two in the other order."""
     cuts = [(word[:at], word[at:]) for at in range(len(word) + 1)]
     swapped = {before + after[1] + after[0] + after[2:] for before, after in cuts if len(after) > 1}
     lost = {before + after[1:] for before, after in cuts if after}

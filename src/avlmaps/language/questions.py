@@ -35,12 +35,7 @@ _listed = partial(word_list, _TABLE)
 
 @dataclass(frozen=True, slots=True)
 class AskedSentence:
-    """The query of a sentence.
-
-    Attributes:
-        inquiry: what is to be known, of which targets.
-        notes: one sentence each: how words were taken.
-    """
+    """The query of a sentence, and a note (one sentence) for each word that was taken for another."""
 
     inquiry: Inquiry
     notes: tuple[str, ...] = ()
@@ -52,10 +47,9 @@ class AskedSentence:
 
 
 def parse_sentence(sentence: str) -> Question:
-    """Return the question that a sentence asks; its first part is sought, the others say where it is.
+    """Return the question that a sentence asks, see `read_question`.
 
-    Raises:
-        QueryError: the sentence is empty, too long, or not understood.
+    Its first part is sought, the others say where it is.
     """
     return read_question(sentence, Attachments(knows=lambda _: True)).questions[0]
 
@@ -69,8 +63,7 @@ def question_of(target: Target) -> Question:
 def read_question(text: str, given: Attachments | None = None) -> AskedSentence:
     """Return the query of a sentence.
 
-    Raises:
-        QueryError: the sentence is empty, too long, or not understood; a name or a file is not known.
+    Raises a QueryError where it is empty, too long, or not understood, or where a name or a file is not known.
     """
     if not any(mark.isalnum() for mark in text):
         raise QueryError(f"The sentence is empty; say what is sought, such as: {_EXAMPLE}.")
@@ -98,7 +91,6 @@ def read_question(text: str, given: Attachments | None = None) -> AskedSentence:
 
 
 def _where_it_sounds(text: str) -> str:
-    """Return a question for the place of what sounds ("what is ringing?"); other questions as they are."""
     found = pattern(_TABLE, "what_sounds").match(text.lower())
     if found is None or found["verb"] in listed("silent") or found["verb"] not in sounding_forms():
         return text
@@ -120,11 +112,7 @@ def by_name(sentence: Sentence) -> AskedSentence | None:
 
 
 def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> AskedSentence:
-    """Return the query of a sentence that was read.
-
-    Raises:
-        QueryError: it is not understood; a name or a file is not known.
-    """
+    """Return the query of a sentence that was read; raises a QueryError as `read_question` does."""
     use = use_in(sentence.text)
     if pattern(_TABLE, "described").search(sentence.text.lower()):
         if use is None:
@@ -146,7 +134,6 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> A
 
 
 def _likely(reads: Sequence[Read], sentence: Sentence, limits: ReadingLimits) -> Inquiry:
-    """Return the likeliest question."""
     best = reads[0].meaning
     assert isinstance(best, Inquiry)
     alike = sum(one.probability for one in reads if isinstance(one.meaning, Inquiry) and one.meaning.of == best.of)
@@ -196,7 +183,6 @@ def _names_nothing(read: Read) -> bool:
 
 
 def _for_use(sentence: Sentence, use: str, limits: ReadingLimits) -> Inquiry:
-    """Return the question for the things that serve a purpose: "where can I sit near the window?"."""
     names = [name.strip() for name in load_word_classes().lists["uses"][use].split(",")]
     rooms = [token.text for token in sentence.tokens if lexicon().find(token.text, EntryKind.ROOM) is not None]
     near = tuple(Target(TargetKind.AREA, room) for room in rooms if room not in use)
@@ -219,7 +205,6 @@ def _place_of_use(sentence: Sentence, use: str) -> str:
 
 
 def _near(name: str, place: str, sentence: Sentence, limits: ReadingLimits) -> tuple[Target, ...]:
-    """Return what a thing should be near."""
     whole = Sentence(f"the {name} {place}", sentence.given)
     for read in learned_reader().question(whole.tokens)[:1]:
         if isinstance(read.meaning, Inquiry) and len(read.meaning.of) == 1 and read.probability >= limits.question:
@@ -235,7 +220,6 @@ def _not_near_itself(target: Target) -> Target:
 
 
 def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
-    """Return a question with names put right."""
     resolver = NameResolver(sentence)
     targets = tuple(_not_near_itself(resolver.resolve(target)) for target in inquiry.of)
     if resolver.problem is not None:

@@ -4,8 +4,7 @@ Floors are counted as in Britain: the ground floor is the lowest, number 0, and 
 map has no such storey the American count is taken, whose first floor is the lowest, and a note says so.
 
 A sound's source has one reading for questions and commands: a question is read as a whole, a command round each sound
-that it names, so that each of its parts has its own place; so have several sounds of a question that say where a thing
-is.
+that it names, so that each part has its own place.
 """
 
 import re
@@ -25,23 +24,14 @@ _words = partial(word_list, "source_words")
 
 @dataclass(frozen=True, slots=True)
 class SaidStorey:
-    """A question that names a storey.
+    """A question that names a storey."""
 
-    Attributes:
-        said: the words for it, such as ``upstairs``; ``""`` where the question is which storey something is on.
-        rest: the question without them.
-        number: of the storey, counted as in Britain; −1 is the highest. None for those above or below others.
-        above: for ``upstairs`` True, for ``downstairs`` False; None for a numbered storey.
-        isnt: whether it is excluded.
-        lists: whether all that is there is sought.
-    """
-
-    said: str
-    rest: str
-    number: int | None = None
-    above: bool | None = None
-    isnt: bool = False
-    lists: bool = False
+    said: str  # "" where the question is which storey something is on
+    rest: str  # the question without it
+    number: int | None = None  # −1 is the highest; None for those above or below others
+    above: bool | None = None  # True upstairs, False downstairs
+    isnt: bool = False  # whether it is excluded
+    lists: bool = False  # whether all that is there is sought
 
 
 def changes_storey(command: str) -> bool:
@@ -87,20 +77,15 @@ def _numbers() -> dict[str, int]:
 
 
 def _tidied(rest: str) -> str:
-    """Return what is left of a sentence: one space between words, none before a sign, no joint that joins nothing."""
     rest = re.sub(r"\s+([?.!,])", r"\1", " ".join(rest.split()))
     return re.sub(r"(?:,| and| or| but| (?:that|which) (?:is|are))+(?=[?.!]*$)", "", rest).strip(" ,")
 
 
 def asks_for_source(text: str, sound: Collection[str] = ()) -> bool:
-    """Return whether words mean the place where a sound came from.
+    """Return whether words mean the place where a sound came from; ``sound`` are those that name it, where known.
 
     "Where does the barking come from?", "what is making the noise" and "the thing that rings" do; "where you heard the
     barking", "the sound of barking" and "where you came from" do not.
-
-    Args:
-        text: the words.
-        sound: those among them that name the sound, where they are known.
     """
     text = text.lower()
     if _source("origin").search(text):
@@ -129,15 +114,10 @@ def _sounds_itself(text: str, sound: Collection[str]) -> bool:
 
 
 def seeks_source(tokens: Sequence[Token], own: Sequence[int], others: Collection[int] = ()) -> bool:
-    """Return whether a command means where the sound came from that it names by some of its words.
+    """Return whether a command means where the sound came from that its ``own`` words name; ``others`` name the rest.
 
     Only the words round the sound count, up to the next step or the next thing that is named, and what refers to it
     behind: "the dog barks, go to where it comes from".
-
-    Args:
-        tokens: the command.
-        own: the words of the sound.
-        others: the words of everything else that the command names.
     """
     if not own or tokens[own[0]].start == tokens[own[0]].end:  # a file that came along stands behind the sentence
         own = [number for number, token in enumerate(tokens) if token.text in _words("recordings")][:1]

@@ -57,26 +57,17 @@ _SIDE = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Attachments:
-    """The files and names that came along with a sentence.
+    """The files and names that came along with a sentence."""
 
-    Attributes:
-        image: the file that "this photo" means.
-        clip: the file that "this recording" means.
-        knows: says whether the map's encoder knows a word that the lexicon does not; None: only the lexicon counts.
-        at: the place of every sound; None: as the words say, else where it was heard.
-        own: names that people gave to things and rooms of the map.
-        no_sources: says why the map does not know where sounds came from; "" where it does, or no map is known yet.
-    """
-
-    image: str | None = None
-    clip: str | None = None
-    knows: Callable[[str], bool] | None = None
-    at: HeardAt | None = "robot"
+    image: str | None = None  # what "this photo" means
+    clip: str | None = None  # what "this recording" means
+    knows: Callable[[str], bool] | None = None  # whether the map's encoder knows a word
+    at: HeardAt | None = "robot"  # the place of every sound; None: as the words say, else where heard
     own: tuple[OwnName, ...] = ()
-    no_sources: Callable[[], str] = lambda: ""
+    no_sources: Callable[[], str] = lambda: ""  # why the map knows no sources; "" where it does, or no map is known yet
 
     def tokens(self, words: Iterable[str], at: int) -> list[Token]:
-        """Return the files that a sentence may speak of as tokens behind it, so that "this photo" can point to one."""
+        """Return files that a sentence may speak of as tokens behind it, so that "this photo" can point to one."""
         said = frozenset(words)
         files = (
             ("image", self.image, claimed_words("of_pictures")),
@@ -90,15 +81,7 @@ class Attachments:
 
 
 class Sentence:
-    """A tokenised sentence, with the files that came along behind it.
-
-    Attributes:
-        text: as it was written.
-        tokens: its words, numbers, files and marks.
-        given: the files and names that came along.
-        respelt: misspelt words, with what they are taken for.
-        order_notes: one sentence for each time that is read before its order.
-    """
+    """A tokenised sentence, with the files that came along behind it."""
 
     def __init__(self, text: str, given: "Attachments | None" = None) -> None:
         given = given or Attachments()
@@ -129,15 +112,10 @@ class Sentence:
 
 @dataclass(frozen=True, slots=True)
 class StandIns:
-    """A sentence with known words in the place of own names, and of things that are chosen by their order.
-
-    Attributes:
-        text: the sentence.
-        own: what each word stands for: "my charging dock", the second nearest chair.
-    """
+    """A sentence with known words in the place of own names and of things that are chosen by their order."""
 
     text: str
-    own: dict[str, Target] = field(default_factory=dict)
+    own: dict[str, Target] = field(default_factory=dict)  # what each word stands for
 
     def back(self, text: str) -> str:
         """Return words with what they stand for."""
@@ -156,11 +134,9 @@ class StandIns:
 
 
 def rewritten(text: str, *, only_robot: bool = False) -> tuple[str, list[str]]:
-    """Return a sentence with the forms of the rows rewritten, and one note for each that a person should know of.
+    """Return a sentence with the forms of the rows rewritten, and a note for each that a person should know of.
 
-    Args:
-        text: the sentence.
-        only_robot: whether only what is said of the robot is said to it.
+    With ``only_robot`` only what is said of the robot is said to it.
     """
     notes: list[str] = []
     for says, row in forms("row", text.lower(), only_robot=only_robot):
@@ -194,10 +170,7 @@ def _whatever(found: re.Match[str]) -> str:
 
 
 def forms(kind: str, text: str, *, only_robot: bool = False) -> Iterator[tuple[re.Pattern[str], Mapping[str, Any]]]:
-    """Yield the rows of a kind: ``row`` is written in another form, ``pick`` and ``condition`` are taken apart.
-
-    Rows of which no word of `has` is in the text cannot fit it, and are not compiled.
-    """
+    """Yield the rows of a kind; those of which no word of `has` is in the text cannot fit it and are not compiled."""
     for row in table("rewrites")[kind]:
         has = row.get("has", "").split()
         if (row.get("robot") or not only_robot) and (not has or any(word in text for word in has)):
@@ -237,9 +210,9 @@ def is_reserved(name: str) -> bool:
 
 
 def stand_ins(text: str, names: Sequence[OwnName], *, orders: bool = False) -> StandIns:
-    """Return a sentence with a known word for each own name in it that the lexicon does not have.
+    """Return a sentence with a known word for each own name that the lexicon does not have.
 
-    ``orders``: also for each thing that is chosen by its order ("the second nearest chair").
+    With ``orders`` also for each thing that is chosen by its order ("the second nearest chair").
     """
     out, own = text, dict[str, Target]()
 

@@ -23,20 +23,12 @@ _WHY = {
 
 @dataclass(frozen=True, slots=True)
 class Translation:
-    """A program for a command.
-
-    Attributes:
-        program: text in the robot's vocabulary, as `avlmaps.language.program` parses it.
-        notes: one sentence each, for the person who gave the command: how something was taken that could have been
-            meant in another way.
-        plan: what the robot will do, in plain words; empty where the translator does not say it.
-        chosen: whether the command has several meanings, of which one was chosen.
-    """
+    """A program for a command."""
 
     program: str
-    notes: tuple[str, ...] = ()
-    plan: str = ""
-    chosen: bool = False
+    notes: tuple[str, ...] = ()  # a sentence each: how something was taken that could have been meant in another way
+    plan: str = ""  # what the robot will do, in plain words; empty where the translator does not say it
+    chosen: bool = False  # of several meanings
 
 
 @runtime_checkable
@@ -49,39 +41,20 @@ class Translator(Protocol):
         ...
 
     def program_for(self, command: str) -> Translation:
-        """Return the program for a command.
-
-        Raises:
-            LanguageError: the command was not understood, or no usable answer came.
-        """
+        """Return the program for a command; raises LanguageError where it is not understood or no answer came."""
         ...
 
     def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
         """Return a program for what is left of a command whose program failed, or None where there is no other.
 
-        What was done stays done: the new program begins where the robot stands then.
-
-        Args:
-            command: what the person said.
-            program: the program that failed.
-            error: the sentence that says why.
-            done: the steps that were done before, over all programs of this command, one text each, such as
-                ``move_to(target="sofa")``.
-
-        Raises:
-            LanguageError: no usable answer came.
+        What was done stays done: the new program begins where the robot stands then. ``done`` are the steps before,
+        over all programs of this command, such as ``move_to(target="sofa")``.
         """
         ...
 
 
 class LearnedTranslator:
-    """Translates with the reader that ships: no download, no connection, the same program for the same command.
-
-    Attributes:
-        given: files and words that came along.
-        knows_map: whether they were given, so that no map's own names and places need be.
-        choose: the number of the meaning to take where a command has several, from 1; None asks.
-    """
+    """Translates with the reader that ships; ``choose`` is the meaning to take where a command has several, from 1."""
 
     name = "learned"
 
@@ -102,9 +75,7 @@ class LearnedTranslator:
     def program_for(self, command: str) -> Translation:
         """Return the program for a command; the same command always gives the same.
 
-        Raises:
-            UnclearError: the command is refused, or unclear; the sentence says why or asks back.
-            LanguageError: the command is empty or too long.
+        Raises an UnclearError, which says why or asks back, where it is refused or unclear.
         """
         read = self.last_read(command)
         stop, intents, number = read.stops, read.intents, self.choose or 0
@@ -122,22 +93,12 @@ class LearnedTranslator:
 
 
 def command_to_program(command: str) -> str:
-    """Return the program for a command.
-
-    Args:
-        command: what a person says, such as "go to the chair near the sound of glass breaking, then turn left".
-
-    Raises:
-        LanguageError: the command is refused, or unclear.
-    """
+    """Return the program for a command; raises LanguageError where it is refused, or unclear."""
     return LearnedTranslator().program_for(command).program
 
 
 def explanation(translator: Translator, command: str) -> list[str]:
-    """Return the readings of a command with their probabilities, a line each, and what decided.
-
-    A translator that weighs no readings has none.
-    """
+    """Return the weighed readings of a command with their probabilities, a line each, and what decided."""
     if not isinstance(translator, LearnedTranslator):
         return ["readings: this translator weighs none"]
     read = translator.last_read(command)

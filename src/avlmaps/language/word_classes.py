@@ -49,28 +49,17 @@ def pattern(name: str, word: str, flags: int = 0) -> re.Pattern[str]:
 
 @dataclass(frozen=True, slots=True)
 class WordClasses:
-    """Classes and lists of words.
+    """Classes and lists of words."""
 
-    Attributes:
-        words: the phrases of each class.
-        classes: the classes of each phrase.
-        longest: how many words the longest phrase has that begins with a word.
-        lists: words by the name of their list, separated by blanks or commas; ``uses`` is a table.
-    """
-
-    words: Mapping[str, frozenset[str]]
-    classes: Mapping[str, list[str]]
-    longest: Mapping[str, int]
-    lists: Mapping[str, Any]
+    words: Mapping[str, frozenset[str]]  # the phrases of each class
+    classes: Mapping[str, list[str]]  # of each phrase
+    longest: Mapping[str, int]  # how many words the longest phrase has that begins with a word
+    lists: Mapping[str, Any]  # by their names; ``uses`` is a table
 
 
 @cache
 def load_word_classes() -> WordClasses:
-    """Return the classes and lists that ship.
-
-    Raises:
-        ValueError: a list is malformed.
-    """
+    """Return the classes and lists that ship."""
     data = table("word_classes")
     data["words"]["GO"] += " | " + " | ".join(f for verb in data["lists"]["motion"].split() for f in forms_of(verb))
     words: dict[str, frozenset[str]] = {}
@@ -109,7 +98,6 @@ def pattern_of(text: str) -> str:
 
 
 def _phrases(pieces: Sequence[str], at: int) -> tuple[list[str], int]:
-    """Return the phrases of alternatives, and where they end."""
     found: list[str] = []
     current = [""]
     while at < len(pieces) and pieces[at] not in ("]", ")"):

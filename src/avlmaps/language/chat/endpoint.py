@@ -1,4 +1,4 @@
-"""A server of the OpenAI chat protocol, hosted or on this machine: its settings, its answers, a file that repeats them.
+"""A server of the OpenAI chat protocol: its settings, its answers, a file that repeats them.
 
 One deadline holds all attempts and each read, nothing endless is read, no redirect is followed (it would carry the
 command elsewhere), no proxy stands before this very machine, and a key appears in no message.
@@ -48,10 +48,7 @@ Messages = Sequence[Mapping[str, str]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChatSettings:
-    """Which chat model writes programs, where it is served, and within which limits.
-
-    ``from_environment`` fills what is not given from ``AVLMAPS_CHAT_MODEL``, ``AVLMAPS_CHAT_TIMEOUT_S`` and so on.
-    """
+    """Which chat model writes programs, where it is served, and within which limits."""
 
     model: str | None = None
     """Name of the model; without one, the only model that a server offers."""
@@ -87,17 +84,10 @@ class ChatSettings:
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ, **given: Any) -> "ChatSettings":
-        """Return the settings that are given, and for what is not given (or None) those of the environment.
+        """Return settings; what is not given (or None) is read from ``AVLMAPS_CHAT_MODEL`` and so on.
 
         ``OPENAI_BASE_URL`` and ``OPENAI_API_KEY`` are a pair: the key goes to that address (or the hosted one where
         none is set) and to no other; for another address there is ``AVLMAPS_CHAT_API_KEY``.
-
-        Args:
-            environment: variables by name.
-            given: fields of the settings.
-
-        Raises:
-            LanguageError: a variable does not hold what its setting needs.
         """
         chosen = {name: value for name, value in given.items() if value is not None}
         for name, kind in get_type_hints(cls, include_extras=True).items():
@@ -147,21 +137,13 @@ def _converted(name: str, text: str, kind: Any) -> Any:
 
 
 class ModelReply(msgspec.Struct, frozen=True):
-    """The answer of a model.
-
-    Attributes:
-        content: its text, empty where it gave none.
-        refusal: the sentence with which it refused, where the server marks refusals.
-        finish: why it ended: "stop", "length", "content_filter", "tool_calls", or what else the server says.
-        model: the model that answered, as the server names it.
-        tokens: how many tokens were read and written, 0 where the server does not say.
-    """
+    """The answer of a model; what it or its server leaves out is empty."""
 
     content: str
-    refusal: str | None = None
-    finish: str | None = "stop"
+    refusal: str | None = None  # where the server marks refusals
+    finish: str | None = "stop"  # "stop", "length", "content_filter", "tool_calls", or what else the server says
     model: str = ""
-    tokens: tuple[int, int] = (0, 0)
+    tokens: tuple[int, int] = (0, 0)  # read and written
 
 
 class _Exchange(msgspec.Struct):
@@ -171,19 +153,12 @@ class _Exchange(msgspec.Struct):
 
 
 class Replay:
-    """The exchanges of a file. A request is known by its messages; what was asked often is answered in that order.
+    """The exchanges of a JSONL file; neither a key nor the address of the server is in it.
 
-    Attributes:
-        path: the file; each line is one exchange. Neither a key nor the address of the server is in it.
-        recording: whether exchanges are added to it instead of read from it.
+    A request is known by its messages; what was asked often is answered in that order.
     """
 
     def __init__(self, path: Path) -> None:
-        """Open a file that is there, or begin one that is not.
-
-        Raises:
-            LanguageError: it cannot be read, or is no file of exchanges.
-        """
         self.path, self.recording = path, not path.exists()
         self._answers: dict[str, list[ModelReply]] = {}
         try:
@@ -195,11 +170,7 @@ class Replay:
             raise LanguageError(f"The replay file {path} cannot be read ({fault}); give another.") from None
 
     def answer(self, messages: Messages) -> ModelReply:
-        """Return the recorded answer to these very messages.
-
-        Raises:
-            LanguageError: they were never sent.
-        """
+        """Return the recorded answer to these very messages; raises LanguageError where they were never asked."""
         answers = self._answers.get(_fingerprint(messages), [])
         if not answers:
             raise LanguageError(
@@ -209,11 +180,7 @@ class Replay:
         return answers.pop(0) if len(answers) > 1 else answers[0]
 
     def add(self, messages: Messages, answer: ModelReply) -> None:
-        """Write one exchange at the end of the file.
-
-        Raises:
-            LanguageError: it cannot be written.
-        """
+        """Write one exchange at the end of the file."""
         line = msgspec.json.encode(_Exchange(_fingerprint(messages), messages[-1]["content"], answer))
         try:
             with self.path.open("ab") as file:
@@ -234,8 +201,6 @@ def quoted(text: str, most: int = 200) -> str:
 
 @dataclass(slots=True, eq=False)
 class _Fault(Exception):  # noqa: N818 - sentences are made of it
-    """Why no answer came: a row of the sentences, what the server says of it, and when to try again."""
-
     kind: str
     told: str = ""
     status: int = 0
@@ -278,11 +243,7 @@ class _NoRedirect(HTTPRedirectHandler):
 
 
 class Endpoint:
-    """One server. What it turned out not to take (a temperature, a seed) is left out from then on.
-
-    Attributes:
-        left_out: names of parameters that the server did not take.
-    """
+    """One server. What it turned out not to take (a temperature, a seed) is ``left_out`` from then on."""
 
     def __init__(self, settings: ChatSettings) -> None:
         if settings.hosted and not settings.api_key:
@@ -296,11 +257,7 @@ class Endpoint:
         self._opener = build_opener(_NoRedirect(), *([ProxyHandler({})] if settings.on_this_machine else []))
 
     def complete(self, model: str, messages: Messages, deadline: float | None = None) -> ModelReply:
-        """Return the model's answer to some messages, before a deadline of the monotonic clock.
-
-        Raises:
-            LanguageError: none came; one sentence says why and what to do.
-        """
+        """Return the model's answer before a deadline of the monotonic clock; raises LanguageError where none came."""
         settings = self._settings
         deadline = monotonic() + settings.timeout_s if deadline is None else deadline
         attempt = 0
@@ -325,11 +282,7 @@ class Endpoint:
             attempt += 1
 
     def model(self) -> str:
-        """Return the only model that the server offers.
-
-        Raises:
-            LanguageError: it offers several, or does not say which.
-        """
+        """Return the only model that the server offers; raises LanguageError where there is none or several."""
         offered = () if self._settings.hosted else self._models()
         if len(offered) == 1:
             return offered[0]
@@ -412,7 +365,6 @@ def _read(response: Any, deadline: float) -> bytes:
 
 
 def _reply(raw: bytes) -> ModelReply:
-    """Return the first choice of a completion; raises _Fault where it has none, or is an error after all."""
     completion = _decoded(raw, _Completion)
     if not completion.choices:
         raise _Fault("other", _message(completion.error), 200)
@@ -430,7 +382,6 @@ def _reply(raw: bytes) -> ModelReply:
 
 
 def _of_status(fault: HTTPError, deadline: float) -> _Fault:
-    """Return the fault that an HTTP error is; its message in any of the usual shapes."""
     try:
         raw = _read(fault, deadline)
     except (_Fault, OSError, HTTPException):

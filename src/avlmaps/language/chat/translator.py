@@ -1,8 +1,7 @@
 """From a command to a program by a chat model, corrected where it cannot be used or where it failed.
 
-The prompt is `prompt.md` with the skills from the one table in it. The command is data: it comes as one JSON string on
-one line, cut to a length, and the prompt says so. That helps an honest model. The interpreter, which knows nothing but
-skills, protects the robot from any other.
+The prompt is `prompt.md` with the skills in it. The command is data: it comes as one JSON string on one line, cut to a
+length, and the prompt says so. That helps an honest model. The interpreter protects the robot from any other.
 """
 
 import ast
@@ -72,19 +71,14 @@ class ChatTranslator:
     def program_for(self, command: str) -> Translation:
         """Return the program that the model writes for a command; it parses, but has not run.
 
-        Raises:
-            UnclearError: the sentence is no order, or a danger; no model is asked.
-            LanguageError: the command is empty or too long, no answer came, or none held a program.
+        Raises UnclearError before any model is asked where the sentence is no order, or a danger.
         """
         check_order(plain_command(command))
         self._command, self._rounds_used = command, 0
         return self._translated(command, _opening(command))
 
     def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
-        """Return a program for the rest of a command, see `Translator.repair`; None where no round is left.
-
-        Without the steps that were done the prompt says that all before the failing line was.
-        """
+        """Return a program for the rest of a command, see `Translator.repair`; None where no round is left."""
         if command != self._command:
             self._command, self._rounds_used = command, 0
         if self._rounds_used >= self._settings.rounds:
@@ -94,7 +88,6 @@ class ChatTranslator:
         return self._translated(command, (*_opening(command), *failed))
 
     def _translated(self, command: str, messages: tuple[Message, ...]) -> Translation:
-        """Return the program that a conversation leads to, with as many corrections as are left."""
         corrected: list[str] = []
         read = written = 0
         deadline = monotonic() + self._settings.timeout_s
@@ -152,8 +145,7 @@ def program_text(answer: ModelReply) -> str:
     """Return the program that an answer holds: its one code block, or all of it where it has no block.
 
     Raises:
-        UnusableAnswerError: it holds none, or several that differ (each may be one step of the whole); why is said so
-            that the model can do better.
+        UnusableAnswerError: it holds none, or several that differ (each may be one step of the whole).
         LanguageError: the model refused, says that the command cannot be done, or was cut off.
     """
     if answer.refusal or answer.finish == "content_filter":
@@ -193,7 +185,6 @@ def _refused(text: str) -> str:
 
 
 def _only_block(said: str) -> str | None:
-    """Return the one code block that can be Python, None where there is no block at all."""
     if one_line := _ONE_LINE.match(said):
         return one_line[2].strip()
     plain = said.replace("\r\n", "\n")
@@ -211,11 +202,7 @@ def _only_block(said: str) -> str | None:
 
 
 def check_files(program: Program, command: str) -> None:
-    """Refuse a program that loads a file which its command does not name.
-
-    Raises:
-        ProgramError: it does, or its file's name is not written out.
-    """
+    """Raise a ProgramError where a program loads a file which its command does not name, or does not write out."""
     for call in program.calls:
         if called(call) not in _LOADERS:
             continue

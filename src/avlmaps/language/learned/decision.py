@@ -52,19 +52,12 @@ _WORTH_ASKING = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Weighed:
-    """What the network reads, checked.
+    """What the network reads, checked."""
 
-    Attributes:
-        intents: what it asks for, names put right; a `Clarify` where a name or a file is not known.
-        probability: of the reading.
-        doubtful: whether a number, or a word that can turn the command round, is not part of it.
-        notes: one sentence each: how words were taken.
-    """
-
-    intents: tuple[Intent, ...]
+    intents: tuple[Intent, ...]  # a `Clarify` where a name or a file is not known
     probability: float
-    doubtful: bool = False
-    notes: tuple[str, ...] = ()
+    doubtful: bool = False  # see `is_doubtful`
+    notes: tuple[str, ...] = ()  # a sentence each: how words were taken
 
     @property
     def stops(self) -> Refuse | Clarify | None:
@@ -201,17 +194,11 @@ def _too_much(intents: Sequence[Intent]) -> Clarify | None:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What to do, and why.
+    """What to do, and why: ``read``, ``danger``, ``stop`` or ``unsure``."""
 
-    Attributes:
-        intents: what to do; one refusal or question where the robot may not drive.
-        why: ``read``, ``danger``, ``stop`` or ``unsure``.
-        notes: of the reading that counts.
-    """
-
-    intents: tuple[Intent, ...]
+    intents: tuple[Intent, ...]  # one refusal or question where the robot may not drive
     why: str
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # of the reading that counts
 
 
 def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Decision:
@@ -297,7 +284,7 @@ def is_doubtful(tokens: Sequence[Token], used: frozenset[int], *, waits: bool = 
     Args:
         tokens: the sentence.
         used: the tokens that the reading points at.
-        waits: whether the reading has a wait in it, so that the word is no "no, wait".
+        waits: whether the reading has a wait in it, so that "wait" is no "no, wait".
     """
     if any(token.text in claimed_words("turning") and not (waits and token.text == "wait") for token in tokens):
         return True

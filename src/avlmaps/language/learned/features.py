@@ -1,6 +1,4 @@
-"""What the network sees of a sentence.
-
-For each token: a vector of its meaning, its number in the vocabulary, and marks of the lexer, word classes and lexicon.
+"""What the network sees of a sentence: of each token the meaning, its number in the vocabulary, and marks.
 
 Numbers and names are seen as kinds of words ("a length begins here", "the lexicon knows this thing"), so that what is
 learnt of one holds for all.
@@ -37,19 +35,12 @@ MOST_PIECES = 12
 
 
 class Features(NamedTuple):
-    """One sentence as arrays.
+    """One sentence as arrays."""
 
-    Attributes:
-        meaning: the vector of each word, zero for marks and what has none.
-        words: the number of each word in the reader's vocabulary, 0 for the others.
-        pieces: numbers of the runs of letters of each word, filled up with 0.
-        marks: which classes begin at and hold each token.
-    """
-
-    meaning: Float32[np.ndarray, "n 128"]
-    words: Int64[np.ndarray, " n"]
-    pieces: Int64[np.ndarray, "n p"]
-    marks: Float32[np.ndarray, "n f"]
+    meaning: Float32[np.ndarray, "n 128"]  # zero for marks and words without a vector
+    words: Int64[np.ndarray, " n"]  # number in the reader's vocabulary, 0 for others
+    pieces: Int64[np.ndarray, "n p"]  # of the runs of letters, filled up with 0
+    marks: Float32[np.ndarray, "n f"]  # which classes begin at and hold a token
 
 
 def features(tokens: Sequence[Token], vocabulary: Mapping[str, int]) -> Features:
@@ -123,7 +114,6 @@ def _marked(tokens: list[Token]) -> Float32[np.ndarray, "n f"]:  # noqa: C901
 
 
 def _classes(tokens: Sequence[Token], at: int) -> list[tuple[str, int]]:
-    """Return the classes of words that begin at a token, each with where it ends."""
     book = load_word_classes()
     found: list[tuple[str, int]] = []
     phrase = ""
@@ -150,7 +140,6 @@ def _lists() -> dict[str, frozenset[str]]:
 
 @cache
 def _entries(phrase: str) -> tuple[str, ...]:
-    """Return the kinds of what a phrase names exactly."""
     book = lexicon()
     found = [str(kind) for kind in EntryKind if book.find(phrase, kind) is not None]
     if "thing" not in found and any(one in also_things() for one in (phrase, *singulars_of(phrase))):

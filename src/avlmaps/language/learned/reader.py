@@ -1,8 +1,8 @@
 """The learned reader: the network's few likeliest readings of a sentence, each with its probability.
 
-The network runs in onnxruntime on one thread. A search over a few lines at once lets each symbol be only one that the
-line may continue with (`linear.State`), so every line that ends means something. Probabilities are the network's own,
-before that: where it would rather write nonsense, its readings are unlikely.
+A search over a few lines at once lets each symbol be only one that the line may continue with (`linear.Grammar`), so
+every line that ends means something. Probabilities are the network's own, before that: where it would rather write
+nonsense, its readings are unlikely.
 """
 
 import json
@@ -33,31 +33,18 @@ _LEAST = -12.0  # lines less likely than e to this are not followed
 
 @dataclass(frozen=True, slots=True)
 class ReadingLimits:
-    """How likely a reading must be; chosen on voices that the networks were not fitted to.
+    """How likely a reading must be; chosen on voices that the networks were not fitted to."""
 
-    Attributes:
-        command: to drive.
-        doubtful: to drive where a number, a name or a word such as "not" is not part of the reading.
-        danger: a refusal for danger, to stop.
-        question: to answer a question.
-        question_doubtful: the same, where such a word is not part of the reading.
-    """
-
-    command: float = 0.7
-    doubtful: float = 0.85
-    danger: float = 0.3
-    question: float = 0.4
+    command: float = 0.7  # to drive
+    doubtful: float = 0.85  # the same, of a doubtful reading (`decision.is_doubtful`)
+    danger: float = 0.3  # a refusal for danger, to stop
+    question: float = 0.4  # to answer a question
     question_doubtful: float = 0.6
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line that the network wrote.
-
-    Attributes:
-        symbols: what it wrote.
-        log: the logarithm of its probability.
-    """
+    """A line that the network wrote, and the logarithm of its probability."""
 
     symbols: tuple[linear.Symbol, ...]
     log: float
@@ -65,19 +52,12 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Read:
-    """One reading of a sentence.
+    """One reading of a sentence."""
 
-    Attributes:
-        meaning: intents of a command; of a question the inquiry, or None where it cannot be answered.
-        probability: of all lines that mean this.
-        used: the tokens that it points at.
-        is_purpose: whether the question names no thing but what it is for ("where can I sit?").
-    """
-
-    meaning: "tuple[Intent, ...] | Inquiry | None"
-    probability: float
-    used: frozenset[int]
-    is_purpose: bool = False
+    meaning: "tuple[Intent, ...] | Inquiry | None"  # None: a question that cannot be answered
+    probability: float  # of all lines that mean this
+    used: frozenset[int]  # the tokens that it points at
+    is_purpose: bool = False  # names no thing but what it is for: "where can I sit?"
 
 
 @dataclass(slots=True)
@@ -92,11 +72,7 @@ class LearnedReader:
     """Reads sentences with the networks of a folder."""
 
     def __init__(self, folder: Traversable) -> None:
-        """Load the networks.
-
-        Raises:
-            BackendError: a file is missing, or was made for another version of the word table or the word classes.
-        """
+        """Load the networks; raises BackendError where a file is missing or was made for other inputs."""
         try:
             facts = json.loads(folder.joinpath("reader.json").read_text(encoding="utf-8"))
             graphs = [folder.joinpath(f"{name}.onnx").read_bytes() for name in ("words", "step")]
@@ -198,7 +174,6 @@ def _number(symbol: linear.Symbol) -> int:
 
 
 def _at_source(tokens: Sequence[Token], used: frozenset[int], own: Sequence[int]) -> bool:
-    """Return whether the place is meant that a sound came from which a reading names by some of its words."""
     return seeks_source(tokens, own, used - frozenset(own))
 
 
@@ -216,11 +191,6 @@ def _placeless(meaning: Any) -> Any:
 
 
 def _check(facts: dict[str, Any]) -> None:
-    """Refuse a network that was made for other inputs.
-
-    Raises:
-        BackendError: it was.
-    """
     wanted = {"symbols": list(SYMBOLS), "columns": list(columns()), "word_table": words_checksum()}
     for name, value in wanted.items():
         if facts.get(name) != value:

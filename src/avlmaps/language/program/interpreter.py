@@ -28,22 +28,12 @@ _STEPS_BETWEEN_LOOKS = 256
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One call of a skill.
-
-    Attributes:
-        skill: its name.
-        arguments: what each parameter was given, as JSON has it: text, numbers, {"place": [x, y, z]} in metres,
-            {"heat": the calls that made it}, {"picture": file} and {"clip": file}.
-        result: what it returned, shown in the same way; None where it failed.
-        line: of the program, from 1.
-        elapsed_s: how long it took.
-        error: why it failed, in one sentence; None where it did not.
-    """
+    """One call of a skill, with values as JSON has them: {"place": [x, y, z]} in metres, {"heat": "get_map(...)"}."""
 
     skill: str
     arguments: Mapping[str, Any]
-    result: Any
-    line: int
+    result: Any  # None where it failed
+    line: int  # of the program, from 1
     elapsed_s: float
     error: str | None = None
 
@@ -59,18 +49,11 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """The trace of one run of a program.
+    """The trace of one run of a program."""
 
-    Attributes:
-        steps: the skills that it called, in their order, a failed one last.
-        error: why it stopped early, in one sentence that names the line; None where it ran to its end.
-        error_type: the class of that error, such as "GoalNotFoundError" or "ProgramError".
-        elapsed_s: how long the run took.
-    """
-
-    steps: tuple[Step, ...]
-    error: str | None
-    error_type: str | None
+    steps: tuple[Step, ...]  # a failed one last
+    error: str | None  # one sentence that names the line; None where it ran to its end
+    error_type: str | None  # such as "GoalNotFoundError"
     elapsed_s: float
 
     @property
@@ -128,14 +111,8 @@ def run_program(
     """Run a program to its end, or to its first error; the trace holds the error, and what was done.
 
     Errors of the project's family that a skill raises end the program and stand in the trace. Any other exception is a
-    mistake of the vocabulary's programmer and comes through, as does the user's interrupt.
-
-    Args:
-        program: what to run.
-        vocabulary: whose skills are called.
-        budget: what the run may use up; the defaults where none is given.
-        on_step: called with each step once it is over, a failed one too.
-        clock: seconds; replaced in tests.
+    mistake of the vocabulary's programmer and comes through, as does the user's interrupt. ``on_step`` is called with
+    each step once it is over, a failed one too.
     """
     run = _Run(vocabulary, budget or Budget(), on_step or (lambda step: None), clock)
     error = error_type = None
@@ -162,8 +139,6 @@ class _LeftError(Exception):
 
 
 class _Run:
-    """One run: the values of its names, and what is left of its budget."""
-
     def __init__(
         self, vocabulary: object, budget: Budget, on_step: Callable[[Step], None], clock: Callable[[], float]
     ) -> None:

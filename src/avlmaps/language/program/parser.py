@@ -69,12 +69,7 @@ _REMEDIES = {name: remedy for names, remedy in _INSTEAD.items() for name in name
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
-    """A program that was parsed and checked.
-
-    Attributes:
-        statements: its lines and blocks, in their order: nodes of Python's own kind, all of them on the whitelist.
-        text: what was parsed.
-    """
+    """A program that was parsed and checked: nodes of Python's own kind, all of them on the whitelist."""
 
     statements: Sequence[ast.stmt]
     text: str = field(repr=False)
@@ -92,13 +87,9 @@ class Program:
 
 
 def parse_program(text: str) -> Program:
-    """Return the program that a text is, with every check that can be made before it runs.
+    """Return the program that a text is, with every check that can be made before it runs, see docs/programs.md.
 
-    Args:
-        text: lines in a small subset of Python; see docs/programs.md.
-
-    Raises:
-        ProgramError: something in it is no part of a program, or is used as it cannot be; it names the line.
+    Raises a ProgramError that names the line.
     """
     if len(text) > MOST_CHARACTERS:
         raise ProgramError(
@@ -144,11 +135,7 @@ def called(call: ast.Call) -> str:
 
 
 def given_to(skill: Skill, call: ast.Call) -> Mapping[str, ast.expr]:
-    """Return the arguments of a call by the names of their parameters.
-
-    Raises:
-        ProgramError: they do not fit the skill's signature.
-    """
+    """Return the arguments of a call by the names of their parameters."""
     named = {each.arg or "**": each.value for each in call.keywords}
     try:
         if len(named) < len(call.keywords):

@@ -45,13 +45,7 @@ class Budget:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Made:
-    """A heatmap, and how the program came by it.
-
-    Attributes:
-        heat: what the skill returned, or a product of such; programs cannot look into it.
-        how: the calls that made it, for the trace.
-        factors: how many were multiplied.
-    """
+    """A heatmap that programs cannot look into, the calls that made it, and how many were multiplied."""
 
     heat: Heat
     how: str
@@ -120,11 +114,7 @@ def needed(line: int, use: str, value: Value) -> Any:
 
 
 def combined(line: int, sign: str, left: Any, right: Any, factors: int) -> Value:
-    """Return the result of an arithmetic operator on two values; ``factors`` are the most Heats in one product.
-
-    Raises:
-        ProgramError: they are of no kinds that it takes, it divides by zero, or the result is too large.
-    """
+    """Return the result of an arithmetic operator on two values; ``factors`` are the most Heats in one product."""
     results, takes, operate = _ARITHMETIC[sign]
     kind = results.get((kind_of(left), kind_of(right)))
     if kind is None:
@@ -150,9 +140,7 @@ def combined(line: int, sign: str, left: Any, right: Any, factors: int) -> Value
 def compared(line: int, sign: str, left: Value, right: Value) -> int:
     """Return how many elements and characters a comparison goes through.
 
-    Raises:
-        ProgramError: it has no meaning for these two, or a list holds lists: one that is small and holds another many
-            times over is compared for years.
+    Refuses lists of lists: one that is small and holds another many times over is compared for years.
     """
     if sign in ("in", "not in"):
         needed(line, "in", right)
@@ -192,11 +180,7 @@ def is_among(value: Any, collection: list[Any] | tuple[Any, ...] | range) -> boo
 
 
 def call_function(line: int, function: str, arguments: list[Any]) -> Value:  # noqa: C901 - one case for each
-    """Return the result of one of the functions.
-
-    Raises:
-        ProgramError: it cannot work with these arguments.
-    """
+    """Return the result of one of the functions."""
     if function == "len":
         return len(needed(line, "len", arguments[0]))
     numbers = arguments

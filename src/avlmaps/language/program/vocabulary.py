@@ -37,13 +37,7 @@ class ValueType(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A place in the world, metres. Programs add places, subtract them, and scale them by numbers.
-
-    Attributes:
-        x: world x.
-        y: world y.
-        z: world z.
-    """
+    """A place in the world, metres. Programs add places, subtract them, and scale them by numbers."""
 
     x: float
     y: float
@@ -77,22 +71,14 @@ class Heat(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture that a program has loaded.
-
-    Attributes:
-        path: its file.
-    """
+    """The file of a picture that a program has loaded."""
 
     path: str
 
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """A recorded sound that a program has loaded.
-
-    Attributes:
-        path: its file.
-    """
+    """The file of a recorded sound that a program has loaded."""
 
     path: str
 
@@ -116,14 +102,7 @@ _TYPES: dict[Any, tuple[ValueType, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter of a skill.
-
-    Attributes:
-        name: its keyword.
-        kinds: which kinds of value it takes.
-        annotation: its type, as in the signature.
-        default: the value that it has when it is not given, as text; None where it must be given.
-    """
+    """One parameter of a skill; its default is text, None where it must be given."""
 
     name: str
     kinds: frozenset[ValueType]
@@ -133,16 +112,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Skill:
-    """One skill of the robot.
-
-    Attributes:
-        name: what programs call.
-        parameters: by their names, in their order.
-        returns: the kind of its result.
-        returns_text: the type of its result, as in the signature.
-        doc: what it does.
-        takes: its signature, without the robot.
-    """
+    """One skill of the robot: ``takes`` is its signature without the robot, ``doc`` says what it does."""
 
     name: str
     parameters: Mapping[str, Parameter]
