@@ -115,11 +115,17 @@ MISTAKES: list[tuple[str, Reason, str]] = [
     ("frames sorted as text", Reason.GEOMETRY, ""),
     ("every second pose is the one before", Reason.GEOMETRY, ""),
     ("all poses the same", Reason.GEOMETRY, "All poses are the same"),
+    ("half of the pictures BGR", Reason.COLOUR, ""),
+    ("colour camera 0.15 m above", Reason.COLOUR, ""),
+    ("colour is a drawing of the depth", Reason.COLOUR, "drawings of the depth"),
+    ("depth in cm, of which 8 bits are stored", Reason.DEPTH, ""),
+    ("camera rolled by 8 degrees, the other way", Reason.GEOMETRY, ""),
+    ("lenses as they are, by a pinhole's numbers", Reason.GEOMETRY, "wide lens"),
     ("depth cut off at 2 m", Reason.DEPTH, "exactly the largest one, 2 m"),
 ]
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("name", "reason", "said"), MISTAKES)
 def test_a_mistake_is_named(name: str, reason: Reason, said: str, right: Draft, tmp_path: Path) -> None:
     found = verdict(EVERY[name].change(right, right, np.random.default_rng(0)), tmp_path)

@@ -31,8 +31,7 @@ JUMPS = 4
 JUMP_RATIO = 4.0
 # A step of the poses this many times the usual one, and beyond this, is odd.
 _ODD_STEP, _ODD_STEP_M, _ODD_STEP_RAD = 4.0, 0.15, np.radians(8.0)
-# Red differs from blue by more than this share of the brightest of the three, or of this brightness (of 255).
-_COLOURED, _DIM = 0.15, 30.0
+_DIM = 30.0  # the least brightness, of 255, of which red less blue is a share
 # A neighbourhood whose depths differ by more is an edge, of which no point is taken.
 _SMOOTH = 0.06
 # Of a pixel and its neighbours, with a depth.
@@ -51,7 +50,7 @@ class Sample:
         world_from_camera: (f, 4, 4) poses as they are read.
         depth_m: (f, h, w) z-depth, 0 where there is none.
         grey: (f, hc, wc) brightness, 0 to 255.
-        warmth: (f,) share of pixels that are redder than blue less the share that are bluer than red.
+        hue: (f, hc, wc) red less blue, of the brightest of the three, -1 to 1.
         rig: the cameras at these sizes.
         pairs: (p, 2) rows of frames that should see the same place, the earlier first.
         follows: (p,) whether the frames of a pair follow one another; the others look at one place from apart.
@@ -63,7 +62,7 @@ class Sample:
     world_from_camera: Float[np.ndarray, "f 4 4"]
     depth_m: Float32[np.ndarray, "f h w"]
     grey: Float32[np.ndarray, "f hc wc"]
-    warmth: Float[np.ndarray, " f"]
+    hue: Float32[np.ndarray, "f hc wc"]
     rig: Rig
     pairs: Int[np.ndarray, "p 2"]
     follows: Bool[np.ndarray, " p"]
@@ -87,7 +86,7 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
     index = np.unique(pairs) if len(pairs) else np.arange(min(len(recording), 1))
     whole = recording.rig
     rig = Rig(_small(whole.rgb), _small(whole.depth), whole.rgb_from_depth)
-    seen: dict[int, tuple[np.ndarray, np.ndarray, float]] = {}
+    seen: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
     fault: RecordingError | None = None
     for number in index.tolist():
         try:
@@ -98,7 +97,7 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
         seen[number] = small_depth(frame, rig), *_colour(frame.rgb, rig.rgb)
     if not seen:
         raise fault or RecordingError(f"{recording.path} has no frame; there is nothing to check.")
-    read, (depth, grey, warmth) = np.array(list(seen)), zip(*seen.values(), strict=True)
+    read, (depth, grey, hue) = np.array(list(seen)), zip(*seen.values(), strict=True)
     kept = np.isin(pairs, read).all(axis=1)
     return Sample(
         index=read,
@@ -106,7 +105,7 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
         world_from_camera=recording.world_from_camera[read],
         depth_m=np.stack(depth),
         grey=np.stack(grey),
-        warmth=np.array(warmth),
+        hue=np.stack(hue),
         rig=rig,
         pairs=np.searchsorted(read, pairs[kept]),
         follows=follows[kept],
@@ -206,14 +205,13 @@ def _small(camera: Pinhole) -> Pinhole:
     return camera.resized(width, max(1, round(camera.height * width / camera.width)))
 
 
-def _colour(rgb: np.ndarray, camera: Pinhole) -> tuple[Float32[np.ndarray, "hs ws"], float]:
+def _colour(rgb: np.ndarray, camera: Pinhole) -> tuple[Float32[np.ndarray, "hs ws"], Float32[np.ndarray, "hs ws"]]:
     import cv2
 
     small = cv2.resize(rgb, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
     colours = small.astype(np.float32)
     hue = (colours[..., 0] - colours[..., 2]) / np.maximum(colours.max(axis=2), _DIM)
-    warmth = float((hue > _COLOURED).mean() - (hue < -_COLOURED).mean())
-    return cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32), warmth
+    return cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32), hue
 
 
 @dataclass(frozen=True, slots=True)
@@ -423,8 +421,8 @@ def _likeness(
     moved: Float[np.ndarray, "p m 3"],
     same: np.ndarray,
 ) -> tuple[float, Float[np.ndarray, " p"], int, float]:
-    one, ok_one = _looked_up(sample, rig, rows[0], points)
-    two, ok_two = _looked_up(sample, rig, rows[1], moved)
+    (u_one, v_one, ok_one), (u_two, v_two, ok_two) = in_colour(rig, points), in_colour(rig, moved)
+    one, two = sample.grey[rows[0][:, None], v_one, u_one], sample.grey[rows[1][:, None], v_two, u_two]
     used = same & ok_one & ok_two
     count = used.sum(axis=1)
     enough = count >= FEWEST_POINTS
@@ -441,16 +439,15 @@ def _likeness(
     return likeness, alike, textured, float(np.sqrt(power.sum(axis=1).min() / max(textured, 1)))
 
 
-def _looked_up(
-    sample: Sample, rig: Rig, frames: np.ndarray, points: Float[np.ndarray, "p m 3"]
-) -> tuple[np.ndarray, np.ndarray]:
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")
+def in_colour(rig: Rig, points: Float[np.ndarray, "*n 3"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the columns and rows where the colour camera sees points of the depth camera, and whether it does."""
     camera = rig.rgb
     seen = points @ rig.rgb_from_depth[:3, :3].T + rig.rgb_from_depth[:3, 3]
     u = camera.fx * seen[..., 0] / seen[..., 2] + camera.cx
     v = camera.fy * seen[..., 1] / seen[..., 2] + camera.cy
     ok = (seen[..., 2] > _LEAST_DEPTH_M) & (u >= 0.0) & (v >= 0.0) & (u < camera.width) & (v < camera.height)
-    at_u, at_v = np.where(ok, u, 0.0).astype(int), np.where(ok, v, 0.0).astype(int)
-    return sample.grey[frames[:, None], at_v, at_u].astype(np.float64), ok
+    return np.where(ok, u, 0.0).astype(int), np.where(ok, v, 0.0).astype(int), ok
 
 
 # Share of points on the surface that the other frame sees.

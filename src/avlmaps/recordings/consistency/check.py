@@ -26,6 +26,7 @@ from avlmaps.recordings.consistency.agreement import (
     Surfaces,
     compare,
     draw_sample,
+    in_colour,
     steps_between_all,
     without_occluded,
 )
@@ -347,10 +348,7 @@ def _without_colour(evidence: Evidence) -> Iterator[Said]:
     frame, at = np.nonzero(there)
     row, column = evidence.surfaces.row[frame, at], evidence.surfaces.column[frame, at]
     z = evidence.sample.depth_m[frame, row, column].astype(np.float64)
-    seen = (rig.depth.rays()[row, column] * z[:, None]) @ rig.rgb_from_depth[:3, :3].T + rig.rgb_from_depth[:3, 3]
-    ahead = seen[:, 2] > 0.01
-    at_px = rig.rgb.project(np.where(ahead[:, None], seen, 1.0))
-    share = float((ahead & ((at_px >= 0.0) & (at_px < (rig.rgb.width, rig.rgb.height))).all(axis=1)).mean())
+    share = float(in_colour(rig, rig.depth.rays()[row, column] * z[:, None])[2].mean())
     if share < _LEAST_COLOURED:
         sentence = f"The colour camera sees {share:.0%} of what the depth camera sees; the rest has no colour."
         yield Said(sentence, sure=share < _IMPOSSIBLE_COLOURED)

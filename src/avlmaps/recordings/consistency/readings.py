@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.poses import from_quaternion
 from avlmaps.recordings.consistency.agreement import (
     APART_SAME_M,
     NOTHING,
@@ -79,6 +80,8 @@ class Reading:
         centred: whether the principal point is put into the middle, with the focal length in proportion.
         turn: how pictures are turned.
         turned: which.
+        rolled_deg: by how much the camera is turned about its axis of view, in its mount.
+        k1: of the lens, whose distortion is in the pictures.
         along_ray: whether the depth is the distance along the ray.
         depth_late: by how many frames depth pictures come after what they belong to.
     """
@@ -90,6 +93,8 @@ class Reading:
     centred: bool = False
     turn: Turn = (False, 0)
     turned: tuple[str, ...] = ()
+    rolled_deg: float = 0.0
+    k1: float = 0.0
     along_ray: bool = False
     depth_late: int = 0
 
@@ -97,6 +102,8 @@ class Reading:
 AS_IT_IS = Reading()
 _SCALED = tuple(Reading(scale=scale) for scale in _SCALES)
 _FOCUSED = tuple(Reading(focal=factor) for factor in _FOCAL)
+_MOUNTED = tuple(Reading(rolled_deg=by) for by in (-8.0, -4.0, 4.0, 8.0))
+_BENT = tuple(Reading(k1=k1) for k1 in (-0.1, -0.2, -0.3))
 _SHIFTED = tuple(Reading(off_centre=at) for by in _OFF_CENTRE for at in ((by, 0.0), (0.0, by)))
 
 
@@ -153,7 +160,10 @@ class Trials:
         seen = self._pictures(replace(AS_IT_IS, **{name: getattr(reading, name) for name in _OF_PICTURES}))
         if rig is None or pose is None or seen is None:
             return Trial(reading, NOTHING, NOTHING, 0.0)
-        (sample, surfaces), pose, median_m = seen, reread_poses(pose, given), self.median_m * reading.scale
+        half_rad = np.radians(reading.rolled_deg) / 2.0
+        rolled = from_quaternion(np.zeros((1, 3)), np.array([[0.0, 0.0, np.sin(half_rad), np.cos(half_rad)]]))
+        (sample, surfaces), pose = seen, reread_poses(pose, given) @ rolled
+        median_m = self.median_m * reading.scale
         after, apart = (
             compare(sample.only(kind), surfaces, pose, rig, reading.scale, floor * median_m, colour=colour)
             for kind, floor in ((sample.follows, _FLOOR_SHARE), (~sample.follows, _APART_FLOOR_SHARE))
@@ -191,6 +201,9 @@ class Trials:
             depth_m = (depth_m / np.linalg.norm(self.sample.rig.depth.rays(), axis=2)).astype(np.float32)
         if "colour" in reading.turned:
             grey = _turned(grey, reading.turn)
+        if reading.k1:
+            depth_m = _straightened(depth_m, self.sample.rig.depth, reading.k1)
+            grey = _straightened(grey, self.sample.rig.rgb, reading.k1)
         return replace(self.sample, depth_m=depth_m, grey=grey), Surfaces.of(depth_m, _POINTS)
 
     def _score(self, after: Agreement, apart: Agreement) -> float:
@@ -201,7 +214,15 @@ class Trials:
         return score
 
 
-_OF_PICTURES = ("turn", "turned", "along_ray", "depth_late")
+_OF_PICTURES = ("turn", "turned", "k1", "along_ray", "depth_late")
+
+
+def _straightened(pictures: Float[np.ndarray, "f h w"], camera: Pinhole, k1: float) -> Float[np.ndarray, "f h w"]:
+    rays = camera.rays()
+    rays[..., :2] *= 1.0 + k1 * (rays[..., :2] ** 2).sum(axis=2, keepdims=True)
+    column, row = np.moveaxis(np.floor(camera.project(rays)).astype(int), 2, 0)
+    inside = (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
+    return np.where(inside, pictures[:, row * inside, column * inside], np.float32(0.0))
 
 
 def _turned(pictures: Float[np.ndarray, "f h w"], turn: Turn) -> Float[np.ndarray, "f h w"]:
@@ -246,7 +267,7 @@ def find_closer(trials: Trials) -> Trial | None:
     as_it_is = trials.run(AS_IT_IS, colour=False)
     if not LEAST_OFF < as_it_is.off < float("inf"):
         return None
-    readings = (*_SCALED, *_delays(trials.pace_s), *_FOCUSED, *_SHIFTED)
+    readings = (*_SCALED, *_delays(trials.pace_s), *_FOCUSED, *_SHIFTED, *_MOUNTED, *_BENT)
     tried = (trials.run(reading, colour=False) for reading in readings)
     closer = [trial for trial in tried if _is_less_off(trial, as_it_is)]
     if not closer:
@@ -324,7 +345,7 @@ def _single(trials: Trials) -> Iterator[Reading]:
     yield from (*_SCALED, Reading(centred=True), *_FOCUSED)
     yield from _delays(trials.pace_s)
     yield from (Reading(Corrections(camera_axes=axes)) for axes in all_axes() if axes not in NAMED.values())
-    yield Reading(along_ray=True)
+    yield from (Reading(along_ray=True), *_MOUNTED, *_BENT)
     for turned in (("colour",), ("depth",), ("colour", "depth")):
         yield from (Reading(turn=turn, turned=turned) for turn in TURNS)
 
@@ -349,6 +370,8 @@ def _refined(trials: Trials, best: Trial) -> Trial:
     elif any(reading.off_centre):
         at_x, at_y = reading.off_centre
         tried = [replace(reading, off_centre=(at_x + x, at_y + y)) for x, y in product(_BESIDE_CENTRE, repeat=2)]
+    elif reading.rolled_deg:
+        tried = [replace(reading, rolled_deg=reading.rolled_deg + by) for by in (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)]
     found = [best, *(trial for trial in map(trials.run, tried) if trial.score >= best.score - _CLEARLY)]
     least = min(found, key=lambda trial: trial.off)
     # a usual unit rather than one beside it that fits hardly better
@@ -414,6 +437,16 @@ def _told(reading: Reading, rig: Rig, median_m: float) -> Iterator[tuple[str, st
         parts = zip(reading.off_centre, (rig.rgb.width, rig.rgb.height), "xy", strict=True)
         by = " and ".join(f"{share * size:+.0f} pixels in {axis}" for share, size, axis in parts if share)
         yield f"the principal point looks {by} off, or the camera turned by as many in its mount", ""
+    yield from _told_of_pictures(reading)
+
+
+def _told_of_pictures(reading: Reading) -> Iterator[tuple[str, str]]:
+    if by := reading.rolled_deg:
+        mounted = f"the camera looks turned by {abs(by):.0f} degrees about its axis of view in its mount"
+        yield mounted, "correct the transform from what the poses are of to the camera"
+    if reading.k1:
+        lens = f"the pictures look taken through a wide lens (k1 about {reading.k1:.2g})"
+        yield lens, "take its distortion out of the colour and the depth pictures, and give the camera of the new ones"
     if late := reading.depth_late:
         by_hand = f"pair each frame with the depth picture {abs(late)} {'later' if late > 0 else 'earlier'}"
         yield f"the depth pictures look {abs(late)} frame(s) {_late(late)}", by_hand
