@@ -16,7 +16,7 @@ from build_fakes import SETTINGS, Pixels, Walk, content_of, open_walk, register_
 from avlmaps.core.errors import AvlmapsError, BackendError, MapError, RecordingError
 from avlmaps.maps import cluster
 from avlmaps.maps.build import build_map
-from avlmaps.maps.cluster import ClusterWorkers, Pool
+from avlmaps.maps.cluster import Pool, cluster_workers
 from avlmaps.perception.encoders import Encoders
 from helpers.pool_here import Here
 
@@ -49,7 +49,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory, audio: Path) -> dict[str, by
 
 
 def build(path: Path, pool: Pool, audio: Path | None = None) -> dict[str, bytes]:
-    workers = ClusterWorkers(pool, partial(open_walk, audio))
+    workers = cluster_workers(pool, partial(open_walk, audio))
     build_map(open_walk(audio), path, PROFILE, SETTINGS, workers=workers, progress=False)
     return content_of(path)
 
@@ -86,7 +86,7 @@ def test_a_build_whose_head_dies_resumes_to_the_same_map(tmp_path: Path, audio: 
 
 def test_too_many_frames_that_cannot_be_read_stop_a_spread_build_as_they_stop_one_alone(tmp_path: Path) -> None:
     bad = (3, 4, 9, 13, 17, 18)
-    for number, workers in enumerate((None, ClusterWorkers(Here(), partial(open_walk, bad=bad)))):
+    for number, workers in enumerate((None, cluster_workers(Here(), partial(open_walk, bad=bad)))):
         with pytest.raises(RecordingError, match=" of 22 frames cannot be read, more than the 4"):
             build_map(
                 open_walk(bad=bad), tmp_path / f"{number}", PROFILE, SETTINGS, workers=workers, progress=False
@@ -120,7 +120,7 @@ def test_an_encoder_that_is_an_object_cannot_travel(tmp_path: Path) -> None:
         def encode_words(self, words: Sequence[str]) -> np.ndarray:
             return np.zeros((len(words), 4), np.float32)
 
-    workers = ClusterWorkers(Here(), open_walk)
+    workers = cluster_workers(Here(), open_walk)
     with pytest.raises(BackendError, match="register it as a backend that they can import"):
         build_map(
             open_walk(), tmp_path / "map", Encoders.named(PROFILE, pixels=Mine()), SETTINGS, workers=workers,

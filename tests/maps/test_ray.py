@@ -20,7 +20,7 @@ from build_fakes import SETTINGS, content_of, open_walk, register_fakes, write_b
 from avlmaps.core.errors import AvlmapsError, BackendError, MapError
 from avlmaps.days.merge import build_together
 from avlmaps.maps.build import build_map
-from avlmaps.maps.cluster import ClusterWorkers, RayPool
+from avlmaps.maps.cluster import RayPool, cluster_workers
 from avlmaps.perception.encoders import encoders_of
 from avlmaps.query.avlmap import with_findings
 
@@ -57,7 +57,7 @@ def pool() -> Iterator[RayPool]:
 
 
 def build(path: Path, pool: RayPool, audio: Path, slow_s: float = 0.0) -> dict[str, bytes]:
-    workers = ClusterWorkers(pool, partial(open_walk, audio, slow_s=slow_s))
+    workers = cluster_workers(pool, partial(open_walk, audio, slow_s=slow_s))
     build_map(open_walk(audio), path, PROFILE, SETTINGS, workers=workers, progress=False, finds=with_findings)
     return content_of(path)
 

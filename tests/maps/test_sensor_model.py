@@ -46,7 +46,8 @@ def room(noise_per_m, seed=0):
 def kept(depth, sensor):
     out = np.empty_like(depth, np.float32)
     slope = np.tan(np.deg2rad(sensor.steepest_deg))
-    drop_flying(depth.astype(np.float32), (slope / CAMERA.fx, slope / CAMERA.fy), sensor.noise, sensor.edge_sigmas, out)
+    steps, noise = (slope / CAMERA.fx, slope / CAMERA.fy), (sensor.noise_m, sensor.noise_per_m)
+    drop_flying(depth.astype(np.float32), steps, noise, sensor.edge_sigmas, out)
     return out
 
 

@@ -111,7 +111,7 @@ class Build(Building):
 def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
     from avlmaps.maps.build import build_map
-    from avlmaps.maps.cluster import ClusterWorkers
+    from avlmaps.maps.cluster import cluster_workers
     from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.perception.cache import CacheSettings
     from avlmaps.query.avlmap import AVLMap, with_findings
@@ -165,7 +165,7 @@ def build(verb: "Build") -> dict[str, Any]:
                 used,
                 resolved,
                 cache=cache,
-                workers=None if pool is None else ClusterWorkers(pool, openings[0], cache),
+                workers=None if pool is None else cluster_workers(pool, openings[0], cache),
                 allow=verb.allow,
                 resume=not verb.fresh,
                 overwrite=verb.overwrite,

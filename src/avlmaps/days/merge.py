@@ -29,7 +29,7 @@ from avlmaps.days import life as lives
 from avlmaps.days.evidence import THROUGH_VIEWS, Day, DayViews
 from avlmaps.days.surfaces import Occupied, resampled
 from avlmaps.maps.build import build_map
-from avlmaps.maps.cluster import ClusterWorkers, Pool, Reopen
+from avlmaps.maps.cluster import Pool, Reopen, cluster_workers
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.plan import require_place
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
@@ -481,7 +481,7 @@ def build_together(
     folder = out.with_name(f"{out.name.removesuffix('.avlmap')}-recordings")
     paths = [folder / f"{number:04d}.avlmap" for number in range(1, len(recordings) + 1)]
     for reopen, path in zip(recordings, paths, strict=True):
-        build_map(reopen(), path, encoders, settings, cache=cache, workers=ClusterWorkers(pool, reopen, cache),
+        build_map(reopen(), path, encoders, settings, cache=cache, workers=cluster_workers(pool, reopen, cache),
                   allow=allow, overwrite=overwrite, finds=with_findings)  # fmt: skip
     return merge_in_turn([AVLMap.open(path) for path in paths], folder, out, overwrite=overwrite)
 

@@ -1,11 +1,10 @@
 """From a recording to a map: a ``Mapper`` takes its frames, and what each stretch of them brings is stored."""
 
-from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import Protocol
 
 import numpy as np
 
@@ -36,12 +35,8 @@ _MOST_HELD = 4  # frames in memory for each that is encoded
 EncodedFrame = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
 
 
-class Workers(Protocol):
-    """Who maps stretches of a recording: a cluster."""
-
-    def map_spans(self, plan: BuildPlan, start: Start, jobs: dict[Path, Span]) -> Iterator[Path]:
-        """Store what each stretch of frames brings in its file (``map_span``); yield each that is done."""
-        ...
+Workers = Callable[[BuildPlan, Start, dict[Path, Span]], Iterator[Path]]
+"""Stores what each stretch of frames brings in its file (``map_span``), and yields each that is done: a cluster."""
 
 
 def build_map(
@@ -125,7 +120,7 @@ def _map_frames(plan: BuildPlan, start: Start, workers: Workers | None) -> None:
     if not jobs:
         return
     if workers is not None:
-        ended = workers.map_spans(plan, start, jobs)
+        ended = workers(plan, start, jobs)
         for file in progress(ended, "fusing", total=total, done=done, size=lambda at: len(range(*jobs[at]))):
             for one in bad_frames(file, plan.key) or ():
                 tolerance.meet(one)

@@ -28,7 +28,7 @@ from avlmaps.core.machine import is_loopback, usable_cores
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import flag
-from avlmaps.maps.build import map_span, spans_of_frames
+from avlmaps.maps.build import Workers, map_span, spans_of_frames
 from avlmaps.maps.estimate import Start
 from avlmaps.maps.plan import BuildPlan, Span, make_plan
 from avlmaps.maps.settings import BuildSettings
@@ -241,30 +241,26 @@ class SpanJob:
     software: str
 
 
-class ClusterWorkers:
-    """Gives a build's stretches of frames to a pool of workers; see ``build.Workers``."""
+def cluster_workers(pool: Pool, reopen: Reopen, cache: CacheSettings = DEFAULT_CACHE) -> Workers:
+    """Return who gives a build's stretches of frames to a pool; ``reopen`` opens the recording there as it was here.
 
-    def __init__(self, pool: Pool, reopen: Reopen, cache: CacheSettings = DEFAULT_CACHE) -> None:
-        """Use a pool; ``reopen`` opens the recording on a worker, as it was opened here."""
-        self._pool, self._reopen, self._cache = pool, reopen, cache
+    ``MapError``: a worker sees another recording or map, runs another avlmaps, or dies again and again.
+    ``BackendError``: it has other weights, or lacks a model.
+    """
 
-    def map_spans(self, plan: BuildPlan, start: Start, jobs: dict[Path, Span]) -> Iterator[Path]:
-        """Let each stretch be mapped by a worker.
-
-        Raises:
-            MapError: a worker sees another recording or map, runs another avlmaps, or dies again and again.
-            BackendError: it has other weights, or lacks a model.
-        """
-        models, path, known = Models.of(plan.encoders, self._cache), plan.path.absolute(), software()
+    def map_spans(plan: BuildPlan, start: Start, jobs: dict[Path, Span]) -> Iterator[Path]:
+        models, path, known = Models.of(plan.encoders, cache), plan.path.absolute(), software()
         orders = [
-            SpanJob(self._reopen, path, models, plan.settings, start, span, file.absolute(), plan.key, known)
+            SpanJob(reopen, path, models, plan.settings, start, span, file.absolute(), plan.key, known)
             for file, span in jobs.items()
         ]
-        with closing(self._pool.run(span_job, orders)) as done:
+        with closing(pool.run(span_job, orders)) as done:
             for number, _ in done:
                 if not orders[number].file.is_file():
                     raise unseen("A worker", path)
                 yield list(jobs)[number]
+
+    return map_spans
 
 
 def span_job(job: SpanJob) -> None:

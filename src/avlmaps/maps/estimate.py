@@ -1,7 +1,6 @@
 """What some frames show before all are fused: what is doubtful, up, the floor, and the depth camera's error."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -13,7 +12,7 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.fusion.sensor import FRAMES, MODELS, SensorModel, measure_noise, nearest_model
-from avlmaps.maps.gravity import Expected, find_ground, find_up, some_frames, up_doubts
+from avlmaps.maps.gravity import Expected, find_ground, find_up, spread_frames, up_doubts
 from avlmaps.maps.plan import strip_folder
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.sources.wiring import check_wiring
@@ -24,7 +23,7 @@ from avlmaps.recordings.consistency.check import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.consistency.suspicions import examine_recording
 from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.plausible import pace_fault, plausible_walk
-from avlmaps.recordings.types import Frame, Ground, Recording
+from avlmaps.recordings.types import Ground, Recording
 
 
 def doubts_of(recording: Recording, allowed: Sequence[str]) -> tuple[str, ...]:
@@ -59,10 +58,9 @@ def judge(recording: Recording, useless: Sequence[str] | None = None, *, closely
     verdict = examine_recording(recording) if closely else check_recording(recording)
     if verdict.refused(()) is not None:  # with such poses nothing is level
         return verdict
-    tilted = up_doubts(recording, some_frames(recording), np.random.default_rng(0))
     array = _array_of(recording)
     wired = [] if array is None else _of_microphones(array, recording.walk, useless)
-    findings = (*verdict.findings, *tilted, *wired)
+    findings = (*verdict.findings, *up_doubts(recording), *wired)
     return replace(verdict, findings=findings, unchecked=verdict.unchecked if not findings else ())
 
 
@@ -159,18 +157,6 @@ def estimate_up(recording: Recording, settings: BuildSettings) -> UpInfo:
         held = -recording.world_from_camera[:, :3, 1].mean(axis=0)
         return UpInfo.of(held if np.linalg.norm(held) > 0.01 else np.array([0.0, 0.0, 1.0]), "camera", 0.0)
     return UpInfo.of(up.direction, "planes", float(up.support))
-
-
-def spread(recording: Recording, count: int) -> list[int]:
-    """Return the numbers of frames evenly spread over the recording."""
-    return np.unique(np.linspace(0, len(recording) - 1, count).round().astype(int)).tolist()
-
-
-def spread_frames(recording: Recording, count: int) -> Iterator[Frame]:
-    """Read frames evenly spread over the recording; fusing reports what cannot be read."""
-    for index in spread(recording, count):
-        with suppress(RecordingError):
-            yield recording.frame(int(index))
 
 
 def estimate_ground(recording: Recording, settings: BuildSettings, up: UpInfo) -> tuple[Ground, GroundInfo]:

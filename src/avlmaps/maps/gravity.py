@@ -12,6 +12,7 @@ is a hypothesis, too. Each piece of evidence is a sum in nats; a softmax over th
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -116,7 +117,7 @@ def _refined(direction: Float[np.ndarray, "3"], normals: Float[np.ndarray, "n 3"
     return direction / np.linalg.norm(direction)
 
 
-_FRAMES = 16
+_FRAMES = 16  # that show whether a given direction is right
 # Given and found directions closer than this are one; beside it, a slope or a tilted sensor explains the difference.
 _APART_DEG = 20.0
 # Planes count where so large a share of the surface agrees and the camera was held within this angle of them.
@@ -125,7 +126,7 @@ _LEAST_SUPPORT, _HELD_DEG = 0.1, 40.0
 _FLATTER, _STILL_M = 0.5, 0.15
 
 
-def up_doubts(recording: Recording, frames: Iterator[Frame], rng: np.random.Generator) -> tuple[Finding, ...]:
+def up_doubts(recording: Recording) -> tuple[Finding, ...]:
     """Return a finding where the up direction of a recording is not that of what it shows, or nothing.
 
     A camera that is mounted on its side shows walls where floors are expected; then the walk decides: nobody walks
@@ -135,7 +136,7 @@ def up_doubts(recording: Recording, frames: Iterator[Frame], rng: np.random.Gene
     if given is None:
         return ()
     try:
-        found = find_up(frames, rng)
+        found = find_up(spread_frames(recording, _FRAMES), np.random.default_rng(0))
     except RecordingError:  # too little smooth surface
         return ()
     held = -recording.world_from_camera[:, :3, 1].mean(axis=0)
@@ -155,13 +156,11 @@ def up_doubts(recording: Recording, frames: Iterator[Frame], rng: np.random.Gene
     return (Finding(Reason.UP, Grade.SUSPICIOUS, sentence, f"Give {up}, or fix the poses."),)
 
 
-def some_frames(recording: Recording) -> Iterator[Frame]:
-    """Read a few frames, evenly spread; those that cannot be read are left out."""
-    for index in np.unique(np.linspace(0, len(recording) - 1, _FRAMES).round().astype(int)).tolist():
-        try:
+def spread_frames(recording: Recording, count: int) -> Iterator[Frame]:
+    """Read frames evenly spread over the recording; those that cannot be read are left out."""
+    for index in np.unique(np.linspace(0, len(recording) - 1, count).round().astype(int)).tolist():
+        with suppress(RecordingError):
             yield recording.frame(index)
-        except RecordingError:
-            continue
 
 
 def _words(up: Float[np.ndarray, "3"]) -> str:

@@ -39,7 +39,8 @@ class KeyframeChooser(Generic[T]):
     """Takes frames in the order of time, and holds one at most.
 
     Where the camera goes beyond the limits since the last keyframe, the frame beyond half of them that moved least
-    becomes the next one, because a camera that moves less blurs less.
+    becomes the next one, because a camera that moves less blurs less. So each frame lies within the limits of one of
+    the two keyframes before it.
     """
 
     def __init__(self, settings: KeyframeSettings) -> None:
@@ -47,7 +48,6 @@ class KeyframeChooser(Generic[T]):
         self._last: _Seen[T] | None = None  # the last keyframe
         self._before: _Seen[T] | None = None  # the last frame
         self._best: tuple[float, _Seen[T]] | None = None  # its speed, and the frame that may become a keyframe
-        self._after: list[_Seen[None]] = []  # frames since that one
 
     def add(self, item: T, stamp_s: float, pose: Float[np.ndarray, "4 4"]) -> Iterator[T]:
         """Take a frame, and yield those that are now known to be keyframes."""
@@ -59,22 +59,13 @@ class KeyframeChooser(Generic[T]):
             return
         moved_m, turned_rad, gap_s = _motion(before, seen)
         speed = (turned_rad + moved_m / _FAR_M) / max(gap_s, 1e-9)
-        share = self._share(seen)
-        if share > 0.5 and (self._best is None or speed < self._best[0]):
-            self._best, self._after = (speed, seen), []
-        if share <= 1.0 or self._best is None:
-            self._after.append(_Seen(None, stamp_s, pose))
-            return
-        best, self._best = self._best[1], None
-        turned_back = any(self._share(one, best) > 1.0 for one in self._after)
-        self._last, self._after = seen if turned_back else best, []
-        yield self._last.item
-        share = self._share(seen)
-        if share > 1.0:
-            self._last = seen
-            yield item
-        elif share > 0.5:
-            self._best = speed, seen
+        while (share := self._share(self._last, seen)) > 0.5:
+            if self._best is None or speed < self._best[0]:
+                self._best = speed, seen
+            if share <= 1.0:
+                return
+            self._last, self._best = self._best[1], None
+            yield self._last.item
 
     def end(self) -> Iterator[T]:
         """Yield the last frame, unless it is a keyframe already."""
@@ -82,10 +73,8 @@ class KeyframeChooser(Generic[T]):
             self._last, self._best = self._before, None
             yield self._before.item
 
-    def _share(self, seen: "_Seen[Any]", since: "_Seen[Any] | None" = None) -> float:
-        begin = since or self._last
-        assert begin is not None
-        return max(value / limit for value, limit in zip(_motion(begin, seen), self._limits, strict=True))
+    def _share(self, since: _Seen[T], seen: _Seen[T]) -> float:
+        return max(value / limit for value, limit in zip(_motion(since, seen), self._limits, strict=True))
 
 
 def _motion(one: _Seen[Any], other: _Seen[Any]) -> tuple[float, float, float]:

@@ -18,7 +18,7 @@ from avlmaps.maps.store.tables import SUFFIX, key_of
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.types import LARGEST_BUDGET_BYTES, Recording
 
-BUILD_VERSION = 7  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
+BUILD_VERSION = 8  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
 
 Span = tuple[int, int, int]  # (first, last + 1, step) of frames
 

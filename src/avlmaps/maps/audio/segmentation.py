@@ -12,7 +12,7 @@ wholly unlike what is round it becomes a stretch of its own, and what is half un
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -43,18 +43,13 @@ class Segment:
         return self.offset_s - self.onset_s
 
 
-@dataclass(frozen=True, slots=True)
-class _Run:
-    """Frames (or samples) ``begin`` to ``end`` that are sound."""
-
-    begin: int
-    end: int
+_Run = tuple[int, int]  # the first frame (or sample) that is sound, and the one after the last
 
 
 def segment(track: AudioTrack, settings: SegmentationSettings = _USUAL) -> list[Segment]:
     """Find the sounds in a track: disjoint segments in the order of time; none for a silent track."""
     if settings.method == "silence":
-        return _padded(list(_loud_runs(track, settings)), settings, 1.0 / track.rate_hz, track)
+        return _padded(_loud_runs(track, settings), settings, 1.0 / track.rate_hz, track)
     powers, step_s = band_powers(track.blocks(_BLOCK_S)), hop_samples(track.rate_hz) / track.rate_hz
     floor = find_noise_floor(powers, track.rate_hz, settings.background_window_s, settings.range_db)
     if floor.loudest <= 0.0:
@@ -62,7 +57,9 @@ def segment(track: AudioTrack, settings: SegmentationSettings = _USUAL) -> list[
     parts = np.array_split(powers, range(_AT_ONCE, len(powers), _AT_ONCE))
     over = (part / floor.at(number * _AT_ONCE, len(part)) for number, part in enumerate(parts))
     excess = np.concatenate([part.mean(axis=1) for part in over])
-    return _padded(list(_merged(_runs(excess, settings, step_s), settings, step_s)), settings, step_s, track)
+    gap, longest = (limit_s / step_s + 1e-6 for limit_s in (settings.merge_gap_s, settings.max_length_s))
+    runs = _merged(_runs(excess, settings, step_s), gap, longest)
+    return _padded(runs, settings, step_s, track)
 
 
 def _runs(excess: Float32[np.ndarray, " frames"], settings: SegmentationSettings, step_s: float) -> Iterator[_Run]:
@@ -81,52 +78,43 @@ def _runs(excess: Float32[np.ndarray, " frames"], settings: SegmentationSettings
                 run = excess[first:last]
                 audible = max(release, float(run.max()) * 10.0 ** (-settings.tail_db / 10.0))
                 loud = np.flatnonzero(run > audible)
-                yield _Run(first + int(loud[0]), first + int(loud[-1]) + 1)
+                yield first + int(loud[0]), first + int(loud[-1]) + 1
 
 
-def _merged(runs: Iterable[_Run], settings: SegmentationSettings, step_s: float) -> Iterator[_Run]:
-    last: _Run | None = None
-    for run in runs:
-        near = last is not None and (run.begin - last.end) * step_s <= settings.merge_gap_s
-        if last is not None and near and (run.end - last.begin) * step_s <= settings.max_length_s:
-            last = replace(last, end=run.end)
+def _merged(runs: Iterable[_Run], gap: float, longest: float) -> list[_Run]:
+    merged: list[_Run] = []
+    for begin, end in runs:
+        if merged and begin - merged[-1][1] <= gap and end - merged[-1][0] <= longest:
+            merged[-1] = merged[-1][0], end
         else:
-            if last is not None:
-                yield last
-            last = run
-    if last is not None:
-        yield last
+            merged.append((begin, end))
+    return merged
 
 
 def _loud_runs(track: AudioTrack, settings: SegmentationSettings) -> Iterator[_Run]:
     gap, longest = round(settings.silence_s * track.rate_hz), int(settings.max_length_s * track.rate_hz)
-    begin = end = at = 0
+    pieces: list[_Run] = []
+    at = 0
     for block in track.blocks(_BLOCK_S):
         loud = at + np.flatnonzero(np.abs(block.samples) > settings.silence_threshold)
         at += len(block.samples)
-        if not len(loud):
-            continue
-        breaks = np.flatnonzero(np.diff(loud) >= gap)
-        for first, last in zip(loud[np.append(0, breaks + 1)], loud[np.append(breaks, len(loud) - 1)], strict=True):
-            if end > begin and first - end >= gap:
-                yield _Run(begin, end)
-                begin = end = 0
-            begin, end = (begin if end > begin else int(first)), int(last) + 1
-            while end - begin > longest:
-                yield _Run(begin, begin + longest)
-                begin += longest
-    if end > begin:
-        yield _Run(begin, end)
+        if len(loud):
+            breaks = np.flatnonzero(np.diff(loud) >= gap)
+            first, last = loud[np.append(0, breaks + 1)], loud[np.append(breaks, len(loud) - 1)] + 1
+            pieces += zip(first.tolist(), last.tolist(), strict=True)
+    for begin, end in _merged(pieces, gap - 1, np.inf):
+        cuts = range(begin, end, longest)
+        yield from zip(cuts, [*cuts[1:], end], strict=True)
 
 
-def _padded(runs: list[_Run], settings: SegmentationSettings, step_s: float, track: AudioTrack) -> list[Segment]:
-    runs = [run for run in runs if (run.end - run.begin) * step_s >= settings.min_length_s]
+def _padded(runs: Iterable[_Run], settings: SegmentationSettings, step_s: float, track: AudioTrack) -> list[Segment]:
+    kept = [run for run in runs if (run[1] - run[0]) * step_s >= settings.min_length_s]
     segments: list[Segment] = []
-    for i, run in enumerate(runs):
-        earliest = (runs[i - 1].end + run.begin) / 2.0 * step_s if i else 0.0
-        latest = (run.end + runs[i + 1].begin) / 2.0 * step_s if i + 1 < len(runs) else track.duration_s
-        onset_s = max(run.begin * step_s - settings.padding_s, earliest)
-        offset_s = min(run.end * step_s + settings.padding_s, latest, track.duration_s)
+    for i, (begin, end) in enumerate(kept):
+        earliest = (kept[i - 1][1] + begin) / 2.0 * step_s if i else 0.0
+        latest = (end + kept[i + 1][0]) / 2.0 * step_s if i + 1 < len(kept) else track.duration_s
+        onset_s = max(begin * step_s - settings.padding_s, earliest)
+        offset_s = min(end * step_s + settings.padding_s, latest, track.duration_s)
         segments.append(Segment(track.start_s + onset_s, track.start_s + offset_s))
     return segments
 

@@ -200,7 +200,7 @@ class VoxelAccumulator(VoxelTable):
         kept = np.empty_like(depth)
         slope = np.tan(np.deg2rad(sensor.steepest_deg))
         steps = slope / camera.fx, slope / camera.fy
-        kernels.drop_flying(depth, steps, sensor.noise, sensor.edge_sigmas, kept)
+        kernels.drop_flying(depth, steps, (sensor.noise_m, sensor.noise_per_m), sensor.edge_sigmas, kept)
         return kept
 
     def _cells(self, features: np.ndarray | None) -> tuple[Float32[np.ndarray, "cells d"], tuple[int, int]]:

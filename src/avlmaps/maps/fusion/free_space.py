@@ -55,7 +55,7 @@ def free_views(frames: Sequence[Frame], sensor: SensorModel) -> FreeViews:
 def clear_blocks(depth_m: Float32[np.ndarray, "h w"], size: int, sensor: SensorModel) -> UInt16[np.ndarray, "r c"]:
     """Return how far every ray of each block of pixels is free, millimetres rounded down; 0 where one has no depth."""
     z = np.asarray(depth_m, np.float64)
-    free = np.where(z > 0.0, (z - sensor.clear_sigmas * (sensor.noise_m + sensor.noise_per_m * z * z)) * 1000.0, 0.0)
+    free = np.where(z > 0.0, (z - sensor.clear_sigmas * sensor.sigma_m(z)) * 1000.0, 0.0)
     rows, columns = -(-z.shape[0] // size), -(-z.shape[1] // size)
     spare = (0, rows * size - z.shape[0]), (0, columns * size - z.shape[1])
     whole = np.pad(free, spare, constant_values=_FARTHEST_MM).reshape(rows, size, columns, size)

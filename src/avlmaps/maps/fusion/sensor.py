@@ -12,7 +12,7 @@ of the depth: σ(z) = noise_m + noise_per_m · z².
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -57,13 +57,8 @@ class SensorModel:
         if self.steepest_deg > 90.0:
             raise MapError(f"steepest_deg is {self.steepest_deg}; choose an angle up to 90 degrees.")
 
-    @property
-    def noise(self) -> tuple[float, float]:
-        """σ at 0 m and its growth with the square of the depth, as the kernels take them."""
-        return self.noise_m, self.noise_per_m
-
-    def sigma_m(self, depth_m: float) -> float:
-        """Return the standard deviation of a depth, metres."""
+    def sigma_m(self, depth_m: Any) -> Any:
+        """Return the standard deviation of a depth or of many, metres."""
         return self.noise_m + self.noise_per_m * depth_m * depth_m
 
     def farthest_m(self, voxel_size_m: float) -> float:
