@@ -50,26 +50,16 @@ Messages = Sequence[Mapping[str, str]]
 class ChatSettings:
     """Which chat model writes programs, where it is served, and within which limits."""
 
-    model: str | None = None
-    """Name of the model; without one, the only model that a server offers."""
-    base_url: str = HOSTED_URL
-    """Address of the API; that of a server on the same machine ends in /v1 mostly."""
-    api_key: str | None = field(default=None, repr=False)
-    """The key; servers on the same machine mostly need none. Better set in the environment than on a command line."""
-    timeout_s: Annotated[float, Meta(gt=0, le=86400)] = 120.0
-    """Seconds to wait for the program of one command, with all attempts and corrections."""
-    retries: Annotated[int, Meta(ge=0, le=10)] = 2
-    """How often a request is sent again where the server is busy, fails, or breaks off."""
-    rounds: Annotated[int, Meta(ge=0, le=10)] = 2
-    """How often the model may correct a program that cannot be used or that failed while it ran."""
-    temperature: Annotated[float, Meta(ge=0, le=2)] | None = 0.0
-    """How freely the model chooses its words; none: as the server likes."""
-    max_tokens: Annotated[int, Meta(ge=1)] = 2048
-    """Most tokens of an answer, with what a reasoning model thinks."""
+    model: str | None = None  # None: the only one that the server offers
+    base_url: str = HOSTED_URL  # of the API; that of a server on the same machine mostly ends in /v1
+    api_key: str | None = field(default=None, repr=False)  # servers on the same machine mostly need none
+    timeout_s: Annotated[float, Meta(gt=0, le=86400)] = 120.0  # for one command, with all attempts and corrections
+    retries: Annotated[int, Meta(ge=0, le=10)] = 2  # of a request where the server is busy, fails, or breaks off
+    rounds: Annotated[int, Meta(ge=0, le=10)] = 2  # of corrections to a program that cannot be used or that failed
+    temperature: Annotated[float, Meta(ge=0, le=2)] | None = 0.0  # None: as the server likes, as for ``seed``
+    max_tokens: Annotated[int, Meta(ge=1)] = 2048  # of an answer, with what a reasoning model thinks
     seed: int | None = 0
-    """Seed of the model's choices; none: as the server likes."""
-    replay: Path | None = None
-    """A JSONL file: written with every exchange where it is missing, else read instead of calling the model."""
+    replay: Path | None = None  # JSONL: written with every exchange where it is missing, else read instead of asking
 
     def __post_init__(self) -> None:
         if not self._is_address():

@@ -9,15 +9,6 @@ from avlmaps.language.program.values import Budget
 from avlmaps.language.program.vocabulary import ROBOT, Parameter, Skill, skill_lines, skills
 
 __all__ = [
-    "ROBOT",
-    "Budget",
-    "Parameter",
-    "Program",
-    "Skill",
-    "Step",
-    "Trace",
-    "parse_program",
-    "run_program",
-    "skill_lines",
+    "ROBOT", "Budget", "Parameter", "Program", "Skill", "Step", "Trace", "parse_program", "run_program", "skill_lines",
     "skills",
-]
+]  # fmt: skip

@@ -7,18 +7,8 @@ from time import monotonic
 from typing import Any
 
 from avlmaps.core.errors import AvlmapsError, ProgramError, SeveralFitError
-from avlmaps.language.program import values
-from avlmaps.language.program.parser import (
-    SIGNS,
-    Program,
-    branches_of,
-    called,
-    check_arguments,
-    given_to,
-    grown,
-    misfit,
-    target_names,
-)
+from avlmaps.language.program import parser, values
+from avlmaps.language.program.parser import SIGNS, Program, called
 from avlmaps.language.program.values import Budget, Value, refused
 from avlmaps.language.program.vocabulary import ValueType, skills
 
@@ -191,12 +181,12 @@ class _Run:
                 before, value = self.name(node.lineno, name), self.value(node.value)
                 sign = SIGNS[type(node.op)]
                 if sign == "+" and values.kind_of(before) is values.kind_of(value) is ValueType.LIST:
-                    raise grown(node.lineno, name)
+                    raise parser.grown(node.lineno, name)
                 self.names[name] = self.arithmetic(node.lineno, sign, before, value)
             case ast.Expr():
                 self.value(node.value)
             case ast.If():
-                chosen, otherwise = branches_of(node)
+                chosen, otherwise = parser.branches_of(node)
                 self.block(next((each.body for each in chosen if self.truth(each.test)), otherwise))
             case ast.For():
                 self.loop(node)
@@ -214,13 +204,13 @@ class _Run:
                     return
 
     def give(self, target: ast.expr, value: Any) -> None:
-        names = target_names(target)
+        names = parser.target_names(target)
         if isinstance(target, ast.Name):
             value = [value]
         else:
             values.needed(target.lineno, "unpack", value)
         if len(value) != len(names):
-            raise misfit(target.lineno, len(names), len(value))
+            raise parser.misfit(target.lineno, len(names), len(value))
         self.names.update(zip(names, value, strict=True))
 
     # ---- expressions
@@ -312,8 +302,8 @@ class _Run:
     def skill_call(self, node: ast.Call) -> Value:
         """Call a skill, the one place where a program reaches anything."""
         line, skill = node.lineno, skills()[called(node)]
-        arguments = {name: self.value(each) for name, each in given_to(skill, node).items()}
-        check_arguments(line, skill, {name: values.kind_of(value) for name, value in arguments.items()})
+        arguments = {name: self.value(each) for name, each in parser.given_to(skill, node).items()}
+        parser.check_arguments(line, skill, {name: values.kind_of(value) for name, value in arguments.items()})
         self.look_at_clock(line)
         if len(self.steps) == self.budget.skill_calls:
             raise refused(
