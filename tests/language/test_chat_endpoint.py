@@ -297,30 +297,13 @@ def test_the_defaults_are_the_hosted_service_and_choices_that_repeat() -> None:
 
 
 def test_every_setting_can_come_from_the_environment() -> None:
-    environment = {
-        "AVLMAPS_CHAT_MODEL": " qwen ",
-        "AVLMAPS_CHAT_BASE_URL": "http://localhost:11434/v1",
-        "AVLMAPS_CHAT_API_KEY": "key",
-        "AVLMAPS_CHAT_TIMEOUT_S": "7.5",
-        "AVLMAPS_CHAT_RETRIES": "1",
-        "AVLMAPS_CHAT_ROUNDS": "0",
-        "AVLMAPS_CHAT_TEMPERATURE": "None",
-        "AVLMAPS_CHAT_MAX_TOKENS": "64",
-        "AVLMAPS_CHAT_SEED": "none",
-        "AVLMAPS_CHAT_REPLAY": "chat.jsonl",
-    }
+    url, texts = "http://localhost:11434/v1", {"timeout_s": "7.5", "retries": "1", "rounds": "0", "max_tokens": "64"}
+    texts |= {"model": " qwen ", "base_url": url, "api_key": "key", "temperature": "None", "seed": "none"}
+    environment = {f"AVLMAPS_CHAT_{name.upper()}": text for name, text in (texts | {"replay": "chat.jsonl"}).items()}
     assert ChatSettings.from_environment(environment) == ChatSettings(
-        model="qwen",
-        base_url="http://localhost:11434/v1",
-        api_key="key",
-        timeout_s=7.5,
-        retries=1,
-        rounds=0,
-        temperature=None,
-        max_tokens=64,
-        seed=None,
-        replay=Path("chat.jsonl"),
-    )
+        model="qwen", base_url=url, api_key="key", timeout_s=7.5, retries=1, rounds=0, temperature=None, max_tokens=64,
+        seed=None, replay=Path("chat.jsonl"),
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
