@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from avlmaps.core.question import Modality, Part, Question, Role
     from avlmaps.live.live_map import LiveMap
     from avlmaps.live.status import LiveSettings
+    from avlmaps.maps.obstacles import BodyShape
     from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
-    from avlmaps.navigate.bodies import BodyShape
     from avlmaps.navigate.skills import Robot, RobotSettings
     from avlmaps.perception.encoders import Encoders, profile
     from avlmaps.query.answer import Answer
@@ -67,8 +67,8 @@ _HOMES = {
         "core.question": "Modality Part Question Role",
         "live.live_map": "LiveMap",
         "live.status": "LiveSettings",
+        "maps.obstacles": "BodyShape",
         "maps.settings": "BuildSettings FrameSettings FusionSettings",
-        "navigate.bodies": "BodyShape",
         "navigate.skills": "Robot RobotSettings",
         "perception.encoders": "Encoders profile",
         "query.answer": "Answer",

@@ -180,7 +180,7 @@ def test_a_signal_after_the_program_does_not_say_that_no_goal_was_sent(
 
     robot: Any = Robot()
     monkeypatch.setattr("avlmaps.navigate.instruct.instruct", lambda *_, **__: None)
-    monkeypatch.setattr("avlmaps.navigate.rehearsal.unfound", lambda *_, **__: None)
+    monkeypatch.setattr("avlmaps.navigate.instruct.unfound", lambda *_, **__: None)
     nothing: Any = None
     with pytest.raises(Interrupted) as stopped:
         drive(Go(map=Path("room.avlmap"), sentence="turn left"), nothing, robot, nothing, nothing)

@@ -9,8 +9,7 @@ import numpy as np
 
 from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import Obstacles
-from avlmaps.navigate.bodies import BASE
-from avlmaps.navigate.costmap import obstacles_for
+from avlmaps.navigate.costmap import BASE, obstacles_for
 from avlmaps.navigate.driver import Arrival
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.drive.app import DriveService

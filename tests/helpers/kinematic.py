@@ -10,7 +10,7 @@ from avlmaps.core.motion import Action, GroundPose
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.footprint import Outline
-from avlmaps.navigate.instances import Destination
+from avlmaps.navigate.grounding import Destination
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.voxel_space import Space
 

@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError, QueryError
-from avlmaps.maps.obstacles import CellState, Obstacles
-from avlmaps.navigate.bodies import BASE, DRONE, SHAPES, BodyShape
-from avlmaps.navigate.costmap import costmap_of, obstacles_for
+from avlmaps.maps.obstacles import BodyShape, CellState, Obstacles
+from avlmaps.navigate.costmap import BASE, DRONE, SHAPES, costmap_of, obstacles_for
 
 CELL_M = 0.05
 

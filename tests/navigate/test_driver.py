@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 
 from avlmaps.core import poses
 from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, wrap_angle
-from avlmaps.maps.obstacles import CellState, Obstacles
-from avlmaps.navigate.bodies import BodyShape
+from avlmaps.maps.obstacles import BodyShape, CellState, Obstacles
 from avlmaps.navigate.controller import bearing
 from avlmaps.navigate.driver import TOLERANCE_M, Driver, MapDriver
-from avlmaps.navigate.rehearsal import FreeBody
+from avlmaps.navigate.instruct import FreeBody
 from avlmaps_sim.body import Building, MotionNoise, SimulatedBody
 from avlmaps_sim.scenes import open_scene
 from helpers.floors import hall, seen

@@ -18,7 +18,7 @@ from avlmaps.language.program.vocabulary import Picture, Place
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.file_access import Readable, named_files, offered_by
 from avlmaps.navigate.footprint import Outline, middle_between
-from avlmaps.navigate.instances import Destination, nearest
+from avlmaps.navigate.grounding import Destination, nearest
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.voxel_space import Space
 from helpers.kinematic import KinematicDriver

@@ -14,15 +14,13 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.obstacles import CellState
 from avlmaps.maps.storeys import find_storeys
 from avlmaps.maps.types import Voxels
-from avlmaps.navigate.bodies import BASE, WALKER
-from avlmaps.navigate.costmap import obstacles_for, storey_of_walk
+from avlmaps.navigate.costmap import BASE, WALKER, obstacles_for, storey_of_walk
 from avlmaps.navigate.driver import MapDriver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
-from avlmaps.navigate.grounding import Seeker
-from avlmaps.navigate.instances import Destination
+from avlmaps.navigate.grounding import Destination, Seeker
+from avlmaps.navigate.instruct import FreeBody
 from avlmaps.navigate.paths import PathFinder
-from avlmaps.navigate.rehearsal import FreeBody
 from avlmaps.navigate.skills import Robot
 from avlmaps.query.factors import NearThings
 from avlmaps.query.heatmap import Heatmap

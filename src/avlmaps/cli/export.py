@@ -122,7 +122,7 @@ def _require_new(paths: "list[Path]", overwrite: bool) -> None:
 
 
 def _write_grids(verb: Export, opened: "AVLMap") -> dict[str, Any]:
-    from avlmaps.navigate.bodies import BodyShape
+    from avlmaps.maps.obstacles import BodyShape
     from avlmaps.navigate.costmap import obstacles_for
     from avlmaps.query.export import write_occupancy
 

@@ -124,7 +124,6 @@ def go(verb: "Go") -> dict[str, Any]:
         translator = translator_for(verb, avlmap)
         # A sentence that is not understood fails here, before a scene is made.
         translation = _read(verb, translator)
-        verb = numbers_left(verb, translation)
         if verb.dry_run or avlmap is None:
             return plan_answer(verb, translation, avlmap)
         return drive(verb, avlmap, robot_of(verb, avlmap, start), translator, translation)
@@ -139,11 +138,6 @@ def _read(verb: "Go", translator: "Translator") -> "Translation":
             say(line)
     translation = translator.program_for(verb.sentence)
     return replace(translation, notes=(*translation.notes, *_idle(verb, translation.program)))
-
-
-def numbers_left(verb: "Go", translation: "Translation") -> "Go":
-    """Return the verb with the numbers of --choose that choose a thing: the first may have chosen a meaning."""
-    return replace(verb, choose=verb.choose[1:]) if translation.chosen else verb
 
 
 def _idle(verb: "Go", program: str) -> list[str]:
@@ -161,22 +155,19 @@ def _idle(verb: "Go", program: str) -> list[str]:
 
 def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None") -> dict[str, Any]:
     """Return the answer for a command that is read and not obeyed, with what a drive would report of its map."""
-    notes, choices, error, error_type = translation.notes, (), None, None
-    if avlmap is not None:
-        from avlmaps.core.motion import GroundPose
-        from avlmaps.navigate.rehearsal import consulted
+    from avlmaps.core.motion import GroundPose
+    from avlmaps.navigate.instruct import InstantDriver, Outcome, rehearse
 
-        told = consulted(verb.sentence, translation, avlmap, GroundPose(0.0, 0.0), robot_settings(verb))
-        notes, choices = told.notes, told.choices
-        if told.error is not None and told.error_type != ProgramError.__name__:
-            notes, error, error_type = (*notes, told.error), told.error, told.error_type
-    return {
-        "plan": translation.plan,
-        "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": error is None,
-        "error": error, "error_type": error_type, "notes": list(dict.fromkeys(notes)),
-        "choices": list(choices), "path_m": 0.0, "elapsed_s": 0.0, "frame": "recording",
-        "missing": None if error is None or error_type is None else error_answer(kind_named(error_type), error),
-    }  # fmt: skip
+    told = Outcome(verb.sentence, (translation.program,), translation.notes, (), (), None, None, 0.0)
+    if avlmap is not None:
+        driver, settings = InstantDriver(avlmap, GroundPose(0.0, 0.0)), robot_settings(verb, translation)
+        told = rehearse(verb.sentence, translation, avlmap, driver, settings=settings, readable=None)
+        told = replace(told, done=(), moves=(), elapsed_s=0.0)
+    if told.error_type == ProgramError.__name__:  # it may depend on what a drive finds out
+        told = replace(told, error=None, error_type=None)
+    missing = None if told.error is None else error_answer(kind_named(told.error_type or ""), told.error)
+    notes = [*told.notes, *([] if told.error is None else [told.error])]
+    return {"plan": translation.plan, **told.to_json(), "notes": list(dict.fromkeys(notes)), "missing": missing}
 
 
 def drive(
@@ -196,11 +187,11 @@ def drive(
         answer = {**outcome.to_json(), **unconfirmed}
         if verb.plot is None:
             return answer
-        from avlmaps.navigate.bodies import SHAPES
-        from avlmaps.navigate.costmap import obstacles_for
+        from avlmaps.navigate.costmap import SHAPES, obstacles_for
         from avlmaps.navigate.trace_plot import plot_path
 
-        obstacles, touched = obstacles_for(avlmap, SHAPES[verb.body]), getattr(robot, "touched", None)
+        obstacles = getattr(robot, "obstacles", None) or obstacles_for(avlmap, SHAPES[verb.body])
+        touched = getattr(robot, "touched", None)
         plot_path(verb.plot, avlmap.space, start, outcome.moves, obstacles, touched, f"“{verb.sentence}”")
         return {**answer, "plot": str(verb.plot)}
     except Interrupted as stop:  # also after the program: goals were sent, and the robot is not watched any more
@@ -211,11 +202,10 @@ def drive(
 def _obeyed(
     verb: "Go", avlmap: "AVLMap", robot: "RobotDriver", translator: "Translator", translation: "Translation"
 ) -> "Outcome":
-    from avlmaps.navigate.instruct import instruct
+    from avlmaps.navigate.instruct import instruct, unfound
     from avlmaps.navigate.interrupts import Interrupted
-    from avlmaps.navigate.rehearsal import unfound
 
-    settings, heats = robot_settings(verb), dict[tuple[object, ...], "Heatmap"]()
+    settings, heats = robot_settings(verb, translation), dict[tuple[object, ...], "Heatmap"]()
     try:
         if verb.language != "chat":  # a chat model's program may decide while it drives
             missing = unfound(verb.sentence, translation, avlmap, robot.pose, settings, heats)
@@ -236,11 +226,12 @@ def _obeyed(
         robot.close()
 
 
-def robot_settings(verb: "Go") -> "RobotSettings":
+def robot_settings(verb: "Go", translation: "Translation") -> "RobotSettings":
     """Return how the robot takes its skills."""
+    from avlmaps.navigate.instruct import settings_after
     from avlmaps.navigate.skills import RobotSettings
 
-    return RobotSettings(guess=verb.guess, choose=verb.choose)
+    return settings_after(translation, RobotSettings(guess=verb.guess, choose=verb.choose))
 
 
 def _choice(verb: "Go", asked: "Outcome") -> int:
@@ -295,8 +286,7 @@ def read_start(words: str | None) -> "GroundPose | None":
 
 def robot_of(verb: "Go", avlmap: "AVLMap", start: "GroundPose | None") -> "RobotDriver":
     """Connect to a real robot, or put a simulated one into the scene that was mapped."""
-    from avlmaps.navigate.bodies import SHAPES
-    from avlmaps.navigate.costmap import obstacles_for
+    from avlmaps.navigate.costmap import SHAPES, obstacles_for
     from avlmaps.navigate.robots import find_robot, open_robot_scene
 
     if verb.robot == "simulated":

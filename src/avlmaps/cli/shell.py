@@ -207,7 +207,6 @@ class ShellSession:
         avlmap = self.opened
         translator = going.translator_for(command, avlmap)
         translation = translator.program_for(command.sentence)
-        command = going.numbers_left(command, translation)
         plan = going.plan_answer(command, translation, avlmap)
         self._unchosen = (line, rest, choose) if plan["choices"] else None
         if going.failure(plan) is not None:

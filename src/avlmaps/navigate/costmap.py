@@ -6,8 +6,10 @@ is stored beside the map and never in it.
 Everything is in the level frame. A grid's cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_size_m``.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import atan2, cos, sin
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import cv2
@@ -16,14 +18,21 @@ from jaxtyping import Bool, Float, Float32, Float64, Int
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.motion import GroundPose
-from avlmaps.maps.obstacles import MIN_HITS, CellState, Obstacles, find_obstacles, floor_height
+from avlmaps.maps.obstacles import MIN_HITS, BodyShape, CellState, Obstacles, find_obstacles, floor_height
 from avlmaps.maps.storeys import said_storeys
-from avlmaps.navigate.bodies import BASE, BodyShape
 from avlmaps.query.contents import require_known
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
 
+BASE = BodyShape()
+"""A wheeled base of the size of those in homes, with a camera on a mast."""
+DRONE = BodyShape(radius_m=0.25, height_m=1.6, flies_m=1.0, ignores=("table",))
+"""A small drone at the height of a person's chest: it flies over tables, and what is called a table stops it not."""
+WALKER = BodyShape(radius_m=0.25, height_m=1.8, step_m=0.2, climbs=True)
+"""A person or a legged robot: it takes stairs."""
+SHAPES: Mapping[str, BodyShape] = MappingProxyType({"base": BASE, "drone": DRONE})
+"""The shapes by name."""
 _LOST_M = 0.002  # a movement must fall short by this to show where it was stopped
 _WIDER_RAD = (0.0, 0.5, -0.5, 1.0, -1.0)  # how far beside the likeliest point it looks for one that can be
 _FAR_CELLS = 2.0**40  # farther off no grid reaches

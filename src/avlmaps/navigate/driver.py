@@ -13,13 +13,11 @@ from jaxtyping import Float
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, wrap_angle
 from avlmaps.core.printable import printable
-from avlmaps.maps.obstacles import Obstacles
-from avlmaps.navigate.bodies import BASE, Body, BodyShape
+from avlmaps.maps.obstacles import BodyShape, Obstacles
 from avlmaps.navigate.controller import ActionController, StallDetector, bearing, turns_for
-from avlmaps.navigate.costmap import ContactMap, costmap_of
-from avlmaps.navigate.grids import rooms
+from avlmaps.navigate.costmap import BASE, ContactMap, costmap_of
 from avlmaps.navigate.interrupts import Halt
-from avlmaps.navigate.planner import ESCAPE_M, Planner, Stop
+from avlmaps.navigate.planner import ESCAPE_M, Planner, Stop, rooms
 
 _SAMPLE_M = 0.02  # places along a straight move that are looked at
 _STILL_RAD = 0.01  # smaller turns may not show
@@ -36,6 +34,27 @@ TOLERANCE_M = 0.15
 """A robot has arrived when it stands no farther from where it is to stop."""
 _MOST_PLANS, _MOST_MOVEMENTS = 40, 5_000  # after which it gives up a place; each contact takes a plan
 T = TypeVar("T")
+
+
+@runtime_checkable
+class Body(Protocol):
+    """A robot on the ground: a simulated one (of ``avlmaps-sim``), or one of a user's own.
+
+    A movement returns when it is over. An obstacle is not an error: the body stops or slides, and reports a contact.
+    """
+
+    @property
+    def pose(self) -> GroundPose:
+        """Where it is, as its odometry says, level frame."""
+        ...
+
+    def act(self, action: Action) -> Moved:
+        """Take one of the paper's actions.
+
+        Args:
+            action: 0.1 m forward, 5 degrees to the left or to the right, or stop (which only stands still).
+        """
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

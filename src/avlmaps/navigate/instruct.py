@@ -1,24 +1,25 @@
 """From a command to what the robot did: translate, parse, run, and try again where the translator can.
 
-The whole path in one function; a program is data all along, and nothing but the table of skills ever runs.
+A program is data all along, and nothing but the table of skills ever runs. `rehearse` runs it on the map alone, before
+any robot moves: where it would go, and whether it can be done at all.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.errors import LanguageError, ProgramError, SeveralFitError
-from avlmaps.core.motion import Action
+from avlmaps.core.errors import GoalNotFoundError, LanguageError, ProgramError, QueryError, SeveralFitError
+from avlmaps.core.motion import Action, GroundPose, Moved
 from avlmaps.core.poses import FRAME
 from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program
 from avlmaps.language.sentence import Attachments
 from avlmaps.language.translator import LearnedTranslator, Translation, Translator
 from avlmaps.navigate.brake import Brake, braked
-from avlmaps.navigate.driver import Driver
+from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.navigate.file_access import Readable, offered_by
 from avlmaps.navigate.grounding import Heats
 from avlmaps.navigate.skills import LoggedMove, Robot, RobotSettings
@@ -28,16 +29,14 @@ from avlmaps.query.whereabouts import own_names
 
 _MOST_PROGRAMS = 6
 _NEAR_M = 1.0  # within this distance a goal counts as reached where the paper judges
+_ABSENT = (GoalNotFoundError.__name__, QueryError.__name__)
+NO_FILES = Readable((), ())
+"""A program may load no file."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReportedStep:
-    """A step of a program, and the movement that it made.
-
-    Attributes:
-        step: the call of a skill.
-        move: what the robot did; None where it did not move.
-    """
+    """A step of a program, and the movement that it made, None where it made none."""
 
     step: Step
     move: LoggedMove | None
@@ -54,30 +53,17 @@ class ReportedStep:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The outcome of a command.
-
-    Attributes:
-        command: what was said.
-        programs: what ran, in order; more than one where the translator had to try again.
-        notes: what a person should know: why the map may be wrong, how a part was understood, where the map's
-            confidence is low.
-        done: every step, a failed one too.
-        moves: every movement.
-        error: why it was not obeyed to its end, one sentence; None where it was.
-        error_type: the class of that error.
-        elapsed_s: from the command to the end.
-        choices: where each of the things is that fit equally, if the error asks which is meant.
-    """
+    """The outcome of a command."""
 
     command: str
-    programs: tuple[str, ...]
-    notes: tuple[str, ...]
-    done: tuple[ReportedStep, ...]
+    programs: tuple[str, ...]  # that ran, in order; more than one where the translator had to try again
+    notes: tuple[str, ...]  # why the map may be wrong, how a part was understood, where it is not sure
+    done: tuple[ReportedStep, ...]  # a failed one too
     moves: tuple[LoggedMove, ...]
-    error: str | None
-    error_type: str | None
+    error: str | None  # why it was not obeyed to its end, one sentence
+    error_type: str | None  # the class of that error
     elapsed_s: float
-    choices: tuple[str, ...] = ()
+    choices: tuple[str, ...] = ()  # places of the things that fit equally, if the error asks which is meant
 
     @property
     def ok(self) -> bool:
@@ -133,8 +119,9 @@ def given_by(avlmap: AVLMap, image: str | None = None, clip: str | None = None, 
     return Attachments(image, clip, avlmap.knows, sounds_at, own, lambda: no_sources(avlmap))
 
 
-def _silent(_: str) -> None:
-    """Report nothing."""
+def settings_after(translation: Translation, settings: RobotSettings) -> RobotSettings:
+    """Return settings with the numbers that choose a thing: the first of them may have chosen a meaning."""
+    return replace(settings, choose=settings.choose[1:]) if translation.chosen else settings
 
 
 def instruct(
@@ -147,7 +134,7 @@ def instruct(
     settings: RobotSettings | None = None,
     readable: Readable | None = None,
     translation: Translation | None = None,
-    tell: Callable[[str], None] = _silent,
+    tell: Callable[[str], None] = lambda _: None,
     pause: Callable[[float], None] | None = None,
     brake: Brake | None = None,
     heats: Heats | None = None,
@@ -192,27 +179,20 @@ def instruct(
     )  # fmt: skip
 
 
+@dataclass(slots=True)
 class _Run:
     """The programs of one command, one after the other until one runs to its end."""
 
-    def __init__(
-        self,
-        command: str,
-        translator: Translator,
-        robot: Robot,
-        budget: Budget | None,
-        brake: Brake,
-        tell: Callable[[str], None],
-    ) -> None:
-        self.command = command
-        self.translator = translator
-        self.robot = robot
-        self.budget, self.brake = budget, brake
-        self.tell = tell
-        self.programs: list[str] = []
-        self.notes: list[str] = []
-        self.done: list[ReportedStep] = []
-        self.last: Trace | None = None
+    command: str
+    translator: Translator
+    robot: Robot
+    budget: Budget | None
+    brake: Brake
+    tell: Callable[[str], None]
+    programs: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    done: list[ReportedStep] = field(default_factory=list)
+    last: Trace | None = None
 
     def through(self, translation: Translation | None) -> None:
         while translation is not None:
@@ -245,7 +225,6 @@ class _Run:
             self.tell(str(self.done[-1]))
 
     def repaired(self, program: str, trace: Trace) -> Translation | None:
-        """Return the program that the translator writes instead; the request lists what was done."""
         done = [one.step.text for one in self.done if one.step.error is None]
         try:
             return self.translator.repair(self.command, program, trace.error or "", done)
@@ -266,3 +245,97 @@ class _Run:
         if note not in self.notes:  # a plan carries those of its rehearsal
             self.notes.append(note)
             self.tell(f"note: {note}")
+
+
+class FreeBody:
+    """A body without a world: every movement is done exactly. The driver's own map holds it off the walls."""
+
+    def __init__(self, pose: GroundPose) -> None:
+        self.pose = pose
+
+    def act(self, action: Action) -> Moved:
+        """Take one of the paper's actions."""
+        self.pose = self.pose.after(action)
+        return Moved(self.pose)
+
+
+class InstantDriver:
+    """Is wherever it is sent, at once and through walls: for what the map knows of a program, without a robot."""
+
+    def __init__(self, avlmap: AVLMap, pose: GroundPose) -> None:
+        self._space, self.pose = avlmap.space, pose
+
+    def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
+        """Be there, looking where it looked before."""
+        x_m, y_m, _ = (float(value) for value in self._space.level(place))
+        return self._at(replace(self.pose, x_m=x_m, y_m=y_m))
+
+    def turn(self, angle_rad: float) -> Arrival:
+        """Look there."""
+        return self._at(self.pose.turned(angle_rad))
+
+    def forward(self, distance_m: float) -> Arrival:
+        """Be straight ahead."""
+        return self._at(self.pose.ahead(distance_m))
+
+    def stop(self) -> Arrival:
+        """Stand."""
+        return self._at(self.pose)
+
+    def _at(self, pose: GroundPose) -> Arrival:
+        self.pose = pose
+        return Arrival(True, pose, (), np.array([[pose.x_m, pose.y_m]]))
+
+
+def rehearse(
+    command: str,
+    translation: Translation,
+    avlmap: AVLMap,
+    driver: Driver,
+    *,
+    settings: RobotSettings | None = None,
+    budget: Budget | None = None,
+    readable: Readable | None = NO_FILES,
+    heats: Heats | None = None,
+) -> Outcome:
+    """Plan: run a program on the map alone; waits take no time.
+
+    The driver is an `InstantDriver` for what the map knows, or, for the path as well, a ``MapDriver`` of a `FreeBody`.
+    """
+    return instruct(
+        command, avlmap, driver, LearnedTranslator(), budget, settings=settings, readable=readable,
+        translation=translation, pause=lambda _: None, heats=heats,
+    )  # fmt: skip
+
+
+def unfound(
+    command: str,
+    translation: Translation,
+    avlmap: AVLMap,
+    start: GroundPose,
+    settings: RobotSettings | None = None,
+    heats: Heats | None = None,
+) -> Outcome | None:
+    """Return the outcome of a program that the map lets not run to its end; None for any other.
+
+    It would drive and then ask for what the map lacks, or several things fit equally and none was chosen. The program's
+    steps must depend on nothing that a drive would find out.
+    """
+    driver = InstantDriver(avlmap, start)
+    told = rehearse(command, translation, avlmap, driver, settings=settings, readable=None, heats=heats)
+    asks = told.error_type == SeveralFitError.__name__
+    if told.error is None or not (asks or (told.error_type in _ABSENT and told.moves)):
+        return None
+    return replace(told, done=(), moves=(), error=f"{told.error.rstrip('.')}. The robot was not moved.")
+
+
+def path_in_world(outcome: Outcome, avlmap: AVLMap, floor_m: float, most: int = 500) -> Float[np.ndarray, "n 3"]:
+    """Return the path of an outcome in the recording frame, thinned evenly to ``most`` points, its ends among them.
+
+    ``floor_m`` is the level height of the floor.
+    """
+    xy = outcome.path
+    if len(xy) > most:
+        xy = xy[np.unique(np.linspace(0, len(xy) - 1, most).round().astype(int))]
+    level = np.column_stack([xy, np.full(len(xy), floor_m)])
+    return np.array([avlmap.space.world(point) for point in level]).reshape(-1, 3)

@@ -10,9 +10,8 @@ from msgspec import Meta
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.poses import FRAME
-from avlmaps.maps.obstacles import Obstacles
-from avlmaps.navigate.bodies import BASE, BodyShape
-from avlmaps.navigate.costmap import costmap_of, obstacles_for, storey_of_walk
+from avlmaps.maps.obstacles import BodyShape, Obstacles
+from avlmaps.navigate.costmap import BASE, costmap_of, obstacles_for, storey_of_walk
 from avlmaps.navigate.planner import Planner, Stop
 from avlmaps.query.answer import Answer
 from avlmaps.query.schema import Frame, Position

@@ -1,17 +1,28 @@
-"""Paths over a cost map: SciPy's Dijkstra over cells with sixteen neighbours, then pulled straight."""
+"""Paths over a cost map: SciPy's Dijkstra over cells with sixteen neighbours, then pulled straight.
+
+Grids are indexed (i, j) for x and y; a place in cells is such that cell (i, j) covers [i, i + 1) x [j, j + 1).
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int
+from scipy.sparse import csgraph, csr_array
 
 from avlmaps.navigate.costmap import Costmap
-from avlmaps.navigate.grids import CellGraph, farthest_opaque, line_costs, straightened
 
 _EVERY = 8  # cells of a straight run of a path from which shortcuts may begin
-
+_SAMPLE = 0.2  # of a line of sight, cells
+_CORNER, _BESIDE = 1e-9, 1e-6  # a piece of a line that is no longer is a corner, whose cells lie beside it; cells
+_WINDOW = 24  # points that a shortcut may leap
+# Half of the sixteen neighbours, each with the cells that a step there passes or touches; the others are the reverse.
+_STEPS: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {
+    (1, 0): (), (0, 1): (), (1, 1): ((1, 0), (0, 1)), (1, -1): ((1, 0), (0, -1)),
+    (2, 1): ((1, 0), (1, 1)), (2, -1): ((1, 0), (1, -1)), (1, 2): ((0, 1), (1, 1)), (1, -2): ((0, -1), (1, -1)),
+}  # fmt: skip
 
 ESCAPE_M = 1.0  # how far a body that stands where the map lets none stand may go straight to get out
 BESIDE_M = 2.0  # how far from a place that cannot be stood on the body may stop instead
@@ -20,6 +31,139 @@ _ROOMY_M = 0.03
 # Obstacles within this distance of a place are the thing there itself: the least that lets it be seen, so that a
 # wardrobe is seen through its front and not through its back and the wall. For free floor just the first.
 _OWN_M = (0.075, 0.2, 0.35, 0.5, 0.7)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CellGraph:
+    """Cells joined with their sixteen neighbours; a step cuts no corner, and costs the mean of the cells it passes."""
+
+    number: Int[np.ndarray, "nx ny"]
+    cells: Int[np.ndarray, "n 2"]
+    weights: csr_array
+
+    @classmethod
+    def of(cls, mask: Bool[np.ndarray, "nx ny"], cost: Float[np.ndarray, "nx ny"]) -> Self:
+        """Join the true cells of a mask."""
+        number, cells = np.where(mask, np.cumsum(mask).reshape(mask.shape) - 1, -1), np.argwhere(mask)
+        around, numbers = np.pad(cost, 2), np.pad(number, 2, constant_values=-1)
+        pairs: list[np.ndarray] = []
+        weights: list[np.ndarray] = []
+        for step, passed in _STEPS.items():
+            pair = _joined(numbers, cells, step)
+            at = cells[pair[:, 0]] + 2
+            mean = 0.5 * (around[tuple(at.T)] + around[tuple((at + step).T)])
+            if 2 in np.abs(step):
+                mean = 0.5 * mean + 0.25 * sum(around[tuple((at + by).T)] for by in passed)
+            pairs.append(pair)
+            weights.append(np.hypot(*step) * mean)
+        one, other = np.concatenate(pairs).T
+        ends = np.concatenate([one, other]), np.concatenate([other, one])
+        return cls(
+            number, cells, csr_array((np.tile(np.concatenate(weights), 2), ends), shape=(len(cells), len(cells)))
+        )
+
+    def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"]:
+        """Return the cells of the cheapest path between two cells of one connected part."""
+        start, end = int(self.number[tuple(first)]), int(self.number[tuple(last)])
+        _, before = csgraph.dijkstra(self.weights, indices=start, return_predecessors=True)
+        nodes = [end]
+        while nodes[-1] != start:
+            nodes.append(int(before[nodes[-1]]))
+        return self.cells[nodes[::-1]]
+
+
+def _joined(
+    around: Int[np.ndarray, "px py"], cells: Int[np.ndarray, "n 2"], step: tuple[int, int]
+) -> Int[np.ndarray, "k 2"]:
+    """Return the pairs of cells that are one step apart, over nothing but numbered cells; the numbers have a margin."""
+    reached = around[tuple((cells + 2 + step).T)]
+    is_open = reached >= 0
+    for by in _STEPS[step]:
+        is_open &= around[tuple((cells + 2 + by).T)] >= 0
+    return np.column_stack([np.flatnonzero(is_open), reached[is_open]])
+
+
+def rooms(
+    points: Float[np.ndarray, "n 2"], occupied: Bool[np.ndarray, "nx ny"], reach: float
+) -> Float64[np.ndarray, " n"]:
+    """Return the distance from each place to the nearest occupied cell's square, at most ``reach``; all in cells."""
+    low = np.maximum(np.floor(points.min(axis=0) - reach).astype(np.int64), 0)
+    high = np.maximum(np.floor(points.max(axis=0) + reach).astype(np.int64) + 1, low)
+    cells = low + np.argwhere(occupied[low[0] : high[0], low[1] : high[1]])
+    apart = np.maximum(np.maximum(cells - points[:, None], points[:, None] - cells - 1), 0.0)
+    return np.minimum(np.hypot(*np.moveaxis(apart, 2, 0)).min(axis=1, initial=reach), reach)
+
+
+def farthest_opaque(
+    place: Float[np.ndarray, "2"], cells: Int[np.ndarray, "n 2"], opaque: Bool[np.ndarray, "nx ny"]
+) -> Float64[np.ndarray, " n"]:
+    """Return how far from a place the farthest opaque cell on the line to each cell's middle is, in cells; -1 for none.
+
+    Where that is no farther than the thing at the place reaches, the thing is seen from there.
+    """
+    toward = cells + 0.5 - place
+    length = np.hypot(*toward.T)
+    steps = (length / _SAMPLE).astype(np.int64) + 1
+    part = np.arange(int(steps.max(initial=1))) / steps[:, None]
+    at = np.floor(place + part[..., None] * toward[:, None]).astype(np.int64)
+    within = (part < 1.0) & ((at >= 0) & (at < opaque.shape)).all(axis=2)
+    blocked = np.zeros(within.shape, bool)
+    blocked[within] = opaque[tuple(at[within].T)]
+    return np.where(blocked, part * length[:, None], -1.0).max(axis=1, initial=-1.0)
+
+
+def line_costs(
+    starts: Float[np.ndarray, "n 2"],
+    ends: Float[np.ndarray, "n 2"],
+    passable: Bool[np.ndarray, "nx ny"],
+    cost: Float[np.ndarray, "nx ny"],
+) -> Float64[np.ndarray, " n"]:
+    """Return the cost of straight lines: a cell's cost times the length within it.
+
+    It is inf where a line touches a cell that is not passable, a corner included.
+    """
+    toward = ends - starts
+    length = np.hypot(*toward.T)
+    crossings = [np.zeros((len(ends), 1)), np.ones((len(ends), 1))]  # into other cells, as parts of each line
+    for axis in (0, 1):
+        both = np.concatenate([starts[:, axis], ends[:, axis]])
+        lines = np.arange(np.ceil(both.min()), np.floor(both.max()) + 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            crossings.append((lines - starts[:, axis, None]) / toward[:, axis, None])
+    part = np.sort(np.clip(np.nan_to_num(np.concatenate(crossings, axis=1)), 0.0, 1.0), axis=1)
+    piece, middle = np.diff(part, axis=1), 0.5 * (part[:, 1:] + part[:, :-1])
+    place = starts[:, None] + middle[..., None] * toward[:, None]
+    beside = _BESIDE * np.stack([-toward[:, 1], toward[:, 0]], axis=1) / np.maximum(length, 1e-12)[:, None]
+    grid = np.pad(passable, 1)
+    is_open = grid[_cells(place, grid.shape)] | (piece <= _CORNER)
+    is_corner = (piece <= _CORNER) & (middle > 0.0) & (middle < 1.0)
+    for side in (-1.0, 1.0):
+        is_open &= grid[_cells(place + side * beside[:, None], grid.shape)] | ~is_corner
+    total = length * (piece * np.pad(cost, 1)[_cells(place, grid.shape)]).sum(axis=1)
+    return np.where(is_open.all(axis=1), total, np.inf)
+
+
+def _cells(places: Float[np.ndarray, "n k 2"], shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cells of places on a grid with a margin of one cell, which is all that lies beyond."""
+    i, j = np.clip(np.floor(places) + 1, 0, np.array(shape) - 1).astype(np.int64).transpose(2, 0, 1)
+    return i, j
+
+
+def straightened(
+    points: Float[np.ndarray, "n 2"], passable: Bool[np.ndarray, "nx ny"], cost: Float[np.ndarray, "nx ny"]
+) -> Float[np.ndarray, "m 2"]:
+    """Pull a path straight wherever that costs no more, from its beginning and then from its end; in cells."""
+    for _ in range(2):
+        along = np.append(0.0, np.cumsum(line_costs(points[:-1], points[1:], passable, cost)))
+        kept = [0]
+        while kept[-1] < len(points) - 1:
+            at = kept[-1]
+            ahead = np.arange(at + 1, min(at + 1 + _WINDOW, len(points)))
+            straight = line_costs(np.repeat(points[[at]], len(ahead), axis=0), points[ahead], passable, cost)
+            no_dearer = ahead[straight <= along[ahead] - along[at] + 1e-9]
+            kept.append(int(no_dearer[-1]) if len(no_dearer) else at + 1)
+        points = points[kept[::-1]]
+    return points
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,8 @@ from avlmaps.core.errors import BackendError, NavigationError
 from avlmaps.core.extras import SIMULATOR, how_to_get, install_command
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.registry import brought, entry_points
-from avlmaps.navigate.bodies import BASE, BodyShape
+from avlmaps.maps.obstacles import BodyShape
+from avlmaps.navigate.costmap import BASE
 from avlmaps.navigate.driver import Driver, Holdable, MapDriver
 from avlmaps.navigate.interrupts import Halt
 

@@ -22,8 +22,7 @@ from avlmaps.navigate.costmap import floor_of_walk, storey_of_walk
 from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline, bearing_rad, middle_between, to_the_left
-from avlmaps.navigate.grounding import Heats, Seeker, kind_of, number_of, text_of
-from avlmaps.navigate.instances import Destination
+from avlmaps.navigate.grounding import Destination, Heats, Seeker, kind_of, number_of, text_of
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 

@@ -18,7 +18,7 @@ from avlmaps.core.camera import Pinhole, intrinsics_of
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable_json, shortened
-from avlmaps.navigate.bodies import WALKER
+from avlmaps.navigate.costmap import WALKER
 from avlmaps.navigate.paths import PathAnswer, PathFinder, goals_near
 from avlmaps.query.answer import Answer
 from avlmaps.query.editor import edit_text

@@ -17,8 +17,7 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from avlmaps.core.errors import AvlmapsError
-from avlmaps.navigate.bodies import SHAPES
-from avlmaps.navigate.costmap import obstacles_for
+from avlmaps.navigate.costmap import SHAPES, obstacles_for
 from avlmaps.query.answer import Answer
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.export import heat_colors

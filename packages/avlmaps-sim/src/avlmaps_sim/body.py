@@ -222,7 +222,7 @@ def _room_m(blocked: np.ndarray) -> np.ndarray:
 
 
 class SimulatedBody:
-    """A round robot in a scene; offers what `avlmaps.navigate.bodies.Body` asks for.
+    """A round robot in a scene; offers what `avlmaps.navigate.driver.Body` asks for.
 
     Attributes:
         building: what is in its way.

@@ -7,9 +7,8 @@ from jaxtyping import Bool, Float
 
 from avlmaps.core.errors import NavigationError, SceneError
 from avlmaps.core.motion import GroundPose
-from avlmaps.maps.obstacles import Obstacles
-from avlmaps.navigate.bodies import BASE, BodyShape
-from avlmaps.navigate.costmap import costmap_of, obstacles_for
+from avlmaps.maps.obstacles import BodyShape, Obstacles
+from avlmaps.navigate.costmap import BASE, costmap_of, obstacles_for
 from avlmaps.navigate.driver import MapDriver
 from avlmaps.query.avlmap import AVLMap
 from avlmaps_sim import scenes

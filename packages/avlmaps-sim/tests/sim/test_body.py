@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose
-from avlmaps.navigate.bodies import Body
+from avlmaps.navigate.driver import Body
 from avlmaps_sim.body import Building, MotionNoise, SimulatedBody
 from helpers.floors import hall
 

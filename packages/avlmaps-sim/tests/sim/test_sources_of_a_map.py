@@ -14,7 +14,7 @@ from avlmaps.language.translator import LearnedTranslator
 from avlmaps.maps.build import build_map
 from avlmaps.maps.sources.find import find_sources
 from avlmaps.maps.store.folder import read
-from avlmaps.navigate.instances import things_in
+from avlmaps.navigate.grounding import things_in
 from avlmaps.navigate.instruct import given_by
 from avlmaps.navigate.skills import Robot
 from avlmaps.query.avlmap import AVLMap

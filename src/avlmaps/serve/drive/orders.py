@@ -32,8 +32,17 @@ from avlmaps.language.program import Budget, parse_program
 from avlmaps.language.translator import LearnedTranslator, Translation
 from avlmaps.navigate.brake import Brake
 from avlmaps.navigate.costmap import floor_of_walk
-from avlmaps.navigate.instruct import Outcome, given_by, instruct
-from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse
+from avlmaps.navigate.driver import MapDriver
+from avlmaps.navigate.instruct import (
+    NO_FILES,
+    FreeBody,
+    Outcome,
+    given_by,
+    instruct,
+    path_in_world,
+    rehearse,
+    settings_after,
+)
 from avlmaps.navigate.skills import RobotSettings
 from avlmaps.serve.drive.robots import Machine
 from avlmaps.serve.guard import token_digest
@@ -301,12 +310,10 @@ class Dispatcher:
     def _planned(self, words: str, program: str, choose: tuple[int, ...]) -> OrderPlan:
         now = self._current()
         translation = self._read(words, program, now, choose)
-        choose = choose[1:] if translation.chosen else choose
+        settings = settings_after(translation, self._settings(choose))
         obstacles, start = self._ready(now), self.machine.driver.pose
-        outcome = rehearse(
-            words, translation, now.avlmap, obstacles, start, shape=self.machine.shape,
-            settings=self._settings(choose), budget=_REHEARSAL,
-        )  # fmt: skip
+        body = MapDriver(obstacles, FreeBody(start), self.machine.shape)
+        outcome = rehearse(words, translation, now.avlmap, body, settings=settings, budget=_REHEARSAL)
         if outcome.error is not None:
             kind = _kind(outcome.error_type or "RefusedError")
             raise RequestError(f"There is no plan: {outcome.error}", 422, kind, outcome.choices)
@@ -324,7 +331,7 @@ class Dispatcher:
             version=now.version,
             robot=self.machine.identity,
             start=start,
-            choose=choose,
+            choose=settings.choose,
         )
 
     def _read(self, words: str, program: str, now: ServedMap, choose: tuple[int, ...]) -> Translation:

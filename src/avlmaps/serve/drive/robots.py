@@ -10,8 +10,7 @@ import msgspec
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.files import user_path
 from avlmaps.core.motion import GroundPose
-from avlmaps.navigate.bodies import SHAPES
-from avlmaps.navigate.costmap import obstacles_for
+from avlmaps.navigate.costmap import SHAPES, obstacles_for
 from avlmaps.navigate.robots import RealRobot, RobotDriver, find_robot, open_robot_scene
 from avlmaps.query.avlmap import AVLMap
 
@@ -106,23 +105,26 @@ class Machine:
             NavigationError: it cannot be reached, or cannot stand on the map.
         """
         before = self._connected
-        if before is None or before[0] != version:
-            obstacles = obstacles_for(avlmap, self.shape)
-            driver = self._driver_on(avlmap) if self._real is None else self._real(obstacles)
-            self._connected = version, obstacles, driver
-            if before is not None:  # until here a stop had one that could be used
-                before[2].close()
-            return obstacles
-        return before[1]
+        if before is not None and before[0] == version:
+            return before[1]
+        obstacles, driver = self._driver_on(avlmap)
+        self._connected = version, obstacles, driver
+        if before is not None:  # until here a stop had one that could be used
+            before[2].close()
+        return obstacles
 
-    def _driver_on(self, avlmap: AVLMap) -> RobotDriver:
+    def _driver_on(self, avlmap: AVLMap) -> "tuple[Obstacles, RobotDriver]":
+        if self._real is not None:
+            obstacles = obstacles_for(avlmap, self.shape)
+            return obstacles, self._real(obstacles)
         start = None
         if self._connected is not None:
             start = self.driver.pose
         elif self._read.start is not None:
             x_m, y_m, heading_deg = self._read.start
             start = GroundPose(x_m, y_m, radians(heading_deg))
-        return open_robot_scene(self._read.scene or "").robot(avlmap, self.shape, start)
+        driver = open_robot_scene(self._read.scene or "").robot(avlmap, self.shape, start)
+        return driver.obstacles, driver
 
     @property
     def driver(self) -> RobotDriver:

@@ -11,8 +11,7 @@ from avlmaps.core.motion import FORWARD_M, Action, GroundPose, Moved
 from avlmaps.language.program import Budget, parse_program, run_program
 from avlmaps.language.translator import Translator
 from avlmaps.maps.obstacles import CellState, Obstacles
-from avlmaps.navigate.bodies import Body
-from avlmaps.navigate.driver import Driver
+from avlmaps.navigate.driver import Body, Driver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.skills import LoggedMove, Robot, RobotSettings
 from avlmaps_sim.bench.navigation.episodes import Episode, Leg, path_length_m

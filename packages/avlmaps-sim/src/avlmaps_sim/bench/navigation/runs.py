@@ -17,8 +17,7 @@ from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.language.translator import Translator
 from avlmaps.maps.obstacles import Obstacles
-from avlmaps.navigate.bodies import BASE
-from avlmaps.navigate.costmap import obstacles_for
+from avlmaps.navigate.costmap import BASE, obstacles_for
 from avlmaps.navigate.driver import Driver, MapDriver
 from avlmaps_sim.bench.harness.factors import WeakHearing
 from avlmaps_sim.bench.harness.own_recording import is_recording

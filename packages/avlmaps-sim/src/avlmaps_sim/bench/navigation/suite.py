@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 
 from avlmaps.core.files import write_bytes_atomically
-from avlmaps.navigate.bodies import BASE
+from avlmaps.navigate.costmap import BASE
 from avlmaps_sim.bench.harness.figures import (
     chosen_on,
     clip_table,
