@@ -181,10 +181,10 @@ def test_each_place_that_is_gone_to_ends_with_one_stop() -> None:
     robot.move_to("a")
     robot.turn(90)
     robot.move_north("a")
-    assert robot.actions.count(Action.STOP) == 2
+    assert [action for move in robot.moves for action in move.actions].count(Action.STOP) == 2
     assert [move.skill for move in robot.moves] == ["move_to", "turn", "move_north"]
     assert [move.goal is None for move in robot.moves] == [False, True, False]
-    assert len(robot.path) == 10
+    assert sum(len(move.path) for move in robot.moves) == 10
 
 
 def test_a_place_that_is_not_reached_stops_the_program_unless_it_is_to_go_on() -> None:

@@ -23,17 +23,12 @@ _LOOK_S = 0.5
 class Brake:
     """Whether an order by a map is stopped; once it is, it stays so. An area that is forbidden meanwhile stops it.
 
-    The drive knows the map as it was, so that it could lead through that area.
-
-    Attributes:
-        forbidden: why an edit stopped it, in part of a sentence; "" where none did.
+    The drive knows the map as it was, so that it could lead through that area. ``forbidden`` is why an edit stopped it,
+    in part of a sentence; "" where none did.
     """
 
     def __init__(self, avlmap: AVLMap, pace_s: float = 0.0) -> None:
-        """Take the map of the drive; one without a folder is not edited.
-
-        ``pace_s`` is the time that a simulated robot takes before each action.
-        """
+        """Take the map of the drive; ``pace_s`` is the time that a simulated robot takes before each action."""
         self._pulled, self._pace_s, self.forbidden = threading.Event(), pace_s, ""
         self._folder, self._stamp = avlmap.path, None
         self._known = {edit.id for edit in avlmap.edited.edits}
@@ -73,11 +68,7 @@ class Brake:
         return self.why
 
     def pause(self, seconds: float) -> None:
-        """Wait for some seconds.
-
-        Raises:
-            NavigationError: the order was stopped.
-        """
+        """Wait, or raise ``NavigationError`` where the order is stopped."""
         until_s = monotonic() + seconds
         while not self.pulled and (left_s := until_s - monotonic()) > 0.0:
             self._pulled.wait(min(left_s, _LOOK_S))

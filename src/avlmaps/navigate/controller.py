@@ -25,13 +25,7 @@ def bearing(pose: GroundPose, x_m: float, y_m: float) -> float:
 
 
 class RouteProgress:
-    """A path and how far along it a body has come; that never goes back.
-
-    Attributes:
-        points: (n, 2) corners.
-        along_m: how far the body has come.
-        length_m: of the whole.
-    """
+    """A path of corners, and how far along it a body has come (``along_m``); that never goes back."""
 
     def __init__(self, points: Float[np.ndarray, "n 2"]) -> None:
         points = np.asarray(points, np.float64)

@@ -47,31 +47,18 @@ _HOLE_M, _HOLE_COST = 0.3, 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Costmap:
-    """A floor as one body finds it.
+    """A floor as one body finds it."""
 
-    Attributes:
-        origin_m: level x and y of the corner of cell (0, 0).
-        cell_size_m: edge of a cell.
-        radius_m: of the body.
-        passable: where its middle may be.
-        cost: what a metre costs there, at least 1.
-        room_m: distance from a cell's middle to the nearest obstacle, never overstated; inf where there is none.
-        occupied: the obstacles themselves.
-        opaque: what blocks the view over the floor.
-        free: where the floor was seen and nothing stands.
-        known: where the content is known, small holes counted in.
-    """
-
-    origin_m: Float64[np.ndarray, "2"]
+    origin_m: Float64[np.ndarray, "2"]  # level x and y of the corner of cell (0, 0)
     cell_size_m: float
-    radius_m: float
-    passable: Bool[np.ndarray, "nx ny"]
-    cost: Float32[np.ndarray, "nx ny"]
-    room_m: Float32[np.ndarray, "nx ny"]
+    radius_m: float  # of the body
+    passable: Bool[np.ndarray, "nx ny"]  # where its middle may be
+    cost: Float32[np.ndarray, "nx ny"]  # of a metre there, at least 1
+    room_m: Float32[np.ndarray, "nx ny"]  # from a cell's middle to the nearest obstacle, never overstated, or inf
     occupied: Bool[np.ndarray, "nx ny"]
-    opaque: Bool[np.ndarray, "nx ny"]
-    free: Bool[np.ndarray, "nx ny"]
-    known: Bool[np.ndarray, "nx ny"]
+    opaque: Bool[np.ndarray, "nx ny"]  # what blocks the view over the floor
+    free: Bool[np.ndarray, "nx ny"]  # where the floor was seen and nothing stands
+    known: Bool[np.ndarray, "nx ny"]  # small holes counted in
 
     def in_cells(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
         """Return places in units of cells, from the corner of cell (0, 0)."""
@@ -102,13 +89,9 @@ class Costmap:
     def known_ahead_m(
         self, xy: Float[np.ndarray, "2"], heading_rad: float, distance_m: float, escape_m: float
     ) -> float:
-        """Return how far straight ahead it is known what is there.
+        """Return how far straight ahead it is known what is there, at most ``distance_m``.
 
-        Args:
-            xy: level x and y.
-            heading_rad: which way is ahead.
-            distance_m: limit of the search.
-            escape_m: from an unknown place, the search may cross this distance if known cells follow.
+        From an unknown place the search may cross ``escape_m`` if known cells follow.
         """
         reach_m = float(np.hypot(*self.passable.shape)) * self.cell_size_m + escape_m  # no farther is anything known
         at_m = np.linspace(0.0, min(distance_m, reach_m), int(5 * min(distance_m, reach_m) / self.cell_size_m) + 2)
@@ -129,10 +112,7 @@ class Costmap:
 def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE, storey: int | None = None) -> Obstacles:
     """Find the obstacles of a body in a map, by its height and by the words that count as obstacles to it.
 
-    Args:
-        avlmap: the map; queried for the words of the shape.
-        shape: of the robot that is to move there.
-        storey: on which it is, counted from 0, the lowest; None for the one where the map's walk began.
+    ``storey`` is counted from 0, the lowest; None for the one where the map's walk began.
 
     Raises:
         MapError: the map holds too little to find a floor, or has no such storey.
@@ -189,13 +169,7 @@ def _voxels_called(avlmap: "AVLMap", word: str) -> Bool[np.ndarray, " n"]:
 
 
 def costmap_of(obstacles: Obstacles, radius_m: float, contacts: Bool[np.ndarray, "nx ny"] | None = None) -> Costmap:
-    """Inflate obstacles for a body.
-
-    Args:
-        obstacles: what the map knows.
-        radius_m: of the body.
-        contacts: cells that the body found occupied, though the map has nothing there; nobody knows how high.
-    """
+    """Inflate obstacles for a body; ``contacts`` are cells that it found occupied though the map has nothing there."""
     touched = np.zeros(obstacles.states.shape, bool) if contacts is None else contacts
     occupied = (obstacles.states == CellState.OCCUPIED) | touched
     free = (obstacles.states == CellState.FREE) & ~occupied
@@ -238,11 +212,7 @@ def _small_holes(known: Bool[np.ndarray, "nx ny"], width: float) -> Bool[np.ndar
 
 
 class ContactMap:
-    """Cells that the body found occupied, and cells that it stood on.
-
-    Attributes:
-        cells: where it touched something.
-    """
+    """Cells that the body found occupied (``cells``), and cells that it stood on."""
 
     def __init__(self, obstacles: Obstacles, radius_m: float) -> None:
         self._obstacles = obstacles
@@ -268,10 +238,7 @@ class ContactMap:
 
         A body that slides loses just the part of its way that leads into the thing, one that stops all of it. Where
         the likeliest point cannot be, since the map has something there or the body has been there, points beside
-        it are taken.
-
-        Returns:
-            Whether that is something new.
+        it are taken. It returns whether that is something new.
         """
         lost = np.array([planned.x_m - now.x_m, planned.y_m - now.y_m])
         if np.hypot(*lost) < _LOST_M:

@@ -49,33 +49,20 @@ class Body(Protocol):
         ...
 
     def act(self, action: Action) -> Moved:
-        """Take one of the paper's actions.
-
-        Args:
-            action: 0.1 m forward, 5 degrees to the left or to the right, or stop (which only stands still).
-        """
+        """Go 0.1 m forward, turn by 5 degrees to the left or to the right, or stop (which only stands still)."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrival:
-    """The result of one movement. That a place was not reached is an ordinary result, and the note says why.
+    """The result of one movement. That a place was not reached is an ordinary result, and the note says why."""
 
-    Attributes:
-        reached: whether the robot stands where it was sent, within the driver's tolerance.
-        pose: where it stands now, level frame.
-        actions: the discrete actions that were taken, in order; empty where a robot is driven in another way.
-        path: (n, 2) the places that it passed, level x and y, metres; the first is where it began.
-        note: one sentence where there is something to say: why it was not reached, or that it stands beside it.
-        contacts: how often it touched something.
-    """
-
-    reached: bool
-    pose: GroundPose
-    actions: tuple[Action, ...]
-    path: Float[np.ndarray, "n 2"]
-    note: str = ""
-    contacts: int = 0
+    reached: bool  # within the driver's tolerance
+    pose: GroundPose  # where it stands now, level frame
+    actions: tuple[Action, ...]  # discrete ones, in order; empty where a robot is driven in another way
+    path: Float[np.ndarray, "n 2"]  # level x and y of the places passed, metres; the first is where it began
+    note: str = ""  # one sentence: why it was not reached, or that it stands beside it
+    contacts: int = 0  # how often it touched something
 
 
 @runtime_checkable
@@ -88,20 +75,14 @@ class Driver(Protocol):
         ...
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
-        """Drive to a place, or as near to it as the robot can stand and see it, and stand there.
+        """Drive to a place in the world, or as near to it as the robot can stand and see it, and stand there.
 
-        Args:
-            place: in the world, metres; its height does not matter.
-            face: a place in the world to look at once there.
+        Its height does not matter. ``face`` is a place in the world to look at once there.
         """
         ...
 
     def turn(self, angle_rad: float) -> Arrival:
-        """Turn on the spot.
-
-        Args:
-            angle_rad: to the left (counter-clockwise in the top-down view); negative turns to the right.
-        """
+        """Turn on the spot: to the left (counter-clockwise from above), to the right by a negative angle."""
         ...
 
     def forward(self, distance_m: float) -> Arrival:
@@ -123,8 +104,6 @@ class Holdable(Protocol):
 
 @dataclass(slots=True)
 class _Trip:
-    """Events since a command was given."""
-
     path: list[tuple[float, float]]
     actions: list[Action] = field(default_factory=list)
     contacts: int = 0
@@ -137,13 +116,7 @@ class MapDriver:
     """Plans on a map, follows the path with its eyes on the body's pose, and plans again after a contact.
 
     Contacts are stored for later drives, beside the map. No movement is made of which the map foretells a contact.
-
-    Attributes:
-        obstacles: what the map knows.
-        body: what it moves.
-        shape: of the body; radius and height must be those that the obstacles were found for.
-        contacts: what the body touched and the map does not know.
-        held: see `Holdable`.
+    Radius and height of ``shape`` must be those that the obstacles were found for.
     """
 
     def __init__(self, obstacles: Obstacles, body: Body, shape: BodyShape = BASE) -> None:
@@ -192,12 +165,7 @@ class MapDriver:
         """Do nothing."""
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
-        """Drive to a place, or as near to it as the robot can stand and see it.
-
-        Args:
-            place: in the world, metres; its height says only which storey it is on.
-            face: a place in the world to look at once there.
-        """
+        """Drive to a place; its height says only which storey it is on."""
         return self._moved_by(lambda trip: self._gone_to(place, face, trip))
 
     def _gone_to(self, place: Float[np.ndarray, "3"], face: Float[np.ndarray, "3"] | None, trip: _Trip) -> Arrival:
@@ -291,11 +259,6 @@ class MapDriver:
                     self.body.act(Action.STOP)
 
     def _of_body(self, do: str, call: Callable[[], T]) -> T:
-        """Return what the body does.
-
-        Raises:
-            NavigationError: it fails to.
-        """
         try:
             return call()
         except Exception as fault:
@@ -314,7 +277,6 @@ class MapDriver:
         return Arrival(reached, self.pose, tuple(trip.actions), np.array(trip.path), note, trip.contacts)
 
     def _at_stop(self, trip: _Trip, stop: Stop | None, goal: Float[np.ndarray, "2"], note: str) -> Arrival:
-        """Report how a drive ended that had a path, and stop there."""
         self._take(Action.STOP, trip)
         if stop is None:
             return self._arrival(trip, False, note)
@@ -403,7 +365,7 @@ class MapDriver:
         return left_rad
 
     def _take(self, action: Action, trip: _Trip) -> bool:
-        """Take an action; return False where something stopped it."""
+        """Return False where something stopped the action."""
         if action is not Action.STOP and (why := self.held()):
             trip.fault = why
             return False

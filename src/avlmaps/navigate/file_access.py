@@ -16,11 +16,9 @@ _PLAIN = re.compile(r"[^\s\"'“”,;()]+\.\w{2,5}(?!\w)")
 
 @dataclass(frozen=True, slots=True)
 class Readable:
-    """The files that a program may load.
+    """The files that a program may load: those in or below a root, and those that a person named, wherever they are.
 
-    Attributes:
-        roots: folders; a file in or below one may be read, and a relative name is sought there in turn.
-        named: files that a person named, wherever they are.
+    A relative name is sought in each root in turn.
     """
 
     roots: tuple[Path, ...] = field(default_factory=lambda: (Path.cwd(),))
@@ -58,12 +56,7 @@ def named_files(command: str) -> tuple[str, ...]:
 
 
 def offered_by(command: str, roots: Sequence[Path] | None = None) -> Readable:
-    """Return the files that a command's program may read: those that the command names, and those in some folders.
-
-    Args:
-        command: what a person said.
-        roots: folders; the working directory where they are not given.
-    """
+    """Return the files that a command's program may read: in the roots (or here), and those that the command names."""
     return Readable((Path.cwd(),) if roots is None else tuple(roots), named_files(command))
 
 

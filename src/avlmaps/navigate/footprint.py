@@ -17,13 +17,9 @@ _MOST_CELLS = 4000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """A polygon on the ground, or a single point.
+    """A polygon on the ground, or a single point."""
 
-    Attributes:
-        corners: (k, 2) level x and y, counter-clockwise; one row for a point.
-    """
-
-    corners: Float[np.ndarray, "k 2"]
+    corners: Float[np.ndarray, "k 2"]  # level x and y, counter-clockwise; one row for a point
 
     def __post_init__(self) -> None:
         if self.corners.ndim != 2 or self.corners.shape[1] != 2 or not len(self.corners):
@@ -36,12 +32,9 @@ class Outline:
 
     @classmethod
     def round(cls, ground: Float[np.ndarray, "n 2"], size_m: float, join_m: float = 0.1) -> "Outline":
-        """Return the outline of columns of voxels; where they are several pieces, the hull of all.
+        """Return the outline of columns of voxels, gaps up to ``join_m`` filled; of several pieces their hull.
 
-        Args:
-            ground: the middles of the voxels, level x and y; at least one.
-            size_m: edge of a voxel.
-            join_m: gaps up to so wide are filled.
+        ``ground`` has the middles of the voxels, level x and y; at least one.
         """
         import cv2
 
@@ -82,12 +75,7 @@ class Outline:
         return 0.0 if self.contains(xy) else float(np.linalg.norm(self.nearest_to(xy) - xy))
 
     def beside(self, direction: Float[np.ndarray, "2"], distance_m: float) -> Float[np.ndarray, "2"]:
-        """Return the place in a direction from its middle, at this distance beyond its outermost corner there.
-
-        Args:
-            direction: unit vector.
-            distance_m: from the edge.
-        """
+        """Return the place in a direction (unit vector) from its middle, so far beyond its outermost corner there."""
         middle = self.centre
         reach = float(((self.corners - middle) @ direction).max())
         return middle + direction * (reach + distance_m)
@@ -145,7 +133,7 @@ def _middle_of(points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "2"]:
 def _raster(
     ground: Float[np.ndarray, "n 2"], size_m: float, join_m: float
 ) -> tuple[UInt8[np.ndarray, "h w"], Float[np.ndarray, "2"], float]:
-    """Return a picture of what the voxels cover, row for y, the place of its corner, and the edge of its cells."""
+    """Return a picture of what the voxels cover (row for y), the place of its corner, and the edge of its cells."""
     import cv2
 
     extent = float(np.ptp(ground, axis=0).max())

@@ -61,25 +61,15 @@ Heats = dict[tuple[object, ...], Heatmap]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Destination:
-    """Something to go to.
+    """Something to go to."""
 
-    Attributes:
-        name: what it was called; ``""`` for a place that a program gives.
-        outline: what it covers of the ground, level frame; a single point where it is not a thing.
-        place: where the goal is, level frame, metres.
-        probability: that it is what was meant; 1 for a place that a program gives.
-        solid: whether it is a thing with an extent, rather than a place.
-        found: whether that is likely enough, by the map's settings.
-        spread: how well the place is known, where it is the source of a sound.
-    """
-
-    name: str
-    outline: Outline
-    place: Float[np.ndarray, "3"]
-    probability: float = 1.0
-    solid: bool = False
-    found: bool = True
-    spread: "Spread | None" = None
+    name: str  # what it was called; "" for a place that a program gives
+    outline: Outline  # what it covers of the ground, level frame; a single point where it is not a thing
+    place: Float[np.ndarray, "3"]  # of the goal, level frame, metres
+    probability: float = 1.0  # that it is what was meant
+    solid: bool = False  # whether it is a thing with an extent, rather than a place
+    found: bool = True  # whether it is likely enough, by the map's settings
+    spread: "Spread | None" = None  # how well the place is known, where it is the source of a sound
 
 
 def describe_query(heat: Heatmap) -> str:
@@ -101,10 +91,8 @@ def tells_one(heat: Heatmap) -> bool:
 def things_in(heat: Heatmap, guess: bool = False) -> list[Destination]:
     """Return the distinct things that a heatmap asks for, best first; at least one, and all of them found.
 
-    Args:
-        heat: what is sought, and what it is near.
-        guess: take the best guess where nothing is found, however unlikely it is; where nothing comes together with
-            what it is near, the thing alone.
+    With ``guess`` the best guess is taken where nothing is found, however unlikely it is; where nothing comes together
+    with what it is near, the thing alone.
 
     Raises:
         GoalNotFoundError: there is none.
@@ -120,7 +108,6 @@ def things_in(heat: Heatmap, guess: bool = False) -> list[Destination]:
 
 
 def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
-    """Yield the possible meanings of a heatmap, the highest confidence first."""
     lead = Heatmap.of(heat.lead, heat.found_at).only(heat.where)
     yield heat
     yield heat.include_uncertain()
@@ -188,9 +175,6 @@ class Seeker:
     """Finds in a map what a program means.
 
     Attributes:
-        avlmap: the map.
-        guess: whether to take the best guess where nothing is found.
-        readable: which files a program may load.
         notes: what a person should know: words half understood, guesses.
         heats: what the map answered; another seeker on the same map need not ask again.
         choices: the things that fitted equally where the last error asks which is meant.
@@ -211,15 +195,12 @@ class Seeker:
         ``choose`` answers which of several things that fit equally is meant, one number from 1 for each name in the
         order of the program. None: the best or the nearest, without a question.
         """
+        self.avlmap, self.guess, self.readable, self._tell = avlmap, guess, readable, tell
         self._asks, self._numbers = choose is not None, list(choose or ())
         self._meant: dict[str, int] = {}
         self.choices: tuple[str, ...] = ()
         self._storey, self.heats = storey, {} if heats is None else heats
-        self.avlmap = avlmap
-        self.guess = guess
-        self.readable = readable
         self.notes: list[str] = []
-        self._tell = tell
         self._handed_out: dict[Place, Destination] = {}
         self._instances: set[Place] = set()
         self._last_line = ""
@@ -267,7 +248,6 @@ class Seeker:
         return self.heats[key]
 
     def _place(self, skill: str, at: object, sound: object) -> HeardAt | None:
-        """Return the place of a sound that a program means: where the map does not know its source, the robot's."""
         if at not in ("robot", "source"):
             raise ProgramError(f'{skill} takes at="robot" or at="source", not {at!r}.')
         if at == "robot" or self.avlmap.settings.sounds.at is not None:
@@ -281,11 +261,7 @@ class Seeker:
     def _named(
         self, kind: str, name: str, primary: bool, heat_of: Callable[[str], Heatmap], at: HeardAt | None = None
     ) -> Heatmap:
-        """Return the heat of a name; where it names a storey ("bed upstairs"), with the goals on that one alone.
-
-        Raises:
-            GoalNotFoundError: the map has no such storey, or nothing of the name is found there.
-        """
+        """Return the heat of a name; where it names a storey ("bed upstairs"), with the goals on that one alone."""
         said = said_storeys(name)
         if len(said) != 1 or not said[0].said or not said[0].rest:
             return self._known((kind, name, primary, at), lambda: heat_of(name))
@@ -307,28 +283,18 @@ class Seeker:
     def best(self, target: Target) -> Destination:
         """Return the thing that a target means: the likeliest.
 
-        Raises:
-            GoalNotFoundError: there is none.
-            SeveralFitError: several fit equally, and none was chosen.
+        Like all that finds, it raises ``GoalNotFoundError`` where there is none, and ``SeveralFitError`` where several
+        fit equally and none was chosen.
         """
         things, _ = self._candidates(target)
         return self._chosen(self._of_equal(things) if self._asks else things[0], len(things))
 
     def referent(self, target: Target, here: Float[np.ndarray, "2"]) -> Destination:
-        """Return the thing that a target means for a robot: the likeliest; without questions that nearest to it.
-
-        Raises:
-            GoalNotFoundError: there is none.
-            SeveralFitError: several fit equally, and none was chosen.
-        """
+        """Return the thing that a target means for a robot: the likeliest; without questions that nearest to it."""
         return self.best(target) if self._asks else self.nearest(target, here)
 
     def nearest(self, target: Target, here: Float[np.ndarray, "2"]) -> Destination:
-        """Return the thing nearest to a robot of those that a target may mean.
-
-        Raises:
-            GoalNotFoundError: there is none.
-        """
+        """Return the thing nearest to a robot of those that a target may mean."""
         things, one = self._candidates(target)
         among = things if not one else as_likely(things) if self._asks else things[:1]
         return self._chosen(nearest(among, here), len(things))
@@ -360,11 +326,7 @@ class Seeker:
         return tuple(f"{place_text(place)}{f' in {the_room(room)}' if room else ''}" for place, room in texts)
 
     def pair(self, a: Target, b: Target, here: Float[np.ndarray, "2"]) -> tuple[Destination, Destination]:
-        """Return the two things that are meant: of several, those nearest to each other and to the robot.
-
-        Raises:
-            GoalNotFoundError: there is none, or only one thing for both.
-        """
+        """Return the two things that are meant: of several, those nearest to each other and to the robot."""
         (first, one), (second, other) = self._candidates(a), self._candidates(b)
         first, second = likely(first, one), likely(second, other)
         pairs = [(x, y) for x, y in product(first, second) if not same_thing(x, y)]
@@ -429,12 +391,7 @@ class Seeker:
         return target
 
     def place_of(self, target: Target) -> Place:
-        """Return the place of the thing that a target means; a later skill finds the thing again at that place.
-
-        Raises:
-            GoalNotFoundError: there is none.
-            SeveralFitError: several fit equally, and none was chosen.
-        """
+        """Return the place of the thing that a target means; a later skill finds the thing again at that place."""
         return self._handed(self.best(target))
 
     def place_of_thing(self, thing: Destination) -> Place:
@@ -444,22 +401,13 @@ class Seeker:
         return place
 
     def every(self, target: Target, here: Float[np.ndarray, "2"]) -> list[Destination]:
-        """Return all things that a target may mean, the nearest first.
-
-        Raises:
-            GoalNotFoundError: there is none.
-        """
+        """Return all things that a target may mean, the nearest first."""
         things, one = self._candidates(target)
         chosen = likely(things, one) if not one else things
         return sorted(chosen, key=lambda thing: float(np.linalg.norm(thing.outline.nearest_to(here) - here)))
 
     def nth(self, target: Target, here: Float[np.ndarray, "2"], number: int, order: str) -> Destination:
-        """Return a thing that a target may mean by its number, from 1, in an order; see `get_nth_pos`.
-
-        Raises:
-            GoalNotFoundError: there are not so many.
-            ProgramError: there is no such order.
-        """
+        """Return a thing that a target may mean by its number, from 1, in an order; see `Robot.get_nth_pos`."""
         things = self.every(target, here)
         ahead = np.mean([thing.outline.centre for thing in things], axis=0) - here
         sides = {"left": (-ahead[1], ahead[0]), "right": (ahead[1], -ahead[0])} | _SIDES

@@ -46,47 +46,31 @@ class PathAnswer(TypedDict):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spot:
-    """A place on a storey.
+    """A place on a storey."""
 
-    Attributes:
-        xy: level x and y.
-        storey: its number; 0 in a map of one.
-    """
-
-    xy: Float[np.ndarray, "2"]
+    xy: Float[np.ndarray, "2"]  # level x and y
     storey: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
-    """A path that may change storeys.
+    """A path that may change storeys."""
 
-    Attributes:
-        stop: where the body stops for the place that it goes to.
-        points: (n, 3) level frame; between two of them on one storey the height is that of its floor.
-        length_m: along the floors and up or down the stairs.
-        cost: its metres, each weighted by how narrow it is there; a metre of stairs costs 1.
-        storeys: numbers of those that it is on, in order.
-    """
-
-    stop: Stop
-    points: Float[np.ndarray, "n 3"]
-    length_m: float
-    cost: float
-    storeys: tuple[int, ...] = (0,)
+    stop: Stop  # where the body stops for the place that it goes to
+    points: Float[np.ndarray, "n 3"]  # level frame; between two of them on one storey the height is that of its floor
+    length_m: float  # along the floors and up or down the stairs
+    cost: float  # its metres, each weighted by how narrow it is there; a metre of stairs costs 1
+    storeys: tuple[int, ...] = (0,)  # that it is on, in order
 
 
 class PathFinder:
     """Plans over one map's floors for one body; several threads may share it.
 
-    Attributes:
-        avlmap: the map.
-        shape: the body; one that climbs goes by the stairs of the map to another storey.
+    A body that climbs goes by the stairs of the map to another storey.
     """
 
     def __init__(self, avlmap: "AVLMap", shape: BodyShape = BASE) -> None:
-        self.avlmap = avlmap
-        self.shape = shape
+        self.avlmap, self.shape = avlmap, shape
         self._lock = threading.RLock()
         self._planners: dict[int, tuple[Obstacles, Planner]] = {}
 
@@ -104,9 +88,8 @@ class PathFinder:
     def spot(self, place: Float[np.ndarray, " n"]) -> Spot:
         """Return level x and y of a place, and its storey.
 
-        Args:
-            place: three numbers are a point of the recording frame; two are x and y of the level frame, on the storey
-                where the walk of the map began.
+        Three numbers are a point of the recording frame, two are x and y of the level frame, on the storey where the
+        walk of the map began.
         """
         if len(place) == 2:
             return Spot(np.asarray(place, np.float64), storey_of_walk(self.avlmap))
@@ -161,17 +144,8 @@ class PathFinder:
         one, other = self.spot(start), self.spot(place)
         found, storeys = self.between(one, other), self.avlmap.storeys
         if found is None:
-            note = "" if storeys is None else storeys.refusal(one.storey, other.storey, self.shape.climbs)
-            off = [
-                name
-                for name, at in (("start", one), ("goal", other))
-                if not self.planner(at.storey).costmap.holds(at.xy)
-            ]
-            note = note or self._forbidden(other)
-            if off:
-                note = f"the {' and the '.join(off)} {'lies' if len(off) == 1 else 'lie'} outside of the map"
             return {"found": False, "points": [], "length_m": None, "cost": None, "stop": None,
-                    "note": note or "no free floor leads there", "frame": FRAME}  # fmt: skip
+                    "note": self._no_path(one, other), "frame": FRAME}  # fmt: skip
         answer: PathAnswer = {
             "found": True,
             "points": [self._world(point) for point in found.points],
@@ -189,6 +163,14 @@ class PathFinder:
         """Return where a body stops at the end of a route."""
         at = np.append(route.stop.xy, self._planned(route.storeys[-1])[0].floor_m)
         return {"position": self._world(at), "beside_m": route.stop.beside_m, "seen": bool(route.stop.seen)}
+
+    def _no_path(self, start: Spot, goal: Spot) -> str:
+        ends, storeys = {"start": start, "goal": goal}, self.avlmap.storeys
+        off = [name for name, at in ends.items() if not self.planner(at.storey).costmap.holds(at.xy)]
+        if off:
+            return f"the {' and the '.join(off)} {'lies' if len(off) == 1 else 'lie'} outside of the map"
+        note = "" if storeys is None else storeys.refusal(start.storey, goal.storey, self.shape.climbs)
+        return note or self._forbidden(goal) or "no free floor leads there"
 
     def _forbidden(self, spot: Spot) -> str:
         obstacles, _ = self._planned(spot.storey)
@@ -234,23 +216,14 @@ class NearGoalsAnswer(TypedDict):
 def goals_near(finder: PathFinder, answer: Answer, near: Float[np.ndarray, " n"], top: int = 3) -> NearGoalsAnswer:
     """Return the goals of an answer by the length of the path to each; those that no path reaches come last.
 
-    Goals of half the best score and less are left out: near and wrong helps nobody.
-
-    Args:
-        finder: plans over the map that was queried.
-        answer: of the query.
-        near: where the body is; see ``PathFinder.spot``.
-        top: most goals.
-
-    Raises:
-        MapError: the map holds too little to find a floor.
+    Goals of half the best score and less are left out: near and wrong helps nobody. ``near`` is where the body is; see
+    ``PathFinder.spot``. It raises ``MapError`` where the map holds too little to find a floor.
     """
     start = finder.spot(near)
     likely = [goal for goal in answer.goals if goal.score >= 0.5 * answer.goals[0].score]
     goals: list[NearGoal] = []
     for goal in likely:
         found = finder.between(start, finder.spot(np.array(goal.position)))
-        stop = None if found is None else finder.stop_answer(found)
         goals.append(
             {
                 "position": list(goal.position),
@@ -258,7 +231,7 @@ def goals_near(finder: PathFinder, answer: Answer, near: Float[np.ndarray, " n"]
                 "probability": goal.probability,
                 "reachable": found is not None,
                 "path_m": None if found is None else found.length_m,
-                "stop": stop,
+                "stop": None if found is None else finder.stop_answer(found),
             }
         )
     goals.sort(key=lambda one: (one["path_m"] is None, one["path_m"] or 0.0))

@@ -5,7 +5,6 @@ Grids are indexed (i, j) for x and y; a place in cells is such that cell (i, j) 
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
 
 import cv2
 import numpy as np
@@ -42,7 +41,7 @@ class CellGraph:
     weights: csr_array
 
     @classmethod
-    def of(cls, mask: Bool[np.ndarray, "nx ny"], cost: Float[np.ndarray, "nx ny"]) -> Self:
+    def of(cls, mask: Bool[np.ndarray, "nx ny"], cost: Float[np.ndarray, "nx ny"]) -> "CellGraph":
         """Join the true cells of a mask."""
         number, cells = np.where(mask, np.cumsum(mask).reshape(mask.shape) - 1, -1), np.argwhere(mask)
         around, numbers = np.pad(cost, 2), np.pad(number, 2, constant_values=-1)
@@ -75,7 +74,7 @@ class CellGraph:
 def _joined(
     around: Int[np.ndarray, "px py"], cells: Int[np.ndarray, "n 2"], step: tuple[int, int]
 ) -> Int[np.ndarray, "k 2"]:
-    """Return the pairs of cells that are one step apart, over nothing but numbered cells; the numbers have a margin."""
+    """Return the pairs of cells that are one step apart, over numbered cells alone; the grid has a margin of two."""
     reached = around[tuple((cells + 2 + step).T)]
     is_open = reached >= 0
     for by in _STEPS[step]:
@@ -168,34 +167,21 @@ def straightened(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedPath:
-    """A path for a body's middle.
+    """A path for a body's middle."""
 
-    Attributes:
-        points: (n, 2) level x and y of its corners, from start to goal, metres.
-        cost: the sum over its metres of what each costs.
-        length_m: its length.
-    """
-
-    points: Float64[np.ndarray, "n 2"]
-    cost: float
+    points: Float64[np.ndarray, "n 2"]  # level x and y of its corners, from start to goal, metres
+    cost: float  # the sum over its metres of what each costs
     length_m: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stop:
-    """Where to stop for a place.
+    """Where to stop for a place."""
 
-    Attributes:
-        xy: level x and y; that of the place itself where a body can stand there.
-        beside_m: how far from the place that is; 0 for the place itself.
-        seen: whether the place can be seen from there.
-        open: whether the body could stand in the place itself; then it stops beside it since no path leads there.
-    """
-
-    xy: Float64[np.ndarray, "2"]
-    beside_m: float = 0.0
-    seen: bool = True
-    open: bool = True
+    xy: Float64[np.ndarray, "2"]  # level x and y; that of the place itself where a body can stand there
+    beside_m: float = 0.0  # distance from the place; 0 for the place itself
+    seen: bool = True  # whether the place can be seen from there
+    open: bool = True  # whether the body could stand in the place itself; it stops beside it since no path leads there
 
 
 class Planner:
@@ -215,11 +201,9 @@ class Planner:
         return CellGraph.of(self.costmap.passable, self.costmap.cost)
 
     def way(self, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> PlannedPath | None:
-        """Return the cheapest path between two places, None where there is none.
+        """Return the cheapest path to a place where the body can stand, both level x and y; None where there is none.
 
-        Args:
-            start: level x and y; from where no body could stand the path leads straight to the nearest place that can.
-            goal: level x and y, where the body can stand.
+        From where no body could stand it leads straight to the nearest place that can.
         """
         if not self.costmap.is_passable(goal):
             return None
@@ -232,12 +216,7 @@ class Planner:
         return self._measured(self._straightened(corners), None if out is start else start)
 
     def entry(self, start: Float[np.ndarray, "2"], part: int | None = None) -> Float64[np.ndarray, "2"] | None:
-        """Return where a body at a place joins the cells that can be passed: at the place itself where it can.
-
-        Args:
-            start: level x and y.
-            part: only to this connected part.
-        """
+        """Return where a body joins the cells that can be passed (of a part): at the place itself where it can."""
         costmap = self.costmap
         if costmap.is_passable(start):
             at = self._part[tuple(costmap.cell_of(start))]
@@ -281,7 +260,6 @@ class Planner:
     def _near(
         self, mask: Bool[np.ndarray, "nx ny"], xy: Float[np.ndarray, "2"], reach_m: float
     ) -> tuple[Int[np.ndarray, "n 2"], Float64[np.ndarray, " n"]]:
-        """Return the true cells within reach of a place and their distances, nearest first."""
         costmap = self.costmap
         low = np.maximum(costmap.cell_of(np.asarray(xy) - reach_m), 0)
         high = np.maximum(costmap.cell_of(np.asarray(xy) + reach_m) + 1, low)
@@ -292,7 +270,6 @@ class Planner:
         return cells[order], distance_m[order]
 
     def _straightened(self, corners: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
-        """Pull a path straight wherever that costs no more, clearance included; in cells."""
         passable, cost = self.costmap.passable, self.costmap.cost
         step = np.round(np.diff(corners, axis=0), 6)
         turns = np.r_[True, (step[1:] != step[:-1]).any(axis=1), True]

@@ -49,8 +49,7 @@ class RealRobot(Protocol):
     def __call__(self, obstacles: "Obstacles") -> RobotDriver:
         """Connect, with a guard that cancels the robot's goals when this process dies.
 
-        Args:
-            obstacles: of the map; goals are moved to where the robot can stand.
+        Goals are moved to where the robot can stand among the map's obstacles.
 
         Raises:
             NavigationError: it cannot be reached, or does not know where it is.
@@ -60,12 +59,7 @@ class RealRobot(Protocol):
 
 
 def find_robot(kind: str, address: str, file: Path | None) -> RealRobot:
-    """Return a robot by the name of what drives it.
-
-    Args:
-        kind: ``nav2`` or ``move_base``.
-        address: of its bridge, or ``native``.
-        file: its frames and settings.
+    """Return a robot by what drives it (``nav2`` or ``move_base``), the address of its bridge, or ``native``, its file.
 
     Raises:
         NavigationError: the file cannot be read.
@@ -83,10 +77,7 @@ class RobotScene(Protocol):
     def robot(self, avlmap: "AVLMap", shape: BodyShape = BASE, start: GroundPose | None = None) -> MapDriver:
         """Put a robot into the scene, and return what drives it by the map alone.
 
-        Args:
-            avlmap: the map of the scene.
-            shape: of the body.
-            start: where it stands at first; by default a free place near that where the map's walk began.
+        By default it starts at a free place near that where the map's walk began.
 
         Raises:
             AvlmapsError: the scene and the map do not lie in the same frame, or the robot cannot stand at the start.

@@ -35,46 +35,33 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoggedMove:
-    """One movement that a skill made.
-
-    Attributes:
-        skill: which skill.
-        name: of the thing that it went to; ``""`` for a turn or a place.
-        goal: where it was to end, world, metres; None for a turn.
-        stop: where it ended, world, on the floor.
-        distance_m: from the goal to where it ended, over the ground (the world need not be level); None for a turn.
-        heading_rad: where it looks then, level frame, counter-clockwise from +x.
-        reached: whether the driver reached its goal.
-        actions: the discrete actions taken.
-        path: (n, 2) places passed, level x and y.
-        note: what the driver had to say.
-        contacts: how often the robot touched something.
-    """
+    """One movement that a skill made."""
 
     skill: str
-    name: str
-    goal: Triple | None
-    stop: Triple
-    distance_m: float | None
-    heading_rad: float
+    name: str  # of the thing that it went to; "" for a turn or a place
+    goal: Triple | None  # where it was to end, world, metres; None for a turn
+    stop: Triple  # where it ended, world, on the floor
+    distance_m: float | None  # from the goal to the stop, over the ground (the world need not be level)
+    heading_rad: float  # where it looks then, level frame, counter-clockwise from +x
     reached: bool
     actions: tuple[Action, ...]
-    path: Float[np.ndarray, "n 2"]
-    note: str = ""
-    contacts: int = 0
+    path: Float[np.ndarray, "n 2"]  # level x and y of the places passed
+    note: str = ""  # what the driver had to say
+    contacts: int = 0  # how often the robot touched something
 
     def to_json(self) -> dict[str, Any]:
         """Return it as a subgoal or a step's result is printed."""
-        answer: dict[str, Any] = {"skill": self.skill, "name": self.name}
-        if self.goal is not None:
-            answer |= {"goal": _rounded(self.goal)}
-        answer |= {"stop": _rounded(self.stop)}
-        if self.distance_m is not None:
-            answer |= {"distance_m": round(self.distance_m, 4)}
-        answer |= {"heading_rad": round(self.heading_rad, 4), "reached": self.reached}
-        return (
-            answer | ({"contacts": self.contacts} if self.contacts else {}) | ({"note": self.note} if self.note else {})
-        )
+        return {
+            "skill": self.skill,
+            "name": self.name,
+            **({} if self.goal is None else {"goal": _rounded(self.goal)}),
+            "stop": _rounded(self.stop),
+            **({} if self.distance_m is None else {"distance_m": round(self.distance_m, 4)}),
+            "heading_rad": round(self.heading_rad, 4),
+            "reached": self.reached,
+            **({"contacts": self.contacts} if self.contacts else {}),
+            **({"note": self.note} if self.note else {}),
+        }
 
     def __str__(self) -> str:
         x, y, z = self.stop
@@ -84,7 +71,6 @@ class LoggedMove:
 
 
 def _joined(arrivals: Sequence[Arrival]) -> Arrival:
-    """Return several movements as one."""
     last = arrivals[-1]
     notes = dict.fromkeys(arrival.note for arrival in arrivals if arrival.note)
     return Arrival(
@@ -115,10 +101,6 @@ class RobotSettings:
     """Let the seconds of a `wait` pass; a plan passes over them."""
 
 
-def _silent(_: str) -> None:
-    """Report nothing."""
-
-
 class Robot:
     """A robot that knows a map and can drive. Each public method is a skill, for programs, plans and chat models alike.
 
@@ -126,10 +108,7 @@ class Robot:
     the map raises ``GoalNotFoundError``. Names are those of the paper and of VLMaps, and angles are in degrees.
     A phrase or a heatmap means the likeliest thing. Where several fit equally the skill fails and asks which; a
     program that means any of them says so (`get_nearest_pos`). Settings may take the nearest without a question, as the
-    paper's programs do.
-
-    Attributes:
-        moves: the movements that it made.
+    paper's programs do. ``moves`` are the movements that it made.
     """
 
     def __init__(
@@ -138,20 +117,14 @@ class Robot:
         driver: Driver,
         settings: RobotSettings | None = None,
         readable: Readable | None = None,
-        tell: Callable[[str], None] = _silent,
+        tell: Callable[[str], None] = lambda _: None,
         pause: Callable[[float], None] = sleep,
         heats: Heats | None = None,
     ) -> None:
         """Make a robot of a map and what drives it in the map's level frame.
 
-        Args:
-            avlmap: the map.
-            driver: moves the body.
-            settings: how skills are taken.
-            readable: which files a program may load; those in the working directory by default.
-            tell: is given a line for each thing found, as it happens.
-            pause: waits for some seconds; a rehearsal does not wait, and a stop ends the wait.
-            heats: what this map answered before.
+        A program may load the files that are ``readable``, those in the working directory by default. ``tell`` is given
+        a line for each thing found; ``pause`` waits for some seconds; ``heats`` is what this map answered before.
         """
         self.avlmap, self.driver, self._pause = avlmap, driver, pause
         self.settings = settings or RobotSettings()
@@ -335,16 +308,6 @@ class Robot:
         if self.settings.waits:
             self._pause(seconds)
 
-    @property
-    def actions(self) -> list[Action]:
-        """All discrete actions that were taken."""
-        return [action for move in self.moves for action in move.actions]
-
-    @property
-    def path(self) -> Float[np.ndarray, "n 2"]:
-        """The places that were passed, level x and y."""
-        return np.concatenate([np.zeros((0, 2)), *(move.path for move in self.moves)])
-
     @cached_property
     def floor_m(self) -> float:
         """Level height of the floor that the robot is on."""
@@ -373,7 +336,6 @@ class Robot:
         direction: Callable[[Float[np.ndarray, "2"]], Float[np.ndarray, "2"]],
         distance_m: float,
     ) -> None:
-        """Drive to a side of a thing: the direction from its middle, by that in which the robot sees it."""
         thing = self.seeker.referent(target, self._here)
         distance_m = number_of(distance_m, skill, _MOST_M, "metres")
         if distance_m < 0.0:

@@ -33,19 +33,10 @@ def plot_path(
     contacts: Float[np.ndarray, "m 2"] | None = None,
     title: str = "",
 ) -> Path:
-    """Write a picture of a robot's path.
+    """Write a picture of a robot's path, in which the movements to a place are numbered.
 
-    Args:
-        path: of the picture.
-        space: the map's voxels, with its colours.
-        start: where the robot stood at first.
-        moves: what it did; those to a place are numbered.
-        obstacles: the obstacles that the map knows.
-        contacts: (m, 2) places where it touched something that the map did not know, level x and y.
-        title: such as the command.
-
-    Raises:
-        QueryError: the picture cannot be written there.
+    ``contacts`` are places where it touched something that the map did not know, level x and y. It raises
+    ``QueryError`` where the picture cannot be written.
     """
     view = TopDown.of(space)
     figure, (ax,) = panels(view, 1)
@@ -81,7 +72,6 @@ def _draw_pose(ax: "Axes", pose: GroundPose, name: str) -> None:
 
 
 def _draw_subgoal(ax: "Axes", space: Space, number: int, move: LoggedMove) -> None:
-    """Ring the goal, dot the stop, and join them where they are apart."""
     goal, stop = space.level(np.array(move.goal)), space.level(np.array(move.stop))
     ax.plot(*np.stack([goal, stop])[:, :2].T, color=_GOAL, linewidth=1.2, linestyle=":", zorder=6)
     ax.plot(*goal[:2], linestyle="none", marker="o", markersize=11, markerfacecolor="none", markeredgecolor=_GOAL,
