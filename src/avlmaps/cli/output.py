@@ -191,8 +191,9 @@ def query_lines(answer: Mapping[str, Any]) -> list[str]:
     others = [f"{one['query']} ({one['probability']:.2f})" for one in others if one["found"]]
     lines += [f"or: {', '.join(others)}"] if others else []
     if answer["goals"]:
+        named = {"name": "name"} if any("name" in goal for goal in answer["goals"]) else {}
         columns: dict[str, Column] = {
-            "": "number", f"place ({answer['frame']} frame)": "position", "probability": "probability",
+            "": "number", **named, f"place ({answer['frame']} frame)": "position", "probability": "probability",
             "size in m (level axes)": lambda goal: size_text(goal["size"]),
         }  # fmt: skip
         lines += table(columns, [{"number": number, **goal} for number, goal in enumerate(answer["goals"], start=1)])
