@@ -10,7 +10,7 @@ from training.found.fit import fitted, held_out
 from training.found.rows import balanced, read_rows
 
 from avlmaps.core.question import Modality
-from avlmaps.query.goals import NUMBERS, GoalEvidence, logit, probability_of, weights
+from avlmaps.query.goals import FACTORS, GoalEvidence, logit, probability_of, weights
 from avlmaps_sim.bench.found.suite import brier
 
 logits, logs = st.floats(-4, 4), st.floats(-4, 0)
@@ -22,7 +22,7 @@ joined = st.builds(
 )  # fmt: skip
 
 
-@given(joined, st.sampled_from(NUMBERS), st.floats(0, 2))
+@given(joined, st.sampled_from(FACTORS), st.floats(0, 2))
 def test_more_of_any_evidence_makes_a_goal_no_less_likely(evidence: GoalEvidence, name: str, more: float) -> None:
     better = replace(evidence, **{name: getattr(evidence, name) + more})
     if name == "thing":
@@ -52,7 +52,7 @@ def test_the_weights_that_ship_are_those_of_the_rows() -> None:
 
 def test_each_row_is_evidence_again() -> None:
     for row in read_rows()[::50]:
-        assert [getattr(row.evidence, name) for name in NUMBERS] == pytest.approx(list(row.numbers))
+        assert [getattr(row.evidence, name) for name in FACTORS] == pytest.approx(list(row.numbers))
 
 
 @pytest.mark.nightly

@@ -8,7 +8,7 @@ from training.found.rows import Row, balanced
 
 from avlmaps.query.goals import FACTORS, factors_of, probability_of
 
-COLUMNS = tuple(name for factor, numbers in FACTORS.items() for name in (f"{factor}_bias", *numbers))
+COLUMNS = tuple(name for factor in FACTORS for name in (f"{factor}_bias", factor))
 # The ridge draws a number's weight towards 1, and a bias towards 2: most of what is likely passes.
 _RIDGE = 1.0
 _START = np.array([2.0 if name.endswith("_bias") else 1.0 for name in COLUMNS])
@@ -43,11 +43,10 @@ def fitted(rows: Sequence[Row]) -> Weights:
 
 
 def _design(rows: Sequence[Row], factor: str) -> np.ndarray:
-    """Return the numbers of a factor in their columns, and 0 elsewhere."""
+    """Return the number of a factor in its column, and 0 elsewhere."""
     design = np.zeros((len(rows), len(COLUMNS)))
     design[:, COLUMNS.index(f"{factor}_bias")] = 1.0
-    for name in FACTORS[factor]:
-        design[:, COLUMNS.index(name)] = [getattr(row.evidence, name) for row in rows]
+    design[:, COLUMNS.index(factor)] = [getattr(row.evidence, factor) for row in rows]
     return design
 
 

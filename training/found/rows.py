@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from avlmaps.core.question import Modality
-from avlmaps.query.goals import NUMBERS, GoalEvidence
+from avlmaps.query.goals import FACTORS, GoalEvidence
 from avlmaps_sim.bench.found.answers import Judged
 
 ROWS = Path(__file__).parent / "rows.csv"
-_COLUMNS = ("scene", "kind", "words", "answerable", "right", "combination", *NUMBERS, "first_alone")
+_COLUMNS = ("scene", "kind", "words", "answerable", "right", "combination", *FACTORS, "first_alone")
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Row:
         answerable: whether anything is right.
         right: whether the first goal is.
         combination: of what is sought and what it is near.
-        numbers: of the evidence, in the order of ``NUMBERS``.
+        numbers: of the evidence, in the order of ``FACTORS``.
         first_alone: probability of the first goal of a query for what is sought alone.
     """
 
@@ -43,7 +43,7 @@ class Row:
     @classmethod
     def of(cls, judged: Judged, evidence: GoalEvidence) -> "Row":
         """Return the row of an answer."""
-        numbers = tuple(round(float(getattr(evidence, name)), 4) for name in NUMBERS)
+        numbers = tuple(round(float(getattr(evidence, name)), 4) for name in FACTORS)
         facts = judged.scene, judged.kind, judged.words, judged.answerable, judged.right
         return cls(*facts, combination(evidence), numbers, round(evidence.alone, 4))
 
@@ -52,7 +52,7 @@ class Row:
         """The evidence again."""
         lead, *near = self.combination.replace(" near ", " and ").split(" and ")
         alone = min(1.0 / (1.0 + math.exp(-self.numbers[0])), self.first_alone)
-        numbers = dict(zip(NUMBERS, self.numbers, strict=True))
+        numbers = dict(zip(FACTORS, self.numbers, strict=True))
         near_kinds = tuple(map(Modality, near))
         return GoalEvidence(Modality(lead), near_kinds, alone, **numbers)
 
@@ -79,7 +79,7 @@ def read_rows() -> list[Row]:
         return [
             Row(
                 one["scene"], one["kind"], one["words"], one["answerable"] == "1", one["right"] == "1",
-                one["combination"], tuple(float(one[name]) for name in NUMBERS), float(one["first_alone"]),
+                one["combination"], tuple(float(one[name]) for name in FACTORS), float(one["first_alone"]),
             )
             for one in csv.DictReader(file)
         ]  # fmt: skip

@@ -1,8 +1,7 @@
 """The content of a map without a question: its things, sounds and rooms, each named with a confidence.
 
-A thing is a connected group of voxels that a word of the vocabulary wins (``query.instances``). Several words may
-claim the same voxels ("desk", "dining table"); the most confident claim stands, and what overlaps it is left out. What
-is certainly a chair, and perhaps an armchair, is listed as a chair.
+Several words may claim the same voxels ("desk", "dining table"); the most confident claim stands. What is certainly a
+chair, and perhaps an armchair, is listed as a chair.
 """
 
 from collections import Counter
@@ -23,6 +22,7 @@ from avlmaps.query.modalities.sound import sound_features
 from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer, row_of
 from avlmaps.query.settings import FEWEST_VIEWS, FOUND_AT, LEAST_PART
 from avlmaps.query.voxel_space import middle_of
+from avlmaps.query.words import unknown_note
 
 if TYPE_CHECKING:
     from avlmaps.maps.storeys import Storeys
@@ -165,12 +165,7 @@ def numbered(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def require_known(knows: Callable[[str], bool], names: Sequence[str]) -> None:
-    """Raise an error where the pixel encoder does not know one of some names.
-
-    ``QueryError``: it does not; the sentence says what was probably meant.
-    """
-    from avlmaps.query.words import unknown_note
-
+    """Raise ``QueryError`` where the pixel encoder does not know one of some names; it says what was probably meant."""
     for name in names:
         if not knows(name):
             note = unknown_note(name)
@@ -187,10 +182,8 @@ def find_things(
 ) -> list[Thing]:
     """Return the things of a map, most confident first.
 
-    ``search`` finds the instances of a word, with its narrower names or alone. ``watch`` is given "things", the
-    number of names that were looked for, and of all; what it raises ends the search.
-
-    ``QueryError``: ``least_confidence`` lies outside [0, 1]. ``BackendError``: the map's profile has no pixel encoder.
+    ``search`` finds the instances of a word, with its narrower names or alone. ``watch`` is given "things", the number
+    of names that were looked for, and of all. ``QueryError``: ``least_confidence`` lies outside [0, 1].
     """
     if not 0.0 <= least_confidence <= 1.0:
         raise QueryError(f"The least confidence is {least_confidence:g}; it must lie between 0 and 1.")
@@ -244,10 +237,7 @@ def thing_of(avlmap: "AVLMap", name: str, confidence: float, rows: Int[np.ndarra
 
 
 def find_sounds(avlmap: "AVLMap", most_names: int = 3) -> list[SoundEvent]:
-    """Return the sounds of a map in the order of their onset, each with its likeliest names.
-
-    ``MapError``: the map was built with another sound encoder than is installed.
-    """
+    """Return the sounds of a map in the order of their onset, each with its likeliest names."""
     heard = avlmap.data.sounds
     if not len(heard):
         return []
@@ -257,27 +247,18 @@ def find_sounds(avlmap: "AVLMap", most_names: int = 3) -> list[SoundEvent]:
     scores = encoder.score_words(sound_features(heard), words) if words else np.zeros((len(heard), 0))
     events: list[SoundEvent] = []
     for k in range(len(heard)):
-        best = np.argsort(-scores[k], kind="stable")[:most_names]
+        best: list[int] = np.argsort(-scores[k], kind="stable")[:most_names].tolist()
         track = np.asarray(heard.track[heard.track_offsets[k] : heard.track_offsets[k + 1]], np.float64)
-        events.append(
-            SoundEvent(
-                names=tuple(words[int(i)] for i in best),
-                confidences=tuple(round(float(scores[k, i]), 3) for i in best),
-                onset_s=float(heard.onset_s[k]),
-                offset_s=float(heard.offset_s[k]),
-                position=plain_point(track.mean(axis=0)),
-                track=track,
-                clip=avlmap.data.sounds.clips[k],
-            )
-        )
+        events.append(SoundEvent(
+            names=tuple(words[i] for i in best), confidences=tuple(round(float(scores[k, i]), 3) for i in best),
+            onset_s=float(heard.onset_s[k]), offset_s=float(heard.offset_s[k]), clip=heard.clips[k],
+            position=plain_point(track.mean(axis=0)), track=track,
+        ))  # fmt: skip
     return events
 
 
 def find_rooms(avlmap: "AVLMap", least_confidence: float = 0.0) -> list[Room]:
-    """Return the rooms of a map, those with most views first.
-
-    A room is a region of the floor that walls and doorways bound and that keyframes looked into; a map without a floor
-    plan has none.
+    """Return the rooms of a map, those with most views first; a map without a floor plan has none.
 
     ``BackendError``: the map's profile has no view encoder.
     """

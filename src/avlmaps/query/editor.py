@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,11 +14,12 @@ from avlmaps.core.wording import option, place_text
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, EditedSpot, World, append_edit, in_force, read_edits
 from avlmaps.query.edits import Edited, means, plain_name, said
 from avlmaps.query.places import is_place, place_given
+from avlmaps.query.schema import EditAnswer, row_of
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Thing
-    from avlmaps.query.schema import EditAnswer, EditsAnswer
+    from avlmaps.query.schema import EditsAnswer
 
 Place = Sequence[float] | str
 """x, y, z in metres of the recording frame, or x, y of the level frame; as numbers or as text."""
@@ -30,12 +31,11 @@ _NEEDS = {"rename": ("to",), "rename-room": ("name", "to"), "forbid": ("name",),
 
 
 class Editor:
-    """Corrects a map in its folder.
+    """Corrects a map in its folder, which another build of it keeps.
 
-    Edits are stored beside the map and survive another build of it. ``by`` says who made them, ``thing`` what a thing
-    is called (None for what is at a place), ``at`` where it is, for one of several, and ``to`` its name from now on.
-    ``QueryError``: there is no such thing or room, or there are several, or a name or place is none. ``MapError``: the
-    map lies in memory alone, or cannot be written.
+    ``by`` says who made an edit, ``thing`` what a thing is called (None for what is at a place), ``at`` where it is,
+    for one of several, and ``to`` its name from now on. ``QueryError``: there is no such thing or room, or there are
+    several, or a name or place is none. ``MapError``: the map lies in memory alone, or cannot be written.
     """
 
     def __init__(self, avlmap: "AVLMap") -> None:
@@ -87,9 +87,7 @@ class Editor:
     ) -> Edit:
         """Take a thing apart by its connected pieces, by an upright plane through two places, or by a box.
 
-        The box is x and y of two opposite corners, level frame, metres.
-
-        ``QueryError``: there is no such thing, or the cut leaves it whole.
+        The box is x and y of two opposite corners, level frame, metres. ``QueryError``: the cut leaves the thing whole.
         """
         found = self._thing(thing, at)
         if len(plane) not in (0, 2) or (plane and box):
@@ -113,9 +111,7 @@ class Editor:
         """Forbid an area to robots: no path goes through it, and no goal in it is accepted.
 
         The box is x and y of two opposite corners, level frame, metres, on the storey where the map's walk began;
-        ``room`` is instead what ``rooms`` calls a room, or a place in it.
-
-        ``QueryError``: neither or both are given, the box is none or far outside of the map, or there is no such room.
+        ``room`` is instead what ``rooms`` calls a room, or a place in it. ``QueryError``: the box is none or far away.
         """
         if bool(box) == (room is not None):
             raise QueryError("An area is forbidden by a box x0,y0,x1,y1 or by a room; give one of them.")
@@ -131,9 +127,7 @@ class Editor:
     def pin(self, name: str, at: Place, *, by: str = "") -> Edit:
         """Give a place a name of one's own: "my charging dock". The same name again moves it.
 
-        A place of two numbers is on the floor of the storey where the map's walk began.
-
-        ``QueryError``: the place or the name is none, or the place lies far outside of the map.
+        A place of two numbers is on the floor of the storey where the map's walk began. ``QueryError``: it is far away.
         """
         self._require_here(self._level(at)[None], "The place")
         spot = EditedSpot(middle=plain_point(self._in_space(place_given(at))))
@@ -141,10 +135,7 @@ class Editor:
 
     @checked(QueryError)
     def undo(self, which: str = "", *, by: str = "") -> Edit:
-        """Undo an edit by its id; by default the last that is in force.
-
-        ``QueryError``: there is no such edit in force.
-        """
+        """Undo an edit by its id; by default the last. ``QueryError``: there is no such edit in force."""
         known = in_force(self._log())
         wanted = [edit for edit in known if edit.id == which] if which else list(known[-1:])
         if not wanted:
@@ -164,10 +155,7 @@ class Editor:
         room: str | None = None,
         by: str = "",
     ) -> Edit:
-        """Make an edit that a front names by a word; ``name`` is the thing or room, or the edit that is undone.
-
-        ``AskError``: a value that it needs is missing.
-        """
+        """Make an edit that a front names by a word; ``name`` is the thing or room, or the edit that is undone."""
         given = {"name": name, "to": to, "at": at}
         for need in _NEEDS.get(does, ()):
             if not given[need]:
@@ -190,20 +178,25 @@ class Editor:
 
     def history(self) -> "EditsAnswer":
         """Return all edits, the oldest first, and which of them find nothing to apply to."""
-        log = self._log()
-        rows = {edit.id: edit for edit in log}
+        log = {edit.id: edit for edit in self._log()}
         lost = {one.edit.id: one.why for one in self._after().lost}
-        state = dict.fromkeys(rows, "undone") | {edit.id: "applied" for edit in in_force(log)}
-        last = {plain_name(edit.name): edit.id for edit in in_force(log) if edit.does == "pin"}
-        for edit in rows.values():
+        applied = {edit.id: edit for edit in in_force(tuple(log.values()))}
+        pinned = {plain_name(edit.name): edit.id for edit in applied.values() if edit.does == "pin"}
+
+        def state_of(edit: Edit) -> str:
             if edit.does == "undo":
-                state[edit.id] = "undo"
-            elif edit.id in lost and state[edit.id] == "applied":
-                state[edit.id] = "lost"
-            elif edit.does == "pin" and state[edit.id] == "applied" and edit.id not in last.values():
-                state[edit.id] = "moved"
-        answers = [_row(edit, state[edit.id], lost.get(edit.id)) for edit in rows.values()]
-        return {"map": self._map.path.name, "edits": answers}
+                return "undo"
+            if edit.id not in applied:
+                return "undone"
+            is_last = edit.does != "pin" or edit.id in pinned.values()
+            return "lost" if edit.id in lost else "applied" if is_last else "moved"
+
+        def row(edit: Edit) -> EditAnswer:
+            of = [edit.of] if edit.does == "undo" else [one.name for one in edit.at]
+            at = edit.at[0].middle if edit.at else None
+            return row_of(edit, EditAnswer, of=of, position=at, state=state_of(edit), why=lost.get(edit.id))
+
+        return {"map": self._map.path.name, "edits": list(map(row, log.values()))}
 
     def _thing(self, name: str | None, at: Place | None) -> "Thing":
         if name is None and at is None:
@@ -281,30 +274,21 @@ class Editor:
         numbers = place_given(place)
         return numbers if len(numbers) == 2 else self._map.space.level(numbers)[:2]
 
-    def _new(
-        self,
-        does: Does,
-        at: Sequence[EditedSpot] = (),
-        *,
-        name: str = "",
-        cut: Sequence[tuple[float, float, float]] = (),
-        of: str = "",
-        by: str = "",
-    ) -> Edit:
+    def _new(self, does: Does, at: Sequence[EditedSpot] = (), *, by: str = "", **what: Any) -> Edit:
         world = World.of(self._map.data.info) if at else None
-        return Edit.new(does, at, name=name, cut=cut, of=of, by=_name(by) if by else "", world=world)
+        return Edit.new(does, at, by=_name(by) if by else "", world=world, **what)
 
     def _add(self, does: Does, at: Sequence[EditedSpot], *, name: str, by: str) -> Edit:
         return self._append(self._new(does, at, name=name, by=by))
 
     def _append(self, edit: Edit) -> Edit:
-        stored = self._map
-        if not stored.data.info.files:
+        avlmap = self._map
+        if not avlmap.data.info.files:
             raise MapError("The map lies in memory alone; save it, and edit what is saved.")
-        if not stored.path.is_dir():  # to lock it would make it, and the map may come back
-            raise MapError(f"{stored.path} is gone, so that the edit has no place; bring the map back first.")
-        append_edit(stored.path, edit)
-        self._map.forget_edits()
+        if not avlmap.path.is_dir():  # to lock it would make it, and the map may come back
+            raise MapError(f"{avlmap.path} is gone, so that the edit has no place; bring the map back first.")
+        append_edit(avlmap.path, edit)
+        avlmap.forget_edits()
         return edit
 
     def _log(self) -> tuple[Edit, ...]:
@@ -312,22 +296,6 @@ class Editor:
 
     def _after(self, *more: Edit) -> Edited:
         return Edited((*self._log(), *more), self._map)
-
-
-def _row(edit: Edit, state: str, why: str | None) -> "EditAnswer":
-    row: EditAnswer = {
-        "id": edit.id,
-        "does": edit.does,
-        "name": edit.name,
-        "of": [one.name for one in edit.at] if edit.does != "undo" else [edit.of],
-        "position": list(edit.at[0].middle) if edit.at else None,
-        "by": edit.by,
-        "made": edit.made,
-        "state": state,
-    }
-    if why is not None:
-        row["why"] = why
-    return row
 
 
 def edit_text(edit: Edit) -> str:

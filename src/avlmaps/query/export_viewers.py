@@ -1,7 +1,6 @@
 """A map for viewers, over the time of its recording: Rerun (``.rrd``) and Foxglove (MCAP with its protobuf schemas).
 
-Both show ``Layers``. Each needs the extra of its name. What holds at any time is logged at the first instant; pictures,
-poses and sounds at theirs.
+Each needs the extra of its name. What holds at any time is logged at the first instant.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,36 +26,33 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class ExportedBox:
-    """A thing's box, upright in the room."""
-
-    name: str  # of the thing
-    confidence: float  # that it is one, in [0, 1]
-    centre: tuple[float, float, float]  # metres
-    size: tuple[float, float, float]  # extent along the axes of the level frame, metres
-    quaternion: tuple[float, float, float, float]  # x y z w, from the level frame's axes to those of the layers
-    color: tuple[int, int, int]  # RGB
-
-    @property
-    def label(self) -> str:
-        """Name and confidence, for a person."""
-        return f"{self.name} {self.confidence:.2f}"
-
-
-@dataclass(frozen=True, slots=True)
-class ExportedSound:
-    """A sound, where the robot was when it heard it."""
-
-    name: str  # the likeliest one; ``sound`` where it has none
+class _Exported:
+    name: str
     confidence: float | None  # of the name, in [0, 1]; None where it has none
-    position: tuple[float, float, float]  # metres
-    onset_s: float  # start, the recording's time
-    offset_s: float  # end
 
     @property
     def label(self) -> str:
         """Name and confidence, for a person."""
         return self.name if self.confidence is None else f"{self.name} {self.confidence:.2f}"
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedBox(_Exported):
+    """A thing's box, upright in the room."""
+
+    centre: tuple[float, float, float]  # metres
+    size: tuple[float, float, float]  # extent along the axes of the level frame, metres
+    quaternion: tuple[float, float, float, float]  # x y z w, from the level frame's axes to those of the layers
+    color: tuple[int, int, int]  # RGB
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedSound(_Exported):
+    """A sound, where the robot was when it heard it; ``sound`` where it has no name."""
+
+    position: tuple[float, float, float]  # metres
+    onset_s: float  # start, the recording's time
+    offset_s: float  # end
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,7 +87,7 @@ def layers_of(
     opened: "AVLMap", frame: FrameName = FrameName.LEVEL, heat: str | None = None, least_confidence: float = 0.5
 ) -> Layers:
     """Gather what a map shows. ``QueryError``: the question cannot be answered."""
-    space, stored = opened.space, opened
+    space = opened.space
     level = space.level_from_recording
     turn = level if frame is FrameName.LEVEL else np.eye(4)
     axes = turn @ inverse(level)
@@ -101,7 +97,7 @@ def layers_of(
 
     qx, qy, qz, qw = (float(value) for value in to_quaternion(axes))
     boxes: list[ExportedBox] = []
-    known = stored.has(Kind.PIXELS)  # else it names none, and shows the rest
+    known = opened.has(Kind.PIXELS)  # else it names none, and shows the rest
     for thing in opened.things(least_confidence=least_confidence) if known else []:
         corners = space.level(thing.points)
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
@@ -110,7 +106,7 @@ def layers_of(
     warm = None
     if heat is not None and (asked := opened.ask(heat).heat) is not None:
         warm = heat, np.asarray(asked.values, np.float32)
-    keyframes, rig = stored.data.keyframes, stored.data.rig
+    keyframes, rig = opened.data.keyframes, opened.data.rig
     pictures = tuple(keyframes.jpeg(row).tobytes() for row in range(len(keyframes)))
     return Layers(
         frame=frame,
@@ -147,10 +143,7 @@ TIMELINE = "recording"
 
 
 def write_rerun(path: Path, layers: Layers) -> Path:
-    """Write a map's layers for Rerun.
-
-    ``BackendError``: rerun-sdk is not installed. ``QueryError``: the file cannot be written.
-    """
+    """Write a map's layers for Rerun. ``BackendError``: rerun-sdk is not installed. ``QueryError``: of the disk."""
     try:
         rr: Any = import_module("rerun")
     except ImportError as fault:
@@ -175,17 +168,13 @@ def _log_still(rr: Any, stream: Any, layers: Layers) -> None:
         points = rr.Points3D(layers.points[shown], colors=heat_colors(heat[shown]), radii=1.2 * radius)
         stream.log("map/heat", points, rr.AnyValues(question=question, heat=heat[shown]), static=True)
     if layers.things:
-        stream.log(
-            "map/things",
-            rr.Boxes3D(
-                centers=[box.centre for box in layers.things],
-                sizes=[box.size for box in layers.things],
-                quaternions=[box.quaternion for box in layers.things],
-                labels=[box.label for box in layers.things],
-                colors=[box.color for box in layers.things],
-            ),
-            static=True,
-        )
+        things = layers.things
+        boxes = rr.Boxes3D(
+            centers=[box.centre for box in things], sizes=[box.size for box in things],
+            quaternions=[box.quaternion for box in things], labels=[box.label for box in things],
+            colors=[box.color for box in things],
+        )  # fmt: skip
+        stream.log("map/things", boxes, static=True)
     if len(layers.stamp_s):
         stream.log("map/path", rr.LineStrips3D([layers.frame_from_camera[:, :3, 3]]), static=True)
 
@@ -215,10 +204,7 @@ _SOUND_M = 0.3
 
 
 def write_foxglove(path: Path, layers: Layers) -> Path:
-    """Write a map's layers as MCAP.
-
-    ``BackendError``: foxglove-sdk is not installed. ``QueryError``: the file cannot be written.
-    """
+    """Write a map's layers as MCAP. ``BackendError``: foxglove-sdk is not installed. ``QueryError``: of the disk."""
     try:
         foxglove: Any = import_module("foxglove")
         channels, messages = (import_module(f"foxglove.{name}") for name in ("channels", "messages"))
@@ -235,7 +221,7 @@ def write_foxglove(path: Path, layers: Layers) -> Path:
 
 
 class _Writer:
-    """Turns layers into messages of one file."""
+    # Turns layers into messages of one file.
 
     def __init__(self, channels: Any, messages: Any, context: Any, layers: Layers) -> None:
         self._channels, self._messages, self._context, self._layers = channels, messages, context, layers
@@ -277,7 +263,6 @@ class _Writer:
     def _cloud(
         self, still: dict[str, Any], colors: UInt8[np.ndarray, "n 3"], heat: Float32[np.ndarray, " n"] | None
     ) -> Any:
-        """Return the voxels as points with a colour, and the heat where there is one."""
         m = self._messages
         types = {"<f4": m.PackedElementFieldNumericType.Float32, "u1": m.PackedElementFieldNumericType.Uint8}
         columns = {axis: ("<f4", self._layers.points[:, k]) for k, axis in enumerate("xyz")}
@@ -296,12 +281,9 @@ class _Writer:
             for size in (fields[name][0].itemsize,)
         ]
         return m.PointCloud(
-            **still,
-            pose=self._pose((0.0, 0.0, 0.0)),
-            point_stride=rows.dtype.itemsize,
-            fields=packed,
+            **still, pose=self._pose((0.0, 0.0, 0.0)), point_stride=rows.dtype.itemsize, fields=packed,
             data=rows.tobytes(),
-        )
+        )  # fmt: skip
 
     def _entity(
         self, name: str, stamp_s: float, label: str, place: Sequence[float], said: dict[str, str], **shapes: Any
@@ -344,12 +326,10 @@ class _Writer:
         for stamp_s, pose, picture in self._layers.shots():
             at = {"timestamp": self._time(stamp_s), "frame_id": CAMERA_FRAME}
             transform = m.FrameTransform(
-                timestamp=self._time(stamp_s),
-                parent_frame_id=self._frame,
-                child_frame_id=CAMERA_FRAME,
+                timestamp=self._time(stamp_s), parent_frame_id=self._frame, child_frame_id=CAMERA_FRAME,
                 translation=m.Vector3(**_named(pose[:3, 3].tolist())),
                 rotation=m.Quaternion(**_named(to_quaternion(pose).tolist())),
-            )
+            )  # fmt: skip
             self._log("/tf", transform, stamp_s)
             if picture:
                 self._log("/camera_info", m.CameraCalibration(**at, **calibrated), stamp_s)

@@ -1,7 +1,7 @@
 """The heat of one thing that was queried, at every occupied voxel: the paper's equations, evaluated exactly.
 
-There are two kinds of factors: ``NearThings`` (objects: falls with the 3D distance to the nearest voxel) and
-``NearAnchors`` (images, areas, sounds: cones around scored places, falling with the horizontal distance).
+``NearThings`` (objects) falls with the 3D distance to the nearest voxel, ``NearAnchors`` (images, areas,
+sounds) with the horizontal distance from scored places.
 """
 
 from abc import ABC, abstractmethod
@@ -20,8 +20,7 @@ from avlmaps.query.words import share
 if TYPE_CHECKING:
     from avlmaps.maps.sources.candidates import Spread
 
-# Scores are products of float32 vectors of unit length. Their last digits depend on the order of summation, which
-# depends on the processor and on how many vectors are multiplied at once; a difference below this means nothing.
+# Scores are products of float32 vectors; their last digits depend on the order of summation, hence on the processor.
 ROUNDING = 1e-6
 # The distances of this many pairs of points are computed one by one, which is faster than a search tree.
 _FEW_PAIRS = 65_536
@@ -131,14 +130,14 @@ class NearThings(Factor):
     found: bool
     understood: str = ""
     note: str = ""
-    # Makes the same with the instances whose confidence is too low to count in a query for the thing alone: the context
-    # may select one of them. None where there are no others.
+    # Adds the instances whose confidence is too low to count in a query for the thing alone: the context may select one
+    # of them. None where there are no others.
     with_uncertain: "Callable[[], NearThings] | None" = None
     is_named: bool = True  # see ``Factor``
     flat: bool = field(default=False, init=False)
 
     def include_uncertain(self) -> "NearThings":
-        """Return the same with its unsure instances."""
+        """Return this factor with its unsure instances."""
         return self._with_uncertain
 
     @cached_property
@@ -201,12 +200,8 @@ class NearAnchors(Factor):
     flat: bool = field(default=True, init=False)
 
     def __post_init__(self) -> None:
-        if len(self.anchors) != len(self.scores) or len(self.anchors) != len(self.instance):
-            raise ValueError(f"{len(self.anchors)} anchors, {len(self.scores)} scores, {len(self.instance)} instances")
         if len(self.scores) and not (np.min(self.scores) >= 0.0 and np.max(self.scores) <= 1.0):
             raise ValueError("an anchor's score is outside [0, 1] or NaN")
-        if not 0.0 <= self.certainty <= 1.0:
-            raise ValueError(f"certainty is {self.certainty}; it must lie in [0, 1]")
 
     @cached_property
     def confidence(self) -> Float[np.ndarray, " i"]:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -232,10 +227,7 @@ class NearAnchors(Factor):
 
 
 def product_of(factors: Sequence[Factor]) -> Float32[np.ndarray, " n"]:
-    """Return the product of the heat of one or more factors at every voxel.
-
-    The lead comes first, as it falls fastest: other factors are computed where it leaves heat.
-    """
+    """Return the product of the heat of factors at every voxel: of the lead first, which falls fastest."""
     lead = lead_of(factors)
     return times(lead.values, [factor for factor in factors if factor is not lead])
 
@@ -254,12 +246,9 @@ def lead_of(factors: Sequence[Factor]) -> Factor:
 
 
 def stretch_scores(scores: Float[np.ndarray, " a"]) -> Float[np.ndarray, " a"]:
-    """Stretch scores to [0, 1] as the paper does, lowest to 0 and highest to 1.
+    """Stretch scores to [0, 1] as the paper does, lowest to 0 and highest to 1; all become 1 where they are equal.
 
-    Where all are equal within rounding (or there is one only) no anchor is better than another, and all become 1;
-    that of nothing is nothing. Only order survives: use it for scores that are not calibrated.
-
-    ``ValueError``: a score is NaN or infinite.
+    Only order survives: use it for scores that are not calibrated. ``ValueError``: a score is NaN or infinite.
     """
     if not np.isfinite(scores).all():
         raise ValueError("a score is NaN or infinite")
@@ -274,10 +263,8 @@ def object_heat(
 ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
     """Return max(1 − ε·d, 0) for every voxel, d the 3D distance in metres to the nearest voxel of the mask, and which.
 
-    Works on squared distances between voxel indices, which are whole numbers, so nothing is approximated.
-
-    ``among``: the voxels that are wanted; others have no heat. None: all. Returns the heat, and the number of the
-    nearest voxel among those of the mask (−1 where there is no heat).
+    Squared distances between voxel indices are whole numbers, so nothing is approximated. ``among``: the voxels that
+    are wanted; others have no heat. The nearest is a number among those of the mask, −1 where there is no heat.
     """
     from avlmaps.query.kernels import nearest_squared
 
@@ -315,7 +302,6 @@ def anchor_heat(
     """Return max over anchors of s − ε·d_xy, floored at 0, for every voxel, and which anchor was highest (−1: none).
 
     ``anchors``: metres, world. ``scores``: s, in [0, 1]. ``among``: the voxels that are wanted; others have no heat.
-    None: all.
     """
     from avlmaps.query.kernels import cone_heat
 

@@ -1,7 +1,7 @@
 """What the encoders of a map see in it: the names closest to each voxel, things, rooms and their kinds.
 
-The end of a build stores them with the map (``MapData.findings``), each with a key of what it was found with; a map
-with other encoders or settings than those is looked through again.
+The end of a build stores them (``MapData.findings``), each with a key of the encoders and settings that found it; a map
+with others is looked through again.
 """
 
 import hashlib
@@ -103,7 +103,7 @@ def _regions_from(stored: Mapping[str, np.ndarray], plan: "FloorPlan") -> "RoomR
 
 
 class MapNames:
-    """What the pixel encoder sees in a map; computed when it is asked for, or as the build found it."""
+    """What the pixel encoder sees in a map, computed when it is used or as the build found it."""
 
     def __init__(self, avlmap: "AVLMap") -> None:
         self._map = avlmap
@@ -199,17 +199,14 @@ class MapNames:
 
 
 class MapRooms:
-    """What the encoders see of the rooms of a map; computed when it is asked for, or as the build found it."""
+    """What the encoders see of the rooms of a map, computed when it is used or as the build found it."""
 
     def __init__(self, avlmap: "AVLMap") -> None:
         self._map, self._settings = avlmap, avlmap.settings.areas
 
     @cached_property
     def votes(self) -> "Rooms | None":
-        """The votes on the kind of room of each place.
-
-        None where there is no floor plan: of a map without voxels or keyframes, or with kilometres of extent.
-        """
+        """The votes on the kind of room of each place; None of a map without keyframes, or of kilometres of extent."""
         from avlmaps.maps.storeys import one_storey
         from avlmaps.query.floor_plan import FloorPlan
         from avlmaps.query.modalities.area import area_anchors
@@ -298,7 +295,7 @@ class MapRooms:
         return rooms_of_cells(self.regions, area_anchors(self._map.data.keyframes, self._settings))
 
     def found(self) -> dict[str, np.ndarray]:
-        """Return the rooms and their kinds, for ``findings``; none where there is no floor plan."""
+        """Return the rooms and their kinds; none where there is no floor plan."""
         if self.votes is None:
             return {}
         plan, field = self.votes.plan, self.known_field

@@ -1,7 +1,7 @@
 """The map top-down, storey by storey: which cells are walls, and how evidence spreads over a floor that they bound.
 
-Evidence spreads as a random walk does: a wall reflects it, a doorway lets little of it through, and where no wall was
-seen it spreads as a Gaussian. So nothing has to decide where the rooms of an open plan end.
+Evidence walks at random: a wall reflects it, a doorway lets little of it through, and elsewhere it spreads as a
+Gaussian. So nothing has to decide where the rooms of an open plan end.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class FloorPlan:
 
     @classmethod
     def of(cls, space: Space, storeys: Storeys, places: Float[np.ndarray, "k 3"] | None = None) -> "FloorPlan | None":
-        """Find the walls of a map; None for a map without voxels, or one that is too large for a grid of it.
+        """Find the walls of a map; None without voxels, or where it is too large for a grid.
 
         ``places``: other points that the grid must cover, metres, world.
         """
@@ -78,10 +78,7 @@ class FloorPlan:
         return self.wall.size
 
     def cells_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
-        """Return the number of the open cell nearest to each point on its storey: a picture hangs in the wall itself.
-
-        Where a storey has no open cell at all it is the cell that the point lies in, or the nearest one of the grid.
-        """
+        """Return the open cell nearest to each point on its storey: a picture hangs in the wall itself."""
         level = self.space.level(points_world)
         storey = self.storeys.of(level[:, 2])
         cell = np.floor((level[:, :2] - self.origin_m) / CELL_M)
@@ -89,7 +86,7 @@ class FloorPlan:
         return self._nearest_open[np.ravel_multi_index((storey, i, j), self.wall.shape)]
 
     def storeys_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
-        """Return the storey of each point, counted from 0, the lowest."""
+        """Return the storey of each point, from 0, the lowest."""
         return self.storeys.of(self.space.level(points_world)[:, 2])
 
     @cached_property
@@ -133,8 +130,6 @@ class FloorPlan:
 
     def spread(self, mass: Float[np.ndarray, "c k"], sigma_m: float) -> Float32[np.ndarray, "c k"]:
         """Return what lies in each cell once all mass has walked about its floor for a while; none is lost.
-
-        On a floor without walls that is a Gaussian.
 
         ``mass``: in each cell, any number of kinds. ``sigma_m``: standard deviation along each axis, metres.
         """

@@ -1,18 +1,16 @@
 """From heat to places: distinct things rather than single voxels, ranked, and how likely each is right.
 
-The lead factor is the primary one. Its instances divide the heated voxels among themselves: each voxel belongs to the
-instance that its lead heat comes from. A goal lies where the product is highest in an instance's share. On a thing it
-is the middle of the part that is nearly as hot, so that one stray voxel at its edge does not decide where the robot
-goes. Where a region is part of the query ("the chair in the kitchen"), an instance is as far in it as the region holds
-it (``Factor.held``): a thing is in one room.
+The instances of the lead (the primary factor) divide the heated voxels among themselves: each voxel belongs to the one
+that its lead heat comes from. A goal lies where the product is highest in an instance's share; on a thing it is the
+middle of the part that is nearly as hot, so that one stray voxel does not decide where the robot goes. In a region
+("the chair in the kitchen") an instance lies as far as the region holds it (``Factor.held``).
 
 The probability that a goal is right, all parts together, is a product of what makes it so, each with its own odds:
 
     p = s(thing) * s(near) * s(marks) * s(room),   s the logistic function of a weight times a number, and a bias
 
-and at most that of the thing alone. The weights (``found.json``) are fitted by ``training/found`` on homes that no
-table uses, half of the queries being for what is not there. A thing, a sound, an area or a photo alone is as likely as
-the models that made it out say: those are calibrated by themselves.
+and at most that of the thing alone, which is as likely as its calibrated model says. The weights (``found.json``) are
+fitted by ``training/found`` on homes that no table uses, half of the queries being for what is not there.
 """
 
 import json
@@ -66,15 +64,9 @@ def evidence_of(
     room = inside * float(np.prod([factor.at(position[None])[0] for factor in beside]))
     near = peak / max(itself * room, _LEAST_SCORE) if context else 1.0
     marks = [_mark(factor, position) for factor in context if factor not in rooms]
-    return GoalEvidence(
-        lead.part.modality,
-        tuple(factor.part.modality for factor in context),
-        alone,
-        logit(alone),
-        float(np.log(np.clip(near, _LEAST_HEAT, 1.0))),
-        float(np.log(np.clip(room, _LEAST_HEAT, 1.0))),
-        min(map(logit, marks), default=0.0),
-    )
+    near, room = (float(np.log(np.clip(heat, _LEAST_HEAT, 1.0))) for heat in (near, room))
+    kinds = tuple(factor.part.modality for factor in context)
+    return GoalEvidence(lead.part.modality, kinds, alone, logit(alone), near, room, min(map(logit, marks), default=0.0))
 
 
 def logit(probability: float) -> float:
@@ -97,10 +89,8 @@ def _mark(factor: Factor, position: Float[np.ndarray, "3"]) -> float:
     return float(factor.confidence[factor.instance[int(np.argmin(away))]])
 
 
-NUMBERS = ("thing", "near", "room", "marks")
-"""The numbers of the evidence that have a weight."""
-FACTORS = {"thing": ("thing",), "near": ("near",), "marks": ("marks",), "room": ("room",)}
-"""The factors of the product, and the numbers that each weighs; the weights have a bias for each as well."""
+FACTORS = ("thing", "near", "marks", "room")
+"""The factors of the product: each is a number of the evidence, which has a weight and a bias."""
 Weights = Mapping[str, float]
 
 
@@ -113,11 +103,8 @@ def probability_of(evidence: GoalEvidence, given: Weights | None = None) -> floa
 def factor_values(evidence: GoalEvidence, given: Weights | None = None) -> dict[str, float]:
     """Return each factor of the probability of a goal of several parts, by its name."""
     own = given or weights()
-    odds = {
-        factor: own[f"{factor}_bias"] + sum(own[name] * getattr(evidence, name) for name in FACTORS[factor])
-        for factor in factors_of(evidence)
-    }
-    return {factor: 1.0 / (1.0 + math.exp(-value)) for factor, value in odds.items()}
+    odds = {name: own[f"{name}_bias"] + own[name] * getattr(evidence, name) for name in factors_of(evidence)}
+    return {name: 1.0 / (1.0 + math.exp(-value)) for name, value in odds.items()}
 
 
 def factors_of(evidence: GoalEvidence) -> tuple[str, ...]:
@@ -128,7 +115,7 @@ def factors_of(evidence: GoalEvidence) -> tuple[str, ...]:
 
 @cache
 def weights() -> Weights:
-    """Return the weights that ship."""
+    """The weights that ship."""
     return json.loads(Path(__file__).with_name("found.json").read_text(encoding="utf-8"))["weights"]
 
 
@@ -223,8 +210,8 @@ def share_voxels(
 ) -> Shares:
     """Divide the heated voxels among the instances of the lead.
 
-    ``values``: returns their product at every voxel; not called for one object alone, whose heat is 1 on it, nor for
-    the anchors of one sound, area or image. ``of_things``: returns the product without regions.
+    ``values`` returns the product at every voxel, ``of_things`` that without regions; both are slow, and not called for
+    one object alone, whose heat is 1 on it, nor for the anchors of one sound, area or image.
     """
     lead = lead_of(factors)
     if isinstance(lead, NearThings) and len(factors) == 1:
@@ -288,7 +275,7 @@ def weigh_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[tup
 
 
 class _Extents:
-    """The boxes of a lead's instances, level frame, and the goals that lie in them."""
+    # The boxes of a lead's instances, level frame, and the goals that lie in them.
 
     def __init__(self, lead: NearThings) -> None:
         self.low, self.high = boxes(lead.space.level(lead.anchors), lead.instance, len(lead.confidence))
@@ -298,7 +285,7 @@ class _Extents:
         return bool((self.low[instance] <= place).all() and (place <= self.high[instance]).all())
 
     def takes(self, instance: int, place: Float[np.ndarray, "3"]) -> bool:
-        """Return whether the goal of an instance is that of another thing than those before, and remember it."""
+        # Whether the goal of an instance is that of another thing than those before; it is remembered.
         if any(self.holds(other, place) or self.holds(instance, at) for other, at in self.goals.items()):
             return False
         self.goals[instance] = place
@@ -333,13 +320,9 @@ def _place_on_thing(lead: NearThings, shares: Shares, instance: int) -> Float[np
 
 
 def _goal(
-    factors: Sequence[Factor],
-    lead: Factor,
-    instance: int,
-    position: Float[np.ndarray, "3"],
-    score: float,
+    factors: Sequence[Factor], lead: Factor, instance: int, position: Float[np.ndarray, "3"], score: float,
     probability: float,
-) -> Goal:
+) -> Goal:  # fmt: skip
     extent = np.ptp(lead.space.level(lead.anchors[lead.instance == instance]), axis=0)
     size = extent if lead.flat else extent + lead.space.grid.voxel_size_m
     parts: dict[str, float] = {}

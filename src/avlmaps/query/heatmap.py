@@ -49,10 +49,9 @@ class Heat(ABC):
     def _terms(self) -> "tuple[tuple[float, Heat], ...]": ...
 
     def at(self, points_world: Any) -> Float[np.ndarray, "*m"]:
-        """Return the heat at any points.
+        """Return the heat at one point or an array (..., 3) of them, metres, recording frame.
 
-        ``points_world``: one point, or an array (..., 3) of them; metres, recording frame. ``QueryError``: they are no
-        points.
+        ``QueryError``: they are no points.
         """
         points = np.asarray(points_world)
         if points.dtype.kind not in "fiu" or points.ndim == 0 or points.shape[-1] != 3 or not np.isfinite(points).all():
@@ -139,32 +138,24 @@ class Heat(ABC):
             raise ValueError(f"two heatmaps of different maps cannot be {how}; ask both of the same AVLMap")
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Blend(Heat):
-    """A weighted sum of heatmaps: ``0.7 * m.object("chair") + 0.3 * m.sound("dog bark")``.
+    """A weighted sum of heatmaps: ``0.7 * m.object("chair") + 0.3 * m.sound("dog bark")``."""
 
-    Attributes:
-        space: the map's voxels.
-        terms: the weights and the heatmaps.
-    """
-
-    def __init__(self, space: Space, terms: "tuple[tuple[float, Heat], ...]") -> None:
-        self.space = space
-        self.terms = terms
-        self._values: Float32[np.ndarray, " n"] | None = None
+    space: Space
+    terms: "tuple[tuple[float, Heat], ...]"  # the weights and the heatmaps
 
     @property
     def _terms(self) -> "tuple[tuple[float, Heat], ...]":
         return self.terms
 
-    @property
-    def values(self) -> Float32[np.ndarray, " n"]:
+    @cached_property
+    def values(self) -> Float32[np.ndarray, " n"]:  # pyright: ignore[reportIncompatibleMethodOverride, reportIncompatibleVariableOverride]
         """The sum at every voxel, computed when it is first used."""
-        if self._values is None:
-            total = np.zeros(len(self.space))
-            for weight, heat in self.terms:
-                total += weight * heat.values
-            self._values = total.astype(np.float32)
-        return self._values
+        total = np.zeros(len(self.space))
+        for weight, heat in self.terms:
+            total += weight * heat.values
+        return total.astype(np.float32)
 
     def _at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         return sum((weight * heat.at(points_world) for weight, heat in self.terms), np.zeros(len(points_world)))
@@ -180,10 +171,7 @@ _Where = Callable[[Float[np.ndarray, "n 3"]], Float[np.ndarray, " n"] | Bool[np.
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Heatmap(Heat):
-    """Heat in [0, 1] of every occupied voxel; ``a * b`` fuses two, ``0.7 * a + 0.3 * b`` weighs them.
-
-    ``np.asarray(heat)`` is in the order of the map's ``points``; ``heat.at(points)`` is the heat anywhere.
-    """
+    """Heat in [0, 1] of every occupied voxel; ``a * b`` fuses two, ``0.7 * a + 0.3 * b`` weighs them."""
 
     space: Space  # the map's voxels
     factors: tuple[Factor, ...]  # the parts of the query, one factor each
@@ -298,7 +286,7 @@ class Heatmap(Heat):
         return self.probability >= self.found_at and self.probability > 0.0
 
     def goals(self, top: int = 3) -> list[Goal]:
-        """Return the best distinct places, best first; fewer where there are fewer, none where there is no heat."""
+        """Return the best distinct places, best first; none where there is no heat."""
         return [goal for goal, _ in self.weighed(top)]
 
     def weighed(self, top: int = 3) -> list[tuple[Goal, GoalEvidence]]:
@@ -325,8 +313,7 @@ class Heatmap(Heat):
     def plot(self, path: str | Path | None = None, *, top: int = 3, ax: "Axes | None" = None) -> "Path | Figure":
         """Draw the map from above, each factor's heat and the product, with the goals numbered.
 
-        ``path``: the picture to write; without one, the figure is returned, for a notebook to show. ``QueryError``: the
-        picture cannot be written there.
+        Without a ``path`` the figure is returned. ``QueryError``: the picture cannot be written there.
         """
         from avlmaps.query.plots import draw_heat, draw_heat_into, save
 
@@ -358,17 +345,14 @@ class HeatCache:
     """Remembers heat up to a size; what was queried longest ago goes first. Threads may use it."""
 
     def __init__(self, most_bytes: int, watch: Callable[[Part], object] = lambda part: None) -> None:
-        """Begin empty.
-
-        ``most_bytes``: about how much heat may take. ``watch``: is given each part before its heat is looked up.
-        """
+        # ``watch`` is given each part before its heat is looked up.
         self._most_bytes, self._watch = most_bytes, watch
         self._held: OrderedDict[Part, tuple[Heatmap, int]] = OrderedDict()
         self._held_bytes = 0
         self._lock = threading.Lock()
 
     def anew(self) -> "HeatCache":
-        """Return an empty one of the same size."""
+        """Return an empty cache of this size."""
         return HeatCache(self._most_bytes, self._watch)
 
     def heat(self, part: Part, find: Callable[[], Heatmap]) -> Heatmap:

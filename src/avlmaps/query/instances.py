@@ -1,9 +1,8 @@
-"""From the scores of voxels to instances: threshold, link, score, join, cut.
+"""From a word to the heat of an object: voxels are scored, and make instances: threshold, link, score, join, cut.
 
-A voxel counts where the queried word beats its rivals; connected voxels are linked to one instance; each is scored;
-parts over one another are joined, and what is too long for a thing of its name is cut: in a real kitchen the chairs
-round a table made one instance of 1.7 m, and "chair" went on from a chair to the cabinets and the wall behind it, 4.6
-m.
+A voxel counts where the queried word beats its rivals; connected voxels are linked to one instance; parts over one
+another are joined, and what is too long for a thing of its name is cut: in a real kitchen the chairs round a table made
+one instance of 1.7 m. Colours count where an encoder knows things: a "red cabinet" is a cabinet of mostly red voxels.
 """
 
 import math
@@ -32,10 +31,7 @@ _FEWEST_VOXELS = 8
 
 
 def longest_m(names: Sequence[str]) -> float:
-    """Return how long things of these names are at most, top-down, metres: the diagonal of the largest.
-
-    Infinity where the lexicon does not say it of all of them.
-    """
+    """Return how long things of these names are at most, top-down, metres, or infinity: the diagonal of the largest."""
     entries = [lexicon().find(name, EntryKind.THING) for name in names]
     sizes = [entry.size_m for entry in entries if entry is not None and entry.size_m is not None]
     if not sizes or len(sizes) < len(names):
@@ -67,12 +63,11 @@ def cut_at_weak(
     longest: float,
     reach: int,
 ) -> tuple[Int[np.ndarray, " a"], Int[np.ndarray, " j"]]:
-    """Cut instances that are too long where their voxels score least.
+    """Cut instances that are longer than ``longest`` metres where their voxels score least.
 
-    ``points_level``: their centres, metres, with z up. ``score``: how well each fits the name. ``instance``: which each
-    belongs to, 0 to the highest without gaps. ``longest``: an instance no longer than this stays whole, metres. Returns
-    which instance each belongs to now, again without gaps, −1 for a voxel that only linked others; and of which
-    instance each is a piece: what was part of something too long is as doubtful as that.
+    ``points_level``: their centres, metres, with z up. ``instance``: which each belongs to, 0 to the highest without
+    gaps. Returns which instance each belongs to now, again without gaps, −1 for a voxel that only linked others; and of
+    which instance each is a piece: what was part of something too long is as doubtful as that.
     """
     count = int(instance.max(initial=-1)) + 1
     out = np.array(instance, np.int64)
@@ -222,22 +217,21 @@ def confident_instances(voxels: FeatureVoxels, word: EncodedWord) -> Instances:
 
 
 def segment(voxels: FeatureVoxels, word: EncodedWord, scored: Scored, confident: Instances | None = None) -> Instances:
-    """Return the instances that scored voxels make up.
+    """Return the instances that scored voxels make up; after ``confident`` ones, uncertain ones of the other voxels.
 
-    With ``confident`` instances, those stay as they are, and uncertain ones of the other voxels come after them: weak
-    voxels round a confident thing make it neither larger nor less likely.
+    Weak voxels round a confident thing make it neither larger nor less likely.
     """
     space, settings = voxels.space, voxels.settings
     if confident is None:
-        least, counting = settings.least_confidence, threshold(scored)
+        least, counting = settings.least_confidence, scored.only(scored.margin > 0.0)
     else:
-        least, counting = settings.least_in_company, threshold_in_company(voxels, scored, confident.rows)
+        least, counting = settings.least_in_company, _threshold_in_company(voxels, scored, confident.rows)
     found = score(voxels, word, link(space, counting, settings.link_m))
     found = found.only(found.confidence >= least)
     joined = join(space, found, settings.link_m, settings.join_m)
     if joined is not found:
         found = score(voxels, word, joined)
-    longest_m = longest_of(voxels, word)
+    longest_m = _longest_of(voxels, word)
     pieces, length_m = cut(space, found, longest_m, settings.link_m)
     if pieces is not found:
         found = score(voxels, word, pieces, length_m)
@@ -245,16 +239,9 @@ def segment(voxels: FeatureVoxels, word: EncodedWord, scored: Scored, confident:
     return found if confident is None else confident.with_others(found)
 
 
-def threshold(scored: Scored) -> Scored:
-    """Return the voxels that the word wins."""
-    return scored.only(scored.margin > 0.0)
-
-
-def threshold_in_company(voxels: FeatureVoxels, scored: Scored, taken: Int[np.ndarray, " t"]) -> Scored:
-    """Return the voxels that count where the context may select among uncertain instances.
-
-    For an encoder of names a voxel counts that scores a part of its best rival's score.
-    """
+def _threshold_in_company(voxels: FeatureVoxels, scored: Scored, taken: Int[np.ndarray, " t"]) -> Scored:
+    # The voxels that count where the context may select among uncertain instances. For an encoder of names a voxel
+    # counts that scores a part of its best rival's score.
     counts, settings = scored.margin > 0.0, voxels.settings
     if isinstance(voxels.encoder, NamedPixelEncoder):
         rival = scored.score - scored.margin
@@ -272,20 +259,17 @@ def link(space: Space, counting: Scored, link_m: float) -> Instances:
 def score(
     voxels: FeatureVoxels, word: EncodedWord, found: Instances, length_m: Float[np.ndarray, " i"] | None = None
 ) -> Instances:
-    """Return instances with the confidence that each matches the word: by looks, by length and by its room.
-
-    ``length_m``: how long each counts as; None measures it.
-    """
+    """Return instances with the confidence that each matches the word: by looks, by length and by its room."""
     space, encoder, settings = voxels.space, voxels.encoder, voxels.settings
     if not isinstance(encoder, NamedPixelEncoder):
         fitted = fitting(settings, encoder)
         return replace(
             found, confidence=margin_confidence(found.margin, found.instance, space.grid.voxel_size_m, fitted)
         )
-    confidence = named_confidence(encoder, word, found, space.grid.voxel_size_m)
-    longest_m = longest_of(voxels, word)
+    confidence = _named_confidence(encoder, word, found, space.grid.voxel_size_m)
+    longest_m = _longest_of(voxels, word)
     if math.isfinite(longest_m):
-        length_m = lengths_m(space, found) if length_m is None else length_m
+        length_m = _lengths_m(space, found) if length_m is None else length_m
         confidence = less_likely(confidence, length_m, longest_m)
     if settings.room_weight > 0.0 and len(confidence) and (rooms := voxels.rooms()) is not None:
         nats = rooms.nats(word.clear_names(encoder), found.rows, found.instance, len(confidence))
@@ -297,16 +281,13 @@ def score(
 def with_rooms(
     confidence: Float[np.ndarray, " i"], nats: Float[np.ndarray, " i"], cost: float
 ) -> Float[np.ndarray, " i"]:
-    """Return confidences after the evidence of rooms: their log-odds raised by it, less a cost.
-
-    ``confidence``: of each instance, in [0, 1]. ``nats``: evidence for each, times its weight.
-    """
+    """Return confidences after the evidence of rooms: their log-odds raised by it, less a cost."""
     odds = np.exp(nats - cost)
     return confidence * odds / np.maximum(1.0 - confidence + confidence * odds, 1e-12)
 
 
 def join(space: Space, found: Instances, link_m: float, join_m: float) -> Instances:
-    """Join instances that lie over one another; return them unscored, or the same object where none do."""
+    """Join instances that lie over one another; return them unscored, or ``found`` itself where none do."""
     which = joined_columns(_points(space, found), found.instance, link_m, join_m)
     return found if len(found) == which.max(initial=-1) + 1 else found.relabelled(which[found.instance])
 
@@ -314,10 +295,9 @@ def join(space: Space, found: Instances, link_m: float, join_m: float) -> Instan
 def cut(
     space: Space, found: Instances, longest_m: float, link_m: float
 ) -> tuple[Instances, Float[np.ndarray, " i"] | None]:
-    """Cut instances that are too long for a thing of their name, where their voxels score least.
+    """Cut instances that are too long for a thing of their name; return them unscored, and how long each counts as.
 
-    Returns the instances, unscored, or the same object where none is cut; and how long each counts as: a piece is as
-    doubtful as what it was cut from.
+    Where none is cut they are ``found`` itself. A piece is as doubtful as what it was cut from.
     """
     if not (math.isfinite(longest_m) and len(found)):
         return found, None
@@ -325,7 +305,7 @@ def cut(
     pieces, piece_of = cut_at_weak(index, points, found.score, found.instance, longest_m, _reach(space, link_m))
     if np.array_equal(pieces, found.instance):
         return found, None
-    return found.relabelled(pieces), lengths_m(space, found)[piece_of]
+    return found.relabelled(pieces), _lengths_m(space, found)[piece_of]
 
 
 def best_guesses(found: Instances, voxel_size_m: float) -> Instances:
@@ -342,9 +322,7 @@ def joined_columns(
 
     A thing of thin parts comes in several instances: the camera saw a chair's legs and its back and little between.
     Two are one thing where at least half of the smaller one's columns (of ``cell_m``, top-down) hold the other too,
-    with nothing else between them and at most ``join_m`` in height.
-
-    ``points_level``: the voxels' middles, metres, level frame. ``instance``: which each belongs to.
+    with nothing else between them and at most ``join_m`` in height. ``points_level``: middles, metres, level frame.
     """
     count = int(instance.max(initial=-1)) + 1
     column = np.floor(points_level[:, :2] / cell_m).astype(np.int64)
@@ -367,10 +345,7 @@ def joined_columns(
 def margin_confidence(
     margin: Float[np.ndarray, " a"], instance: Int[np.ndarray, " a"], voxel_size_m: float, settings: ObjectSettings
 ) -> Float32[np.ndarray, " i"]:
-    """Return the confidence of each instance, in [0, 1]: m / (m + m_yes) · (1 − exp(−area / area_yes)).
-
-    m is the mean margin of its voxels, the area is a voxel's face for each of them.
-    """
+    """Return the confidence of each instance, m / (m + m_yes) · (1 − exp(−area / area_yes)), m its mean margin."""
     count = np.bincount(instance)
     mean_margin = np.bincount(instance, weights=margin) / np.maximum(count, 1)
     clear = mean_margin / (mean_margin + settings.margin_yes)
@@ -378,21 +353,19 @@ def margin_confidence(
     return (clear * large).astype(np.float32)
 
 
-def named_confidence(
+def _named_confidence(
     encoder: NamedPixelEncoder, word: EncodedWord, found: Instances, voxel_size_m: float
 ) -> Float32[np.ndarray, " i"]:
-    """Return the confidence that each instance matches the query, as the encoder was calibrated.
-
-    A phrase that means several names has the confidence that the most meant name would have with all their probability.
-    """
+    # As the encoder was calibrated. A phrase that means several names has the confidence that the most meant name would
+    # have with all their probability.
     mean, area_m2 = found.mean_probability, found.voxel_count * voxel_size_m**2
     sure = [encoder.instance_probability(name, mean, area_m2) for name in word.clear_names(encoder)]
     nothing = np.zeros(len(found))  # of a word that names none of the encoder's names
     return np.max([nothing, *sure], axis=0).astype(np.float32)
 
 
-def longest_of(voxels: FeatureVoxels, word: EncodedWord) -> float:
-    """Return the length from which an instance is too long for the word's likeliest names, metres; or infinity."""
+def _longest_of(voxels: FeatureVoxels, word: EncodedWord) -> float:
+    # The length from which an instance is too long for the word's likeliest names, metres; or infinity.
     encoder, settings = voxels.encoder, voxels.settings
     if not isinstance(encoder, NamedPixelEncoder) or settings.too_long <= 0.0 or not word.name_weights.any():
         return math.inf
@@ -400,8 +373,7 @@ def longest_of(voxels: FeatureVoxels, word: EncodedWord) -> float:
     return settings.too_long * longest_m([encoder.names[index] for index in np.flatnonzero(most)])
 
 
-def lengths_m(space: Space, found: Instances) -> Float[np.ndarray, " i"]:
-    """Return how long each instance is, top-down, metres."""
+def _lengths_m(space: Space, found: Instances) -> Float[np.ndarray, " i"]:
     return box_lengths_m(_points(space, found), found.instance, len(found))
 
 

@@ -67,8 +67,8 @@ def cone_heat(
 ):
     """Write max over anchors of s − ε·d, floored at 0, for horizontal points in blocks, and who won (−1: none).
 
-    Anchors come in falling score. Blocks that follow each other lie near each other: all cones are looked through for
-    a wide circle about the first of them, and those that it leaves for each block in it.
+    Anchors come in falling score. All cones are looked through for a wide circle about a block, and those that it
+    leaves for each further block in it.
     """
     every, near, nearest = np.arange(len(score)), np.empty(len(score), np.int64), np.empty(len(score), np.int64)
     wide_x, wide_y, wide, wide_count = 0.0, 0.0, -1.0, 0
@@ -143,11 +143,10 @@ def nearest_squared(
     first: Whole,
     last: Whole,
 ):
-    """Write each voxel's squared distance, in voxels, to the nearest thing, and which it is.
+    """Write each voxel's squared distance, in voxels, to the nearest thing, and which it is; at most ``limit`` and −1.
 
-    Where that is ``limit`` or farther, ``limit`` and -1 are written. Voxels and things come in blocks: places
-    ``starts[b]:starts[b + 1]`` of int32 indices (one row an axis, so that the inner loop is vectorised), in boxes from
-    ``low`` to ``high``. Blocks of voxels from ``first`` to ``last`` are done.
+    Voxels and things come in blocks: places ``starts[b]:starts[b + 1]`` of int32 indices (one row an axis, so that the
+    inner loop is vectorised), in boxes from ``low`` to ``high``. Blocks of voxels from ``first`` to ``last`` are done.
     """
     near, gaps = np.empty(len(thing_low), np.int64), np.empty(len(thing_low), np.int64)
     # The highest x up to each block of things, and the lowest x from each on: only those within reach are looked at.

@@ -1,8 +1,7 @@
 """Where was this picture taken: the 6-DoF pose of a photo in the map, or an honest "not located".
 
-Where nobody gave the focal length, or what was given does not fit, it is refined together with the pose, from the
-camera that is assumed and, where its points agree badly, from others. The same equations say how well the points fix
-both.
+Where nobody gave the focal length, or it does not fit, it is refined together with the pose, from the camera that is
+assumed and, where its points agree badly, from others.
 """
 
 import time
@@ -66,18 +65,17 @@ class LocatableMap:
     keyframes: Keyframes
     place_state: dict[str, np.ndarray]  # what the place encoder learned
     encoders: Encoders  # that made the keyframes
-    rig: Rig  # the recording's cameras
+    rig: Rig
 
     @classmethod
     def of(cls, avlmap: "AVLMap") -> "LocatableMap":
-        """Return those of a map."""
+        """Return the parts of a map."""
         return cls(avlmap.data.keyframes, avlmap.data.place_state, avlmap.encoders, avlmap.data.rig)
 
 
 @dataclass(frozen=True, slots=True)
 class _FocalSearch:
-    """How far a focal length is doubted."""
-
+    # How far a focal length is doubted.
     most: float  # largest factor between it and what replaces it
     gain: float  # the agreement must grow by this factor; 0 takes the best in any case
     starts: bool  # whether others are tried as well, where points agree badly
@@ -95,11 +93,7 @@ _SEARCH: dict[FocalSource, _FocalSearch] = {
 
 @dataclass(frozen=True, slots=True)
 class LocateSettings:
-    """How a picture is located, and when it counts as located.
-
-    Keypoints and matchers of every kind are judged by the same numbers: they count points that agree with one pose,
-    parts of matches and of the picture, never likeness.
-    """
+    """How a picture is located, and when it counts as located: by points that agree, never by likeness."""
 
     enough_inliers: int = 60
     """This many keypoints of one keyframe are enough. More keyframes would not help: the poses of a recording drift,
@@ -188,9 +182,8 @@ def locate(
 ) -> Located:
     """Find where a picture was taken.
 
-    ``camera``: the camera that took it; None says that nobody knows: that of ``focal_35mm``, else the map's own colour
-    camera is assumed, and another focal length is taken where it fits clearly better. ``focal_35mm``: the focal length
-    for 35 mm film in the picture's EXIF, mm.
+    ``camera``: that took it; None where nobody knows: that of ``focal_35mm`` (mm for 35 mm film, from the picture's
+    EXIF), else the map's own colour camera is assumed, and another focal length is taken where it fits clearly better.
     """
     start_s = time.perf_counter()
     camera, source = _camera_of(rgb, camera, stored.rig.rgb, focal_35mm)
@@ -220,8 +213,7 @@ def locate_features(
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """A pose from some keyframes."""
-
+    # A pose from some keyframes.
     world_from_camera: Float[np.ndarray, "4 4"]
     camera: Pinhole
     inliers: int  # distinct keypoints
@@ -233,8 +225,7 @@ class _Fit:
 
 @dataclass(frozen=True, slots=True)
 class _Search:
-    """The search for the pose of a picture, by its keypoints."""
-
+    # The search for the pose of a picture, by its keypoints.
     stored: LocatableMap
     local: LocalFeatures
     rng: np.random.Generator
@@ -258,19 +249,11 @@ class _Search:
             return Located(None, 0, None, 0.0, 0.0, camera, guess, guess_inliers, focal_from=source)
         score = min(fit.score, _UNSURE) if unsure else fit.score if other is None else 0.5
         return Located(
-            world_from_camera=fit.world_from_camera if score >= 0.5 else None,
-            inliers=fit.inliers,
-            reference_stamp_s=float(keyframes.stamp_s[fit.keyframe]),
-            score=score,
-            elapsed_ms=0.0,
-            camera=fit.camera if score >= 0.5 or unsure else camera,
-            guess=guess,
-            guess_inliers=guess_inliers,
-            focal_from=source if fit.uncertainty is None else "photo",
-            uncertainty=uncertainty,
-            centred=source == "assumed",
-            elsewhere=other,
-        )
+            fit.world_from_camera if score >= 0.5 else None, fit.inliers, float(keyframes.stamp_s[fit.keyframe]), score,
+            elapsed_ms=0.0, camera=fit.camera if score >= 0.5 or unsure else camera, guess=guess,
+            guess_inliers=guess_inliers, focal_from=source if fit.uncertainty is None else "photo",
+            uncertainty=uncertainty, centred=source == "assumed", elsewhere=other,
+        )  # fmt: skip
 
     def elsewhere(self, place: Float32[np.ndarray, " d"], fit: _Fit) -> Float[np.ndarray, "4 4"] | None:
         likely = alike(self.stored.keyframes, place, _MOST_ALIKE)
@@ -306,7 +289,7 @@ class _Search:
     def fit(
         self, references: Int[np.ndarray, " k"], camera: Pinhole, search: _FocalSearch | None = None
     ) -> _Fit | None:
-        """Match keyframes, estimate the pose from all their points, and judge it; ``search`` doubts the camera."""
+        # Matches keyframes, estimates the pose from all their points, and judges it; ``search`` doubts the camera.
         keypoint, keyframe, points_world = self.matched(references)
         points = _Points(self.local.xy[keypoint], points_world, self.rng)
         estimate = points.pose(camera)
@@ -336,7 +319,7 @@ class _Search:
     def matched(
         self, references: Int[np.ndarray, " k"]
     ) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], Float32[np.ndarray, "n 3"]]:
-        """Return keypoints of the picture, the keyframes that they match in, maybe several, and the points there."""
+        # Returns keypoints of the picture, the keyframes that they match in, maybe several, and the points there.
         keyframes, size = self.stored.keyframes, (self.stored.rig.rgb.width, self.stored.rig.rgb.height)
         keypoint, keyframe, points = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros((0, 3), np.float32)]
         for reference in references:
@@ -351,8 +334,7 @@ class _Search:
 
 @dataclass(frozen=True, slots=True)
 class _Points:
-    """Image points and what they show; from them a pose, and the focal length with it."""
-
+    # Image points and what they show; from them a pose, and the focal length with it.
     xy: Float[np.ndarray, "n 2"]  # pixels
     points_world: Float[np.ndarray, "n 3"]  # metres
     rng: np.random.Generator
@@ -368,7 +350,7 @@ class _Points:
         return Uncertainty(3.0 * focal, 3.0 * place_m, 3.0 * angle_rad)
 
     def better_focal(self, camera: Pinhole, estimate: Estimate, search: _FocalSearch) -> tuple[Pinhole, Estimate]:
-        """Return the camera with a better focal length, and its estimate, where points agree clearly better."""
+        # Returns the camera with a better focal length, and its estimate, where points agree clearly better.
         tolerance_px = PoseSettings().max_error_rad * camera.fx
 
         def score(other: Pinhole, found: Estimate) -> float:
@@ -436,10 +418,8 @@ def focal_35mm_of(photo: Path | bytes) -> float | None:
 
 
 def camera_of_35mm(focal_mm: float, width: int, height: int) -> Pinhole:
-    """Return the camera of a picture that is not cropped, by its focal length for film of 36 mm x 24 mm.
-
-    The equivalence goes by the diagonal of the picture (CIPA DCG-001).
-    """
+    """Return the camera of a picture that is not cropped, by its focal length for 35 mm film (CIPA DCG-001)."""
+    # The equivalence goes by the diagonal of the picture.
     focal = focal_mm / _DIAGONAL_35MM * float(np.hypot(width, height))
     return Pinhole(focal, focal, 0.5 * width, 0.5 * height, width, height)
 

@@ -37,16 +37,8 @@ def place_of(text: str) -> Float[np.ndarray, " n"]:
 
 
 def place_given(place: str | Sequence[float]) -> Float[np.ndarray, " n"]:
-    """Return the numbers of a place that comes as a text or as a list.
-
-    ``AskError``: they are no two or three numbers.
-    """
-    if isinstance(place, str):
-        return place_of(place)
-    try:
-        return place_of(",".join(str(value) for value in place))
-    except TypeError:  # no list
-        return place_of(str(place))
+    """Return the numbers of a place that comes as a text or as a list. ``AskError``: they are no two or three."""
+    return place_of(",".join(map(str, place)) if not isinstance(place, str) and np.iterable(place) else str(place))
 
 
 def distance_m(
@@ -56,8 +48,7 @@ def distance_m(
 ) -> float:
     """Return how far a point lies from a place: in space, or level where the place has no height.
 
-    ``level``: turns points of the recording frame into the level one. ``point``: x, y, z, recording frame. ``place``:
-    of two or three numbers.
+    ``level`` turns points of the recording frame into the level one. ``point``: x, y, z, recording frame.
     """
     here = np.array(point)
     return math.dist(here, place) if len(place) == 3 else math.dist(level(here)[:2], place)
@@ -133,7 +124,7 @@ def voxels_near(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: float
 def column_point(avlmap: "AVLMap", level_xy: Float[np.ndarray, "2"], radius_m: float) -> Float[np.ndarray, "3"] | None:
     """Return the place on the highest voxel under head height of a column, recording frame; None for an empty column.
 
-    What a person means who points at a floor plan is the thing that stands there, not the ceiling over it.
+    Who points at a floor plan means the thing that stands there, not the ceiling over it.
     """
     space = avlmap.space
     level = space.level(space.centres)
@@ -146,10 +137,9 @@ def column_point(avlmap: "AVLMap", level_xy: Float[np.ndarray, "2"], radius_m: f
 
 
 def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: float = 0.15) -> PlaceAnswer:
-    """Return the content of a map at a point.
+    """Return the content of a map at a point (metres, recording frame) and within a radius.
 
-    ``point``: metres, recording frame. ``radius_m``: voxels within it count; at most 5 m. ``QueryError``: a number is
-    not finite, or the radius not in (0, 5].
+    ``QueryError``: a number is not finite, or the radius not in (0, 5] m.
     """
     if not (np.isfinite(point).all() and np.abs(point).max(initial=0.0) <= FARTHEST_M):
         raise QueryError("The place is not a point in metres; give finite numbers, such as 1.5,2.0,0.8.")
@@ -219,7 +209,7 @@ def _views(avlmap: "AVLMap", row: int) -> list[ViewOfPlace]:
 
 
 class SeenPlace(TypedDict):
-    """One place of a thing and when it was seen there."""
+    """One place of a thing, and when it was seen there."""
 
     position: Position
     score: Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -239,10 +229,7 @@ class LastSeenAnswer(TypedDict):
 
 
 def last_seen(avlmap: "AVLMap", thing: str, top: int = 3) -> LastSeenAnswer:
-    """Return when a thing was last seen: the latest time of any voxel of each of its instances.
-
-    ``QueryError``: the name is empty, or the pixel encoder understands nothing of it.
-    """
+    """Return when a thing was last seen: the latest time of any voxel of each of its instances."""
     heat = avlmap.heat(Part(Modality.OBJECT, thing, Role.PRIMARY))
     factor = heat.factors[0]
     stamps = np.asarray(avlmap.data.voxels.last_seen_s)
@@ -253,23 +240,17 @@ def last_seen(avlmap: "AVLMap", thing: str, top: int = 3) -> LastSeenAnswer:
         for goal in heat.goals(top):
             nearest = int(np.argmin(np.square(factor.anchors - np.array(goal.position)).sum(axis=1)))
             seen = float(stamps[rows[factor.instance == factor.instance[nearest]]].max())
-            places.append(
-                {
-                    "position": list(goal.position),
-                    "score": goal.score,
-                    "probability": goal.probability,
-                    "last_seen_s": seen,
-                    "before_end_s": max(end_s - seen, 0.0),
-                }
-            )
+            places.append({
+                "position": list(goal.position), "score": goal.score, "probability": goal.probability,
+                "last_seen_s": seen, "before_end_s": max(end_s - seen, 0.0),
+            })  # fmt: skip
     return {"thing": thing, "found": heat.found, "places": places, "note": factor.note, "frame": FRAME}
 
 
 def answer_in(answer: Mapping[str, Any], frame: FrameName, level_from_recording: Float[np.ndarray, "4 4"]) -> Any:
     """Return an answer of the command line with all its positions, poses and texts about them in a frame.
 
-    ``answer``: in the recording's frame: with ``position``, ``outline`` and ``world_from_camera`` at any depth.
-    ``level_from_recording``: 4x4, metres.
+    ``answer``: in the recording's frame, with ``position``, ``outline`` and ``world_from_camera`` at any depth.
     """
     if frame is FrameName.RECORDING:
         return dict(answer)
@@ -300,13 +281,13 @@ def _moved(key: str, value: Any, level_from_recording: Float[np.ndarray, "4 4"],
 
 
 def _spoken(answer: dict[str, Any], spoken: Mapping[str, str]) -> dict[str, Any]:
-    texts = {key: value for key, value in answer.items() if key in ("text", "notes")}
-    for key, value in texts.items():
-        parts = [value] if isinstance(value, str) else value
+    def said(text: str) -> str:
         for before, now in spoken.items():
-            parts = [part.replace(before, f"\0{now[1:]}") for part in parts]  # no place is replaced twice
-        parts = [part.replace("\0", "(") for part in parts]
-        answer[key] = parts[0] if isinstance(value, str) else parts
+            text = text.replace(before, f"\0{now[1:]}")  # no place is replaced twice
+        return text.replace("\0", "(")
+
+    for key in {"text", "notes"} & answer.keys():
+        answer[key] = said(answer[key]) if isinstance(answer[key], str) else list(map(said, answer[key]))
     return answer
 
 

@@ -133,11 +133,8 @@ def draw_heat(
 ) -> "Figure":
     """Draw a heatmap: a panel for each factor, and one for their product.
 
-    The colour of a place is its heat times the confidence that the thing there is what was queried, as a goal's
-    score is; what was not found stays dark.
-
-    ``shown``: the product's heat times the confidence, in [0, 1]. ``found``: whether all parts are in the map and come
-    together.
+    ``shown``: the product's heat times the confidence that the thing there is what was queried, as a goal's score is,
+    in [0, 1]. ``found``: whether all parts are in the map and come together.
     """
     space = factors[0].space
     view = TopDown.of(space)
@@ -177,11 +174,7 @@ def png_of(figure: "Figure") -> bytes:
 def draw_map(
     avlmap: "AVLMap", things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = (), title: str | None = None
 ) -> "Figure":
-    """Draw a map top-down, with the camera's path, the sounds, and the names of things and rooms.
-
-    ``things``: get their names; of more than ``MOST_NAMES`` those that cover most ground. ``title``: by default the
-    folder's name.
-    """
+    """Draw a map top-down, with the camera's path, the sounds, and the names of rooms and of ``MOST_NAMES`` things."""
     space = Space(avlmap.data.grid, avlmap.data.voxels.index, avlmap.data.up_in_world, avlmap.data)
     view = TopDown.of(space)
     figure, axes = panels(view, 1)
@@ -316,19 +309,11 @@ def mark(
     """Write a short text in a bubble beside a place, in points (1/72 inch) to the right and up of it."""
     box = {"boxstyle": "circle,pad=0.25" if len(text) < 3 else "round,pad=0.25", "facecolor": colour}
     ax.annotate(
-        text,
-        xy=(float(point_level[0]), float(point_level[1])),
-        xytext=beside,
-        textcoords="offset points",
-        fontsize=8,
-        color="white",
-        fontweight="bold",
-        ha="center",
-        va="center",
+        text, xy=(float(point_level[0]), float(point_level[1])), xytext=beside, textcoords="offset points", fontsize=8,
+        color="white", fontweight="bold", ha="center", va="center", zorder=6,
         bbox={**box, "edgecolor": "white", "linewidth": 1.0},
         arrowprops={"arrowstyle": "-", "color": "white", "linewidth": 1.2, "shrinkA": 0, "shrinkB": 0},
-        zorder=6,
-    )
+    )  # fmt: skip
     ax.plot(*point_level[:2], marker="o", markersize=5, color=colour, markeredgecolor="white", zorder=7)
 
 

@@ -1,10 +1,9 @@
 """The rooms of a map as regions of its floors: what walls and closed doorways bound is one room.
 
-On each storey doorways are closed, and the free floor is parted where it narrows to no more than a door (watershed of
-the distance to walls). A doorway is a gap between two ends of a wall, or between a wall's end and the wall across it,
-through which one can see; the floor is wider behind it and before it. Narrow gaps are closed first, so that a doorway
-beside a passage does not make the passage look wide. Leaves of open doors and posts are no walls. Nooks join the room
-that they open into. Parts of an open plan, with an opening wider than ``WIDEST_M`` between them, are one region.
+The free floor is parted where it narrows to no more than a door (watershed of the distance to walls). A doorway is a
+gap between two ends of a wall, or between a wall's end and the wall across it, through which one can see; the floor is
+wider behind it and before it. Narrow gaps are closed first, so that a doorway beside a passage does not make the
+passage look wide. Nooks join the room that they open into, and an opening wider than ``WIDEST_M`` two parts of a room.
 """
 
 from dataclasses import dataclass
@@ -354,7 +353,7 @@ class RoomRegions:
     def shares_of(
         self, middle_world: Float[np.ndarray, "3"], corners_world: Float[np.ndarray, "k 3"]
     ) -> Float[np.ndarray, " r"]:
-        """Return for each room which share of it and of an area together both hold, in [0, 1].
+        """Return the share of what each room or an area holds that both hold, in [0, 1].
 
         The area has a middle, which is on its storey, and corners, metres.
         """

@@ -35,10 +35,9 @@ def _nats_of(contents: RoomContents, surface_m2: Float64[np.ndarray, "t r"]) -> 
 def votes(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -> Float[np.ndarray, "t n"]:
     """Return by how much, in nats, a square metre of each thing speaks for each kind of room.
 
-    ``things``: names, as an encoder has them; one that the table does not hold speaks for none. A thing speaks against
-    no kind of room that its entry of the lexicon lists. ``kinds``: kinds of room. One that the table does not hold gets
-    the mean vote of those that it holds, which for most things is against it; one that belongs to a kind of the table
-    (a kitchenette) gets that kind's.
+    A thing that the table does not hold speaks for none, and against no kind of room that its entry of the lexicon
+    lists. A kind that the table does not hold gets that of a wider kind that it holds (of a kitchenette the kitchen),
+    or else the mean vote of all, which for most things is against it.
     """
     ratios, known = _log_ratios(contents), lexicon()
     row_of = {known.find(name, EntryKind.THING): number for number, name in enumerate(contents.things)}
@@ -54,9 +53,7 @@ def votes(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -
 def commonness(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -> Float[np.ndarray, " n"] | None:
     """Return ln of how many times as common things of some names are in rooms of each kind as in rooms on average.
 
-    Their narrower kinds count as well: a kitchen cabinet is a cabinet.
-
-    Returns nats; None where the table holds none of them.
+    Their narrower kinds count as well. None where the table holds none of them.
     """
     is_a = lexicon().is_a
     rows = [
@@ -74,8 +71,7 @@ def commonness(things: Sequence[str], kinds: Sequence[str], contents: RoomConten
 def _not_against(
     nats: Float[np.ndarray, " n"], kinds: Sequence[str], entries: Iterable[Entry]
 ) -> Float[np.ndarray, " n"]:
-    # Nats that speak against no kind of room in which the lexicon says that such things stand. The homes that are
-    # counted have tables to dine at in dining rooms alone; many a kitchen has one.
+    # The homes that are counted have tables to dine at in dining rooms alone; many a kitchen has one.
     usual = {room for entry in entries for room in entry.rooms}
     return np.where([kind in usual for kind in kinds], np.maximum(nats, 0.0), nats)
 
@@ -137,10 +133,7 @@ class RoomField:
     rooms: "tuple[RoomRegions, Int[np.ndarray, ' c']] | None" = None  # once settled, and the room of each cell
 
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float32[np.ndarray, "m n"]:
-        """Return how likely each point is in each kind of room.
-
-        A picture in a thin wall is in the room that its region says, though the open cell nearest to it be behind it.
-        """
+        """Return how likely each point is in each kind of room: what hangs in a thin wall by its region."""
         cells = self.plan.cells_of(points_world)
         if self.rooms is not None:
             own, room_of_cell = self.room_of(points_world), self.rooms[1]
@@ -151,7 +144,7 @@ class RoomField:
         return self.share[cells]
 
     def room_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
-        """Return the room of each point, of a settled field: its region, else that of the cell nearest to it."""
+        """Return the room of each point of a settled field: its region, else that of the cell nearest to it."""
         assert self.rooms is not None
         regions, room_of_cell = self.rooms
         own = regions.at(points_world)
@@ -159,10 +152,7 @@ class RoomField:
         return np.where(is_room, own, room_of_cell[self.plan.cells_of(points_world)])
 
     def with_certain(self, named: "Sequence[tuple[str, Bool[np.ndarray, ' c']]]") -> "RoomField":
-        """Return the field where some cells are certain to be of a kind; new kinds come behind the others.
-
-        ``named``: kinds, each with its cells; of several on one cell the last counts.
-        """
+        """Return the field with new kinds behind the others, of which some cells are certain; of several the last."""
         kinds = list(dict.fromkeys([*self.kinds, *(name for name, _ in named)]))
         share = np.zeros((len(self.share), len(kinds)), np.float32)
         share[:, : len(self.kinds)] = self.share
@@ -172,10 +162,7 @@ class RoomField:
         return replace(self, kinds=tuple(kinds), share=share)
 
     def of_cells(self, weights: Float[np.ndarray, " n"]) -> Float32[np.ndarray, " c"]:
-        """Return for every cell how likely it is in a room of some kinds, in [0, 1].
-
-        ``weights``: how much each kind is meant, in [0, 1].
-        """
+        """Return how likely every cell is in a room of some kinds, each meant with a weight in [0, 1]."""
         return np.clip(self.share @ weights, 0.0, 1.0).astype(np.float32)
 
     def of_rooms(self, regions: RoomRegions) -> Float[np.ndarray, "r n"]:
@@ -191,11 +178,9 @@ class RoomField:
         return total
 
     def whole_rooms(self, regions: RoomRegions) -> Float[np.ndarray, "r n"]:
-        """Return how likely each room is each kind, if it is of one kind; rows add up to 1.
-
-        The looks at different parts of one floor are evidence for one room: their mean log counts ``_LOOKS`` times. A
-        room that leads to few others is seldom a passage, though one sees a hallway through its door.
-        """
+        """Return how likely each room is each kind, if it is of one kind; rows add up to 1."""
+        # The looks at different parts of one floor are evidence for one room: their mean log counts ``_LOOKS`` times. A
+        # room that leads to few others is seldom a passage, though one sees a hallway through its door.
         cells = self._sum_of_floors(regions, np.ones((len(self.share), 1)))
         nats = self._sum_of_floors(regions, np.log(np.maximum(self.share, _LEAST_SHARE))) / np.maximum(cells, 1.0)
         passage = _among(self.kinds, _PASSAGES)
@@ -204,10 +189,7 @@ class RoomField:
         return total / total.sum(axis=1, keepdims=True)
 
     def parts_of_rooms(self, regions: RoomRegions) -> Bool[np.ndarray, "r n"]:
-        """Return which kinds are parts of which rooms: of an open plan, those of much of the floor whose kind is sure.
-
-        A room that is of one kind has no parts.
-        """
+        """Return which kinds are parts of which rooms: of an open plan, those of much of its sure floor."""
         sure = self._sum_of_floors(regions, (self.share >= FOUND_AT).astype(np.float64))
         parts = sure >= np.maximum(LEAST_PART * sure.sum(axis=1, keepdims=True), _LEAST_PART_M2 / CELL_M**2)
         parts &= _among(self.kinds, _OPEN)
@@ -215,10 +197,7 @@ class RoomField:
         return parts
 
     def settled(self, regions: RoomRegions, room_of_cell: Int[np.ndarray, " c"]) -> "RoomField":
-        """Return the field in which all of a room is of its kind, and of an open plan each place of one of its parts.
-
-        ``room_of_cell``: the room that each cell belongs to; ``NONE`` leaves a cell as it is.
-        """
+        """Return the field in which a room is of one kind, and each place of an open plan of one of its parts."""
         inside = np.flatnonzero(room_of_cell != NONE)
         room = room_of_cell[inside]
         parts, whole = self.parts_of_rooms(regions)[room], self.whole_rooms(regions)[room]
@@ -233,7 +212,6 @@ def rooms_of_cells(regions: RoomRegions, places: Float[np.ndarray, "k 3"]) -> In
     """Return the room that each cell of the floor plan belongs to: its region, or that of the nearest view.
 
     Regions into which fewer than ``FEWEST_VIEWS`` views looked are no rooms. ``NONE``: near views beyond all floors.
-
     ``places``: middle of what each keyframe saw, metres, world.
     """
     own = regions.at(places)
@@ -253,11 +231,8 @@ def _among(kinds: tuple[str, ...], names: tuple[str, ...]) -> Bool[np.ndarray, "
 class Rooms:
     """The kinds of room of one map; what depends on the map alone is computed once.
 
-    Args:
-        plan: the map's floors and walls.
-        places: middle of what each keyframe saw, metres, world.
-        named: returns the voxels whose names vote; None where the map's things have no names.
-        settings: weights and distances.
+    ``places``: middle of what each keyframe saw, metres, world. ``named`` returns the voxels whose names vote; None
+    where the map's things have no names.
     """
 
     def __init__(
@@ -267,17 +242,12 @@ class Rooms:
         named: Callable[[], NamedVoxels | None],
         settings: RoomSettings,
     ) -> None:
-        self.plan = plan
-        self.settings = settings
+        self.plan, self.settings, self._named = plan, settings, named
         self._places = np.asarray(places, np.float64).reshape(-1, 3)
-        self._named = named
         self._votes: dict[tuple[str, ...], Float32[np.ndarray, "c n"]] = {}
 
     def field(self, kinds: Sequence[str], share: Float[np.ndarray, "k n"]) -> RoomField:
-        """Return how likely each place is each kind of room.
-
-        ``share``: how likely each keyframe's view shows each of them; rows add up to 1.
-        """
+        """Return how likely each place is each kind of room; ``share``: how likely each view shows each of them."""
         settings = self.settings
         mass = np.zeros((len(self.plan), len(kinds) + 1))
         np.add.at(mass, self._place_cells, np.c_[share, np.ones(len(share))])
@@ -319,10 +289,7 @@ class Rooms:
 
 
 def voting_rows(index: Int[np.ndarray, "n 3"], products: int) -> tuple[Int[np.ndarray, " m"], int]:
-    """Return the voxels whose names vote, one of q planes across the diagonal, and q: the voxels that each stands for.
-
-    Which voxels they are depends on their places alone, so that a map in another order gives the same.
-    """
+    """Return the voxels whose names vote, one of q planes across the diagonal whatever their order, and q."""
     every = max(1, int(np.ceil(len(index) * products / _MOST_PRODUCTS)))
     chosen = np.empty(len(index), bool)
     for a in range(0, len(index), _CHUNK):
@@ -374,16 +341,10 @@ _LEAST_NATS, _MOST_NATS = -3.0, 1.0
 
 
 class ThingsInRooms:
-    """The evidence of the rooms of a map on the things in it.
-
-    Args:
-        field: how likely each place is each kind of room.
-        contents: the things of rooms of each kind.
-    """
+    """The evidence of the rooms of a map on the things in it."""
 
     def __init__(self, field: RoomField, contents: RoomContents) -> None:
-        self._field = field
-        self._contents = contents
+        self._field, self._contents = field, contents
         self._nats: dict[tuple[str, ...], Float32[np.ndarray, " c"] | None] = {}
 
     def nats(
@@ -391,7 +352,7 @@ class ThingsInRooms:
     ) -> Float[np.ndarray, " i"] | None:
         """Return the mean, over the voxels of each instance, of ln of how many times as common such things are there.
 
-        Returns nats in [-3, 1]; None where it is not known in which rooms such things stand.
+        In nats, from −3 to 1; None where it is not known in which rooms such things stand.
         """
         if names not in self._nats:
             self._nats[names] = self._of_cells(names)

@@ -1,7 +1,4 @@
-"""What a map holds, as the command line, the server and agents list it: by room, place, name and page.
-
-The server stores what was computed once.
-"""
+"""What a map holds, as the command line, the server and agents list it: by room, place, name and page."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -43,10 +40,7 @@ class MapLists:
     def things(
         self, least: float = 0.5, names: Sequence[str] = (), structure: bool = False, at: str | None = None
     ) -> list[ThingAnswer]:
-        """Return the things, perhaps those of a day, most confident first; none of a map without a model of pixels.
-
-        ``QueryError``: ``least`` lies outside [0, 1], the pixel encoder does not know a name, or there is no such day.
-        """
+        """Return the things, perhaps those of a day, most confident first; none of a map without a model of pixels."""
 
         def found() -> list[ThingAnswer]:
             if not self.avlmap.has(Kind.PIXELS):
@@ -155,10 +149,7 @@ def things_with_rooms(lists: MapLists, wanted: Wanted) -> list[Selected]:
 
 
 def selected(lists: MapLists, wanted: Wanted) -> tuple[list[Selected], NearAnswer | None]:
-    """Return all things that are meant, and the thing that they are near to if one is named.
-
-    ``QueryError``: there is no such room, or no such thing to be near to.
-    """
+    """Return all things that are meant, and the thing that they are near to if one is named."""
     found = _inside(lists, wanted.room, things_with_rooms(lists, wanted), lambda one: one.thing["position"])
     if wanted.near is None:
         return found, None
@@ -174,10 +165,7 @@ def selected(lists: MapLists, wanted: Wanted) -> tuple[list[Selected], NearAnswe
 
 
 def page_of(rows: Sequence[Row], top: int, page: int, of: str) -> tuple[list[Row], int]:
-    """Return a page of some rows, and how many pages there are.
-
-    ``QueryError``: there is no such page, or a page of nothing is wanted.
-    """
+    """Return a page of some rows, and how many pages there are. ``QueryError``: there is no such page."""
     if top < 1:
         raise QueryError(f"A page cannot hold {top} {of}; it holds at least 1.")
     pages = max(1, math.ceil(len(rows) / top))
@@ -232,7 +220,7 @@ def beyond(lists: MapLists, room: str | None, about: NearAnswer | None) -> list[
 def map_answer(avlmap: AVLMap, note: Callable[[AvlmapsError], object] = lambda _: None) -> dict[str, Any]:
     """Return the description of a map that ``avlmaps info`` prints: counts, models, sounds with names, rules.
 
-    ``note``: is given the error where the sounds have no names since their model is not here.
+    ``note`` is given the error where the sounds' model is not here.
     """
     from avlmaps.maps.store.map_data import describe
     from avlmaps.query.settings import rules_of

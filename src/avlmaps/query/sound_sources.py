@@ -1,8 +1,7 @@
 """Where sounds came from: the evidence of a map's microphones as regions with probabilities, rooms and things.
 
-Sounds of one kind that come from one place are one source, and sharpen it: they are joined while that is likelier than
-two places (the birth rule). What usually makes a kind of sound (the lexicon's makers) is a prior apart, which can be
-left out.
+Sounds of one kind are joined to one source while that is likelier than two places (the birth rule). What usually makes
+a kind of sound (the lexicon's makers) is a prior apart, which can be left out.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -173,10 +172,9 @@ class SourceMap:
         return Joined(tuple(events), density, density.of_candidates(chosen, heard + expected))
 
     def sources(self, events: Sequence[int], kind: str, prior: bool = True) -> list[Joined]:
-        """Return the sources of sounds of one kind: each sound joins the source that it fits best, or begins its own.
+        """Return the sources of sounds of one kind, the clearest first: each joins the best fitting one, or begins one.
 
-        ``events``: numbers of the sounds, the clearest first; one that is not located is left out. ``prior``: whether
-        things that usually make such a sound count.
+        ``prior``: whether things that usually make such a sound count.
         """
         base = np.asarray(self.evidence.prior, np.float64)
         found: list[Joined] = []
@@ -200,10 +198,8 @@ class SourceMap:
         return self.space.world(np.array([*xy, height]))
 
     def anchors(self, joined: Joined) -> tuple[Float[np.ndarray, "a 3"], Float[np.ndarray, " a"]]:
-        """Return places of a source, with values in (0, 1]: its likeliest place, and the cells of its region of 0.9.
-
-        A cell has how likely it is against the likeliest cell, and a little less than the place, which is a mean.
-        """
+        """Return places of a source, with values in (0, 1]: its likeliest place, and the cells of its region of 0.9."""
+        # A cell has how likely it is against the likeliest cell, and a little less than the place, which is a mean.
         inside = np.flatnonzero(joined.density.region(0.9).ravel())
         share = joined.density.share.ravel()[inside]
         place = self.position_of(joined)
@@ -215,11 +211,10 @@ class SourceMap:
 def list_sources(
     avlmap: "AVLMap", names: Sequence[str] = (), prior: bool = True, *, least: float = 0.0
 ) -> list[SoundSource]:
-    """Return the sources of a map's sounds, or of those of some names, most confident first.
+    """Return the sources of a map's sounds, or of those of some kinds, most confident first.
 
-    ``names``: kinds of sound; by default each sound has its likeliest name. ``prior``: whether things that usually make
-    such a sound count. ``least``: sources of a lower confidence are left out, in [0, 1]. ``QueryError``: the map does
-    not know where sounds came from.
+    ``prior``: whether things that usually make such a sound count. ``least``: sources of a lower confidence are left
+    out, in [0, 1]. ``QueryError``: the map does not know where sounds came from.
     """
     places = _Places(avlmap)
     listed = list_joined(avlmap, names, prior, least=least)
@@ -228,10 +223,7 @@ def list_sources(
 
 
 def source_of(avlmap: "AVLMap", number: int) -> SoundSource:
-    """Return the source of one sound by its likeliest name.
-
-    ``QueryError``: the map does not know where sounds came from.
-    """
+    """Return the source of one sound by its likeliest name."""
     event, known = avlmap.sounds()[number], avlmap.source_map
     name, confidence = (event.names[0], event.confidences[0]) if event.names else ("", 0.0)
     return _Places(avlmap).described(known, known.joined([number], name), name, float(confidence))
@@ -270,7 +262,7 @@ def _by_kind(avlmap: "AVLMap", names: Sequence[str]) -> dict[str, dict[int, floa
 
 
 class _Places:
-    """Names the rooms and things of places in a map."""
+    # Names the rooms and things of places in a map.
 
     def __init__(self, avlmap: "AVLMap") -> None:
         self._map, self._rooms = avlmap, avlmap.where
@@ -280,7 +272,6 @@ class _Places:
         return self._map.things() if self._map.has(Kind.PIXELS) else []
 
     def described(self, known: SourceMap, joined: Joined, kind: str, confidence: float) -> SoundSource:
-        """Return a source with its region, rooms and things."""
         spread = joined.density.spread
         return SoundSource(
             name=kind, confidence=round(confidence, 3), probability=round(confidence * spread.right, 3),
@@ -305,10 +296,7 @@ class _Places:
 
 
 def things_that_may_be(known: SourceMap, joined: Joined, things: "Sequence[Thing]") -> list[tuple[int, float]]:
-    """Return the numbers of the things that a source may be, and the probability of each, likeliest first.
-
-    A candidate counts for the nearest thing within ``_AT_THING_M``.
-    """
+    """Return the numbers of the things that a source may be, and the probability of each, likeliest first."""
     from scipy.spatial import KDTree
 
     likely = np.flatnonzero(joined.share > 1e-5)
@@ -333,9 +321,6 @@ def with_heard(
 ) -> list[Thing]:
     """Return things with the sounds that may have come from them; as they are where the map does not know that.
 
-    The probability is that of the name of the sound times that the thing is its source. Of several sounds of one source
-    the last gives the time.
-
     ``are_all``: whether these are all that it lists; else a sound may have come from the others as well, which are
     those of ``every``, by default of the map's list. ``visit``: of a day, from 0, the sounds of that day alone.
     """
@@ -353,9 +338,8 @@ def with_heard(
         onset_s = max(sounds[event].onset_s for event in one.events)
         for number, share in things_that_may_be(avlmap.source_map, one, every):
             if kind and confidence * share >= _LEAST_HEARD:
-                row: HeardFromAnswer = {
-                    "sound": kind, "probability": round(confidence * share, 3), "onset_s": onset_s
-                }  # fmt: skip
+                likely = round(confidence * share, 3)
+                row: HeardFromAnswer = {"sound": kind, "probability": likely, "onset_s": onset_s}
                 if visits:
                     number_of_day = _visit_of(visits, onset_s)
                     row["when"] = {"visit": number_of_day + 1, "day": visits[number_of_day].day or None}

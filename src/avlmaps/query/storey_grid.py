@@ -127,7 +127,7 @@ def contacts(label: Labels) -> dict[tuple[int, int], int]:
 def outline(cells: Cells, loose: float, most: int) -> Float32[np.ndarray, "k 2"]:
     """Return the corners of the largest piece of cells, in cells from the corner of cell (0, 0), without its holes.
 
-    It may be off by ``loose`` cells, and by more where it would have more than ``most`` corners.
+    They may be off by ``loose`` cells, and by more where there would be more than ``most``.
     """
     import cv2
 
@@ -190,11 +190,7 @@ class StoreyGrid:
         cls, level: Float[np.ndarray, "n 3"], floor_m: float, sights: Sights, voxel_size_m: float,
         heading_rad: float | None = None,
     ) -> "StoreyGrid":  # fmt: skip
-        """Sort the voxels of a storey into cells.
-
-        ``level``: middles of its voxels, level frame, metres; at least one. ``floor_m``: level z of its floor.
-        ``heading_rad``: of its walls; found if None.
-        """
+        """Sort the voxels of a storey into cells: ``level``, their middles, metres; at least one."""
         if heading_rad is None:
             height = level[:, 2] - floor_m
             heading_rad = wall_heading(level[(height >= WALL_M[0]) & (height < WALL_M[1]), :2], voxel_size_m)
@@ -250,10 +246,7 @@ def turned(xy: Float[np.ndarray, "m 2"], angle_rad: float) -> Float[np.ndarray, 
 
 
 def wall_heading(xy: Float[np.ndarray, "m 2"], cell_m: float) -> float:
-    """Return the heading along which most walls run, in [0, π/2) by degrees; 0 where it is as good as any.
-
-    Along it, walls fall into few rows and columns of cells.
-    """
+    """Return the heading along which walls fall into the fewest rows and columns of cells, in [0, π/2) by degrees."""
     column = np.floor(np.asarray(xy) / cell_m + _SIDE).astype(np.int64)
     low, width = column.min(axis=0, initial=2**62), int(column[:, 1].max(initial=0) - column[:, 1].min(initial=0)) + 1
     column = low + np.stack(np.divmod(np.unique((column - low) @ np.array([width, 1])), width), axis=1)

@@ -37,9 +37,9 @@ class VoxelMap:
     """A map in memory: ``add`` frames, ``ask``, ``save``. It is the map that ``build_map`` makes of the same frames.
 
     Up, the floor and the depth camera's error are found in the first 60 frames, which are fused then, or with the first
-    question; up and the floor again when a question comes after the walk has doubled, and in ``save``. The map of a
-    longer walk can hence differ a little from a build's. A question after new frames computes the voxels again. Sounds
-    are found while they happen, and in ``save`` as a build finds them. Threads may add and ask.
+    question; up and the floor again with a question after the walk has doubled, and in ``save``. The map of a longer
+    walk can hence differ a little from a build's. Sounds are found while they happen, and in ``save`` as a build finds
+    them. Threads may add and ask.
     """
 
     def __init__(
@@ -53,16 +53,9 @@ class VoxelMap:
     ) -> None:
         """Begin an empty map.
 
-        Args:
-            voxel_size_m: edge of a voxel, metres.
-            encoders: the models that perceive; those of the profile ``embedded`` if None; ``Encoders()`` has none.
-            up_in_world: the direction that is up in the world of the poses; None finds it in the frames.
-            settings: everything else about the map, as of ``build_map``; its voxel size does not count.
-            query: how to query.
-
-        Raises:
-            MapError: the voxel size or up is none.
-            BackendError: there is no such profile.
+        ``encoders``: the models that perceive; those of the profile ``embedded`` if None; ``Encoders()`` has none.
+        ``up_in_world``: the direction that is up in the world of the poses; None finds it in the frames. ``settings``:
+        everything else about the map, as of ``build_map``. ``MapError``: the voxel size or up is none.
         """
         edge_m = as_number(voxel_size_m)
         if edge_m is None:
@@ -80,18 +73,14 @@ class VoxelMap:
     ) -> None:
         """Add a frame. What is refused leaves the map as it was.
 
-        Args:
-            rgb: colour picture, (h, w, 3) uint8.
-            depth_m: z-depth in metres, (hd, wd) floats; 0, NaN or infinity where there is none.
-            camera: a ``Pinhole`` of the colour picture, whose view the depth shares; or a ``Rig`` of both cameras.
-            world_from_camera: 4x4 pose of the depth camera (OpenCV axes), metres.
-            stamp_s: seconds, rising from frame to frame; by default 0.1 s after the one before.
-            features: of the pixels, (hf, wf, d), covering the picture evenly at any resolution, each of unit length or
-                zero; instead of the encoder's.
+        ``rgb``: (h, w, 3) uint8. ``depth_m``: z-depth in metres, (hd, wd) floats; 0, NaN or infinity where there is
+        none. ``camera``: a ``Pinhole`` of the colour picture, whose view the depth shares, or a ``Rig`` of both
+        cameras. ``world_from_camera``: 4x4 pose of the depth camera (OpenCV axes), metres. ``stamp_s``: seconds, rising
+        from frame to frame; by default 0.1 s after the one before. ``features``: of the pixels, instead of the
+        encoder's: (hf, wf, d), covering the picture evenly at any resolution, each of unit length or zero.
 
-        Raises:
-            RecordingError: an array, the camera, the pose or the stamp is not what it must be.
-            BackendError: so are the features, or what the encoder gave.
+        ``RecordingError``: an array, the camera, the pose or the stamp is not what it must be. ``BackendError``: so are
+        the features, or what the encoder gave.
         """
         with self._lock:
             index, last_s = self._mapper.next_index, self._mapper.last_stamp_s
@@ -104,37 +93,24 @@ class VoxelMap:
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of the microphone's sound. What is refused leaves the map as it was.
 
-        A question knows the sounds that have been over for a quarter of a second. Which they are can change as the
-        background becomes known; a saved map has those that a build finds in the whole track.
-
-        Args:
-            chunk: a ``Sound``: float32 mono samples in [-1, 1] and their rate, the same for all pieces.
-            stamp_s: when its first sample sounds, on the clock of the frames; None where the piece before ended, at
-                first 0. A gap of 0.1 s and more is filled with silence, and an overlap of that is left out.
-
-        Raises:
-            AudioError: it is no sound, is of another rate, repeats what came, or is of another clock.
+        A question knows the sounds that have been over for a quarter of a second. ``chunk``: float32 mono samples in
+        [-1, 1] and their rate, which all pieces share. ``stamp_s``: when its first sample sounds, on the clock of the
+        frames; None where the piece before ended, at first 0. A gap of 0.1 s and more is filled with silence, and an
+        overlap of that is left out. ``AudioError``: it is no sound, is of another rate, repeats what came, or is of
+        another clock.
         """
         with self._lock:
             self._mapper.add_sound(chunk, stamp_s)
             self._map = None
 
     def correct_poses(self, stamps_s: Any, poses: Any) -> tuple[float, float]:
-        """Move the map to corrected poses of its frames, as a loop closure gives them.
+        """Move the map to corrected poses of its frames, as a loop closure gives them; return median and most, metres.
 
         It takes a map that was begun with submaps: ``settings=BuildSettings(frames=FrameSettings(per_submap=32))``.
-        Frames to come have poses of the corrected world.
-
-        Args:
-            stamps_s: (k,) of corrected poses, rising: each of a frame, or within half a second of one.
-            poses: (k, 4, 4) world_from_camera of the depth camera then. Frames between two of them follow smoothly.
-
-        Returns:
-            How far frames moved: the median and the most, metres.
-
-        Raises:
-            MapError: there are no submaps or no frames, or the poses are not of its frames; the map is as it was.
-            RecordingError: a pose is no rigid motion.
+        Frames to come have poses of the corrected world. ``stamps_s``: (k,), rising: each of a frame, or within half a
+        second of one. ``poses``: (k, 4, 4) world_from_camera of the depth camera then; frames between them follow
+        smoothly. ``MapError``: there are no submaps or no frames, or the poses are not of its frames; the map is as it
+        was. ``RecordingError``: a pose is no rigid motion.
         """
         with self._lock:
             moved = self._mapper.correct_poses(stamps_s, poses)
@@ -143,11 +119,7 @@ class VoxelMap:
 
     @property
     def map(self) -> AVLMap:
-        """The map of the frames that came, to be queried in every way; later frames do not change it.
-
-        Raises:
-            MapError: no frame came, or none has a depth within the limits.
-        """
+        """The map of the frames up to now. ``MapError``: there is no frame, or none has a depth within the limits."""
         with self._lock:
             if self._map is None:
                 self._map = AVLMap(self._mapper.snapshot(), self._mapper.encoders, path=IN_MEMORY, settings=self._query)
@@ -203,12 +175,7 @@ class VoxelMap:
     def save(self, path: str | Path, *, overwrite: bool = False) -> AVLMap:
         """Write the map into a folder, by custom ``NAME.avlmap``, and open it; frames can be added on.
 
-        Args:
-            path: the folder.
-            overwrite: replace a map that is there.
-
-        Raises:
-            MapError: there is nothing to write, the folder is something else or a map, or it cannot be written.
+        ``MapError``: there is nothing to write, the folder is something else or a map, or it cannot be written.
         """
         with self._lock:
             place = lasting_path(path)
@@ -236,11 +203,7 @@ def require_kinds(*given: tuple[str, object, type]) -> None:
 
 
 def direction(up_in_world: Any) -> Float[np.ndarray, "3"] | None:
-    """Return the unit vector of a direction that a program gave; None for None.
-
-    Raises:
-        MapError: it is none.
-    """
+    """Return the unit vector of a direction that a program gave; None for None. ``MapError``: it is no direction."""
     if up_in_world is None:
         return None
     up = np.asarray(up_in_world)

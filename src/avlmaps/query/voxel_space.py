@@ -1,7 +1,6 @@
 """The space that heatmaps live in: the map's voxels, their places, which are connected, and what is horizontal.
 
-The recording's world need not be level, so the map knows the up direction. "Level frame" means the world turned
-by the smallest rotation that makes up its z axis; it shares the world's origin.
+The level frame is the recording's world turned by the smallest rotation that makes up its z axis, about its origin.
 """
 
 from dataclasses import dataclass
@@ -24,10 +23,9 @@ _MOST_AT_ONCE = 1 << 17
 def linked(index: Int[np.ndarray, "n 3"], reach: int) -> Int64[np.ndarray, " n"]:
     """Label voxels so that those within ``reach`` along every axis share a label; labels rise by their first voxel.
 
-    Voxels over one another make runs, and runs of columns within reach are joined where they overlap.
-
     ``index``: sorted by x, then y, then z, without repeats.
     """
+    # Voxels over one another make runs, and runs of columns within reach are joined where they overlap.
     if not len(index):
         return np.zeros(0, np.int64)
     voxels = np.asarray(index, np.int64)
@@ -186,13 +184,9 @@ class Blocks:
 
 
 class Space:
-    """Where a map's voxels are. All heatmaps of one map share one; what costs time is computed once.
+    """Where a map's voxels are: ``index`` (n, 3), sorted. All heatmaps of one map share it.
 
-    Attributes:
-        grid: turns metres into voxels.
-        index: (n, 3) occupied voxels, sorted.
-        level_from_world: 3x3 rotation.
-        data: the map, for its colours in pictures; None for a space without one.
+    ``data``: the map, for its colours in pictures; None for a space without one.
     """
 
     def __init__(
@@ -202,10 +196,8 @@ class Space:
         up_in_world: Float[np.ndarray, "3"],
         data: "MapData | None" = None,
     ) -> None:
-        self.grid = grid
-        self.index = index
+        self.grid, self.index, self.data = grid, index, data
         self.level_from_world = rotation_to_level(np.asarray(up_in_world, np.float64))
-        self.data = data
 
     def __len__(self) -> int:
         return len(self.index)

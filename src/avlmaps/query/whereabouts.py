@@ -1,4 +1,4 @@
-"""The floors and rooms of a map as names, and which of them a point lies in: lists, questions and counts ask here.
+"""The floors and rooms of a map as names, and which of them a point lies in.
 
 Of two bathrooms the lists of a map call one "bathroom 1", and a question may say so too.
 """
@@ -33,12 +33,8 @@ _NUMBERED = re.compile(rf"[^\W\d_] [1-9]\d{{0,2}}\b(?!\.\d| ?({_UNITS})\b)", re.
 class Whereabouts:
     """The floors and rooms of one map; none where it has no model of views.
 
-    ``MapError``: the map was built with another encoder than is installed.
-
-    Attributes:
-        rooms: those with most views first.
-        names: of each room, all different: the kind of room, and a number where there are several of a kind.
-        regions: the floor of each room; None for a map without a floor plan.
+    ``rooms``: those with most views first. ``names``: of each room, all different: its kind, and a number where there
+    are several. ``regions``: their floors; None without a floor plan. ``MapError``: another encoder made the map.
     """
 
     def __init__(self, avlmap: "AVLMap") -> None:
@@ -62,9 +58,9 @@ class Whereabouts:
         return np.zeros(len(points), np.int64) if self._plan is None else self._plan.storeys_of(points)
 
     def rooms_of(self, points: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
-        """Return the number of the room of each point: the one whose region holds it, else that of the nearest view.
+        """Return the room of each point (metres, recording frame): by its region, else of the nearest view.
 
-        ``points``: metres, recording frame. Numbers into ``rooms``; ``NOWHERE`` for a map without rooms, and outside.
+        Numbers into ``rooms``; ``NOWHERE`` for a map without rooms, and outside.
         """
         points = np.asarray(points, np.float64).reshape(-1, 3)
         field = self._map.room_field if self.rooms and len(points) else None
@@ -90,10 +86,7 @@ class Whereabouts:
         return np.array([room.area_m2 for room in self.rooms], np.float64)
 
     def parts_of(self, kind: Callable[[str], bool], points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
-        """Return which points lie in a room of a kind: in one of that name, or in the part of an open plan that is.
-
-        ``kind``: whether a name of a room is meant. ``points``: metres, recording frame.
-        """
+        """Return which points (metres, recording frame) lie in a room whose name is meant, or such a part of one."""
         points = np.asarray(points, np.float64).reshape(-1, 3)
         own = self.rooms_of(points)
         whole = np.array([kind(room.name) for room in self.rooms] + [False])[own]
@@ -167,10 +160,7 @@ def _numbered(avlmap: "AVLMap") -> dict[str, int]:
 
 
 def region_named(avlmap: "AVLMap", phrase: str) -> int | None:
-    """Return the region of the room that a phrase names with its number; None where it names none so.
-
-    What a person called so goes before what the lists number.
-    """
+    """Return the region of the room that a phrase names with its number; None where a person called something so."""
     if not _NUMBERED.search(phrase) or avlmap.edited.knows(phrase):
         return None
     from avlmaps.query.edits import plain_name

@@ -1,9 +1,8 @@
 """By how much a queried word wins each voxel, against a vocabulary and "other"; what a voxel is taken for.
 
-As in the paper, the queried word competes with a vocabulary and with "other" for every voxel, and wins where it
-is the closest. The margin by which it wins ranks instances and decides absence. An encoder of an open vocabulary gives
-each word a vector, and those of one sense lie close but not at one place: queried for a couch, a sofa would win half of
-its voxels. Words which name the wanted thing, or a kind of it by the lexicon, do not compete.
+As in the paper, the word competes with a vocabulary and with "other" for every voxel, and wins where it is the closest.
+The margin by which it wins ranks instances and decides absence. Words which name the wanted thing, or a kind of it by
+the lexicon, do not compete: of an open vocabulary, a sofa would win half the voxels of a couch.
 """
 
 import hashlib
@@ -73,10 +72,7 @@ _BIAS = np.float32(2.0**112)
 def feature_scores(
     feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "k d"], rows: Int[np.ndarray, " m"] | None = None
 ) -> Float32[np.ndarray, " m"]:
-    """Return the product of features with one word; of several words, the length of the products with them.
-
-    ``rows``: which features; None for all.
-    """
+    """Return the product of features, or of some rows of them, with one word; of several words the products' length."""
     out = np.empty(len(feature) if rows is None else len(rows), np.float32)
     scaled = np.asarray(words, np.float32) * _BIAS
 
@@ -141,10 +137,7 @@ def two_closest(feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, 
 def margins(
     score: Float32[np.ndarray, " n"], closest: Closest, silent: Bool[np.ndarray, " v"], least: float
 ) -> tuple[Float32[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
-    """Return score minus the best competing rival's, and where a third word may be that rival.
-
-    ``least``: what the word must beat in any case.
-    """
+    """Return score minus that of the best competing rival or ``least``, and where a third word may be that rival."""
     best, best_word, second, second_word = closest
     mute = np.append(silent, True)  # number −1 is no word
     first_mute, second_mute = mute[best_word], mute[second_word]
@@ -158,7 +151,7 @@ _UNIT = 0.02  # by as much a length may differ from one, as in features of pixel
 def encoded_words(encoder: PixelEncoder | ViewEncoder, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
     """Return a row for each word, zero for one that the encoder does not know.
 
-    ``BackendError``: the encoder failed, or gave other than finite rows, one for each word, of unit length or zero.
+    ``BackendError``: the encoder failed, or gave other than a row of unit length or zero for each word.
     """
     what = f"encode_words of the encoder {encoder!r}"
     try:
@@ -316,8 +309,8 @@ class Vocabulary:
 class ClosestWords(Vocabulary):
     """A vocabulary, and its two words closest to each voxel, computed once a map and vocabulary.
 
-    With the best two, a query is one pass over the features even if the queried word is in the vocabulary. For an
-    encoder of names they also say, without its feature, of most voxels that a word cannot win there.
+    They make a query one pass over the features even if the word is in the vocabulary; of names they also say of most
+    voxels, without the features, that a word cannot win there.
     """
 
     best: Float32[np.ndarray, " n"]  # highest score; −inf where there is no word at all
@@ -436,8 +429,7 @@ def scorer_of(
 ) -> Callable[[float], Scored]:  # fmt: skip
     """Return a function that gives the voxels where a word scores at least a share of its best rival, maybe others.
 
-    For an encoder of any words, whose ``ClosestWords`` are always known, they are all voxels. Of an encoder of names,
-    voxels with little of the word are not compared with its rivals.
+    For an encoder of any words they are all voxels; of names, voxels with little of the word are not compared.
     """
     silent = rivals.not_competing(encoder, encoded, settings.same_word_cosine)
     known = rivals if isinstance(rivals, ClosestWords) else None
@@ -466,9 +458,9 @@ def scorer_of(
 def least_score_to_count(names: int, share: float) -> float:
     """Return a score that every voxel exceeds which scores at least a share of its best rival, for a closed set.
 
-    The squared scores of all names are probabilities. What is left by the word, p, and by the names that do not compete
-    because it clearly means them, at most p / ``CLEARLY_MEANT``, is divided among the rivals (``names`` counts the
-    word): the best of them has at least (1 − p / ``CLEARLY_MEANT``) / names. A tenth is ample for rounding to float16.
+    The squared scores of all ``names`` are probabilities. What is left by the word, p, and by names that do not compete
+    because it clearly means them, at most p / ``CLEARLY_MEANT``, is divided among its rivals: the best of them has at
+    least (1 − p / ``CLEARLY_MEANT``) / names. A tenth is ample for rounding to float16.
     """
     return 0.9 * share / math.sqrt(names + 1.0 / CLEARLY_MEANT)
 
@@ -478,19 +470,10 @@ _OWN_VOXELS = 1.5  # a ray ends this far before the voxel itself, in voxels
 
 
 class VoxelNamer:
-    """Names voxels by the pixel encoder's vocabulary.
-
-    Attributes:
-        names: what it distinguishes.
-        calibrated: whether confidences are probabilities; else they are cosines.
-    """
+    """Names voxels by the pixel encoder's vocabulary (``names``); with ``calibrated`` false confidences are cosines."""
 
     def __init__(self, avlmap: "AVLMap", vocabulary: Sequence[str] | None = None) -> None:
-        """Take the encoder's names, or a vocabulary for one that has none of its own.
-
-        ``BackendError``: the map's profile has no pixel encoder. ``MapError``: the map was built with another encoder
-        than is installed.
-        """
+        # Takes the encoder's names, or a vocabulary for one that has none of its own.
         self._voxels = avlmap.data.voxels
         encoder = avlmap.encoders.pixels
         avlmap.require_model(Kind.PIXELS)
@@ -528,10 +511,7 @@ class VoxelNamer:
     def best(
         self, rows: Int[np.ndarray, " m"] | None = None, rivals: ClosestWords | None = None
     ) -> tuple[Int[np.ndarray, " m"], Float32[np.ndarray, " m"]]:
-        """Return for each of some voxels the number of its likeliest name (-1 for none) and its confidence.
-
-        ``rows``: numbers of the voxels in the map; by default all.
-        """
+        """Return for each of some voxels, or of all, the number of its likeliest name (−1: none) and its confidence."""
         rows = np.arange(len(self._voxels)) if rows is None else rows
         if self._named and rivals is not None and set(rivals.words) == set(self.names):
             number_of = np.array([*(self.names.index(word) for word in rivals.words), -1], np.int64)

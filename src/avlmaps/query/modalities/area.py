@@ -42,9 +42,6 @@ def area_scores(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return for each keyframe the posterior of the name among all area names, and its score in [0, 1].
 
-    An encoder that distinguishes named kinds of room gives their probabilities. For one of an open vocabulary they
-    are the softmax over the names that it was trained with; names that mean the queried area as well do not compete.
-
     The scores are the posteriors, or stretched cosines where the settings ask for the paper's score.
     """
     shares = view_shares(view, encoder, name, settings)
@@ -64,8 +61,9 @@ def view_shares(
         return ViewShares(encoder.names, share, weights, np.clip(share @ weights, 0.0, 1.0))
     others = [area for area in AREA_NAMES if not same_place(area, name)]
     words = encoded_words(encoder, [name, *others]).astype(np.float64)
-    apart = words - words.mean(axis=0) if isinstance(encoder, ScaledEncoder) else words
-    competes = np.r_[True, _cosine(apart[1:], apart[0]) < settings.same_word_cosine]
+    apart = words - (words.mean(axis=0) if isinstance(encoder, ScaledEncoder) else 0.0)
+    apart /= np.maximum(np.linalg.norm(apart, axis=1, keepdims=True), 1e-6)
+    competes = np.r_[True, apart[1:] @ apart[0] < settings.same_word_cosine]
     cosine = _cosines(view, words[competes])
     kinds = tuple(kind for kind, does in zip([name, *others], competes, strict=True) if does)
     return ViewShares(kinds, _softmax(cosine, encoder, settings), np.eye(1, len(kinds))[0], cosine[:, 0])
@@ -88,11 +86,10 @@ def name_shares(
 
 
 def same_place(area: str, asked: str) -> bool:
-    """Return whether an area's name and a wanted phrase mean the same kind of place, or the phrase one such place.
+    """Return whether an area's name and a wanted phrase mean one kind of place, or the phrase one such place.
 
-    A "large kitchen" is a kitchen: the bare name would beat the phrase wherever it is right. The lexicon says which
-    names mean the same: the features of two words of one sense lie as far apart as kitchen and dining room for some
-    models.
+    A "large kitchen" is a kitchen: the bare name would beat the phrase wherever it is right. The lexicon says it, as
+    features of two words of one sense lie as far apart as kitchen and dining room for some models.
     """
     words = " ".join(word for word in asked.casefold().split() if word not in ("a", "an", "the"))
     known, name = lexicon(), area.casefold()
@@ -104,10 +101,6 @@ def same_place(area: str, asked: str) -> bool:
     return any(
         not wide.generic and wide in theirs for entry in ours for wide in known.wider(entry.name, EntryKind.ROOM)
     ) or any(wide in ours for entry in theirs for wide in known.wider(entry.name, EntryKind.ROOM))
-
-
-def _cosine(rows: Float[np.ndarray, "n d"], row: Float[np.ndarray, " d"]) -> Float[np.ndarray, " n"]:
-    return rows @ row / np.maximum(np.linalg.norm(rows, axis=1) * np.linalg.norm(row), 1e-12)
 
 
 def _named_shares(view: Float32[np.ndarray, "k d"], encoder: NamedViewEncoder) -> Float[np.ndarray, "k n"]:
@@ -135,8 +128,7 @@ def _temperature(encoder: ViewEncoder, settings: AreaSettings) -> float:
 def modes(points: Float[np.ndarray, "a 2"], score: Float[np.ndarray, " a"], link_m: float) -> Int[np.ndarray, " a"]:
     """Group anchors round the local maxima of their score: each follows its best neighbour uphill (quick shift).
 
-    ``points``: horizontal, metres. ``score``: one for each. ``link_m``: how far a neighbour may be. Returns the number
-    of the group of each anchor, the best group first.
+    ``points``: horizontal, metres. ``link_m``: how far a neighbour may be. Groups are numbered, the best one first.
     """
     from scipy.spatial import KDTree
 
@@ -169,10 +161,9 @@ def area_factor(
     """Return the heat of an area: one anchor a keyframe.
 
     As context it is how likely each place is in such an area; where the area itself is sought it falls from the places
-    that look most like it, and each room is one goal. Without rooms heat falls off round every keyframe.
-
-    ``settled`` makes a room of one kind, and puts in the rooms that people named: kinds behind those that the encoder
-    knows; one without a name is the room that the query names by its number.
+    that look most like it, and each room is one goal. Without rooms heat falls off round every keyframe. ``settled``
+    puts in the rooms that people named, behind the kinds that the encoder knows; one without a name is the room that
+    the query names by its number.
     """
     anchors = area_anchors(keyframes, settings)
     view = np.asarray(keyframes.view)

@@ -70,11 +70,7 @@ def require_fitting(rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None)
 
 
 def image_factor(space: Space, located: "Located", part: Part, heat: HeatSettings) -> NearAnchors:
-    """Return the heat of a picture: one anchor of score 1 at the camera.
-
-    Where it was not located, the anchor is at the best guess, if there is one, with the guess's confidence: below 0.5
-    it is not found by itself.
-    """
+    """Return the heat of a picture: one anchor of score 1 at the camera, else at the best guess, if there is one."""
     is_located = located.world_from_camera is not None
     pose = located.world_from_camera if is_located else located.guess
     confidence = 1.0 if is_located else max(min(located.score, _MOST_OF_A_GUESS), _LEAST_CERTAINTY)
@@ -85,13 +81,14 @@ def image_factor(space: Space, located: "Located", part: Part, heat: HeatSetting
         note += f"; {located.notes[0][:1].lower()}{located.notes[0][1:].rstrip('.')}"
     if pose is not None and not is_located:
         note += "; the heat is that of the best guess"
+    scores, instance = np.ones(len(anchors)), np.zeros(len(anchors), np.int64)
     return NearAnchors(
         space,
         part,
         heat.falloff_per_m(part.role),
         anchors,
-        np.ones(len(anchors)),
-        np.zeros(len(anchors), np.int64),
+        scores,
+        instance,
         found,
         part.query,
         note,

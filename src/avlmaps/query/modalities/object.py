@@ -9,7 +9,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool, Float32, Int, UInt8
+from avlmaps.core.arrays import Float32, Int, UInt8
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Part
@@ -38,20 +38,17 @@ NOTHING = frozenset({"", "thing", "things", "something", "object", "objects", "a
 class ColourPhrase:
     """The colour in a phrase, and the phrase without it."""
 
-    text: str  # the words of colour
+    text: str
     feature: Float32[np.ndarray, " d"]  # of the colour
     thing: str  # the rest of the phrase, ``""`` where the query names only a colour
 
 
-@cache
-def colour_words() -> ColourWords:
-    """Return the encoder of colours, made once."""
-    return ColourWords()
+_colour_words = cache(ColourWords)
 
 
 def colour_in(phrase: str) -> ColourPhrase | None:
     """Return the colour in a phrase, None where there is none."""
-    words = colour_words()
+    words = _colour_words()
     text = words.understood(phrase)
     if not text:
         return None
@@ -59,14 +56,9 @@ def colour_in(phrase: str) -> ColourPhrase | None:
     return ColourPhrase(text, words.encode_words([phrase])[0], "" if set(thing.split()) <= NOTHING else thing)
 
 
-def has_colour(rgb: UInt8[np.ndarray, "n 3"], said: ColourPhrase) -> Bool[np.ndarray, " n"]:
-    """Return which voxels' colours are closer to the queried one than to any other term."""
-    return colour_margin(rgb, said) > 0.0
-
-
-def colour_margin(rgb: UInt8[np.ndarray, "n 3"], said: ColourPhrase) -> Float32[np.ndarray, " n"]:
-    """Return by how much each voxel's colour is closer to the queried one than to any other term."""
-    words = colour_words()
+def _colour_margin(rgb: UInt8[np.ndarray, "n 3"], said: ColourPhrase) -> Float32[np.ndarray, " n"]:
+    # By how much each voxel's colour is closer to the queried one than to any other term.
+    words = _colour_words()
     colour = words.encode_colours(rgb)
     terms = words.encode_words(COLOURS)
     own = terms @ said.feature >= 0.5
@@ -79,7 +71,7 @@ def colour_share(
     """Return for each instance the share of its voxels in the queried colour: 1 from four in ten on."""
     if not len(instance):
         return np.zeros(0, np.float32)
-    hits = has_colour(np.asarray(rgb)[rows], said)
+    hits = _colour_margin(np.asarray(rgb)[rows], said) > 0.0
     share = np.bincount(instance, weights=hits) / np.maximum(np.bincount(instance), 1)
     return np.minimum(share / FULL_SHARE, 1.0).astype(np.float32)
 
@@ -89,16 +81,15 @@ def object_factor(
 ) -> NearThings:
     """Return the heat of the object that a word names; if no confidence suffices, of the best guesses, not ``found``.
 
-    With the voxels' colours, an encoder that knows things but no colours is helped out with those.
-
-    ``QueryError``: the encoder understands nothing of the word.
+    With the voxels' colours, an encoder that knows things but no colours is helped out with those. ``QueryError``: an
+    encoder of any words understands nothing of the word.
     """
     encoder = voxels.encoder
     compound = " " in part.query.strip() and lexicon().find(part.query, EntryKind.THING) is not None  # a white board
     by_colour = voxels.rgb is not None and isinstance(encoder, NamedPixelEncoder) and not compound
     colour = colour_in(part.query) if by_colour else None
     if colour is not None and voxels.rgb is not None and not colour.thing:
-        return colour_factor(voxels, voxels.rgb, colour, part, heat)
+        return _colour_factor(voxels, voxels.rgb, colour, part, heat)
     word = EncodedWord.of(encoder, colour.thing if colour else part.query)
     if len(word.rows):
         return _Search(voxels, part, heat, word, colour, searched if colour is None else None).factor()
@@ -117,17 +108,14 @@ def object_factor(
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """A search for the instances of a word."""
-
-    voxels: FeatureVoxels  # of the map
-    part: Part  # of the query
-    heat: HeatSettings  # how fast it falls
-    word: EncodedWord  # as the encoder takes it
+    voxels: FeatureVoxels
+    part: Part
+    heat: HeatSettings
+    word: EncodedWord
     colour: ColourPhrase | None  # what the part says of colours beside it; None for nothing
     searched: Instances | None = None  # its confident instances, where they were found before
 
     def factor(self) -> NearThings:
-        """Return the heat of the confident instances; where there are none, of the best guesses."""
         confident = self._coloured(self._confident)
         if len(confident):
             return self._factor(confident, lambda: self._factor(self._uncertain(self.voxels.settings)))
@@ -178,12 +166,11 @@ class _Search:
         )
 
 
-def colour_factor(
+def _colour_factor(
     voxels: FeatureVoxels, rgb: UInt8[np.ndarray, "n 3"], colour: ColourPhrase, part: Part, heat: HeatSettings
 ) -> NearThings:
-    """Return the heat of everything that has a colour."""
     space, settings = voxels.space, voxels.settings
-    fit = colour_margin(np.asarray(rgb), colour)
+    fit = _colour_margin(np.asarray(rgb), colour)
     rows = np.flatnonzero(fit > 0.0)
     found = link(space, Scored(rows, fit[rows], np.ones(len(rows), np.float32)), settings.link_m)
     confidence = margin_confidence(found.margin, found.instance, space.grid.voxel_size_m, settings)

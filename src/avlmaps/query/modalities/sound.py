@@ -27,10 +27,7 @@ _SILENCE = 1e-4
 
 def sound_features(sounds: HeardSounds) -> list[Float32[np.ndarray, "windows d"]]:
     """Return the features of each heard sound."""
-    offsets = sounds.feature_offsets
-    return [
-        np.asarray(sounds.feature[a:b], np.float32) for a, b in itertools.pairwise(offsets)
-    ]  # fmt: skip
+    return [np.asarray(sounds.feature[a:b], np.float32) for a, b in itertools.pairwise(sounds.feature_offsets)]
 
 
 def sound_factor(
@@ -41,10 +38,7 @@ def sound_factor(
     settings: SoundSettings,
     heat: HeatSettings,
 ) -> NearAnchors:
-    """Return the heat of a sound: its anchors are the places along its track, each with the sound's score.
-
-    ``scores`` are, for each detected sound, the probability that it matches the query.
-    """
+    """Return the heat of a sound, by each one's probability to match: anchors are the places along its track."""
     best = float(np.max(scores, initial=0.0))
     note = ""
     if not len(sounds):
@@ -99,9 +93,6 @@ class SourceAnchors(NearAnchors):
     """Heat of where sounds came from: the anchors of a source are the cells of its region.
 
     What is sought is right where the sound is one and its source lies so near; as context the sound alone counts.
-
-    Attributes:
-        part: says that the place is the source's.
     """
 
     spreads: "tuple[Spread, ...]"  # for each source, how well its place is known
@@ -149,12 +140,9 @@ def source_factor(
     settings: SoundSettings,
     heat: HeatSettings,
 ) -> SourceAnchors:
-    """Return the heat of where a sound came from.
+    """Return the heat of where a sound came from, by the probability of each to match.
 
-    A cell has the source's score times how likely it is against the likeliest cell. Sounds that are one yes together;
-    those of a lower score stay by themselves.
-
-    ``scores`` are, for each detected sound, the probability that it matches the query.
+    A cell has the source's score times how likely it is against the likeliest cell. Unlikely sounds are not joined.
     """
     order = np.argsort(-scores, kind="stable")
     kind, with_prior = "" if part.is_file else part.query, settings.prior == "lexicon"
