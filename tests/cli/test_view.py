@@ -55,14 +55,14 @@ def test_a_scene_that_is_not_the_maps_is_refused_before_a_page_opens(
 
 
 def test_a_robot_drives_what_was_planned(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from avlmaps.cli.view import _robot
+    from avlmaps.navigate.robots import open_robot_scene
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.view.route import Guide
     from cli.test_go import scene_of
     from helpers.room import Room
 
     monkeypatch.setattr("avlmaps_sim.scenes.open_scene", lambda spec: scene_of(Room()))
-    guide = Guide(AVLMap.open(built), _robot("room"))
+    guide = Guide(AVLMap.open(built), open_robot_scene("room").robot)
     told = guide.obey("go to the nearest red thing")
     assert told["driven"]["ok"] and told["planned"]["ok"]
     assert told["driven"]["path_m"] == pytest.approx(told["planned"]["path_m"], abs=1.0)

@@ -364,6 +364,7 @@ def test_what_is_no_address_is_refused(url: str) -> None:
         ({"base_url": "http://api.openai.com/v1"}, "sent the key in clear; give https://api.openai.com/v1"),
         ({"base_url": "http://API.openai.com:443"}, "sent the key in clear"),
         ({"api_key": "sk-\nx"}, "key for the chat model holds characters"),
+        ({"retries": 99}, "chat setting retries is out of bounds"),
         ({"api_key": "schlüssel"}, "key for the chat model holds characters"),
     ],
 )
@@ -405,7 +406,7 @@ def test_a_file_of_anything_else_is_refused(tmp_path: Path, line: bytes) -> None
     with pytest.raises(LanguageError, match=r"The replay file .* cannot be read"):
         Replay(path)
     with pytest.raises(LanguageError, match=r"The replay file .* cannot be written"):
-        Replay(tmp_path / "missing" / "chat.jsonl").add(MESSAGES, ModelReply(""))
+        Replay(tmp_path / "missing" / "chat.jsonl")
 
 
 @given(st.text(max_size=300))

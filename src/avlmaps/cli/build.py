@@ -120,6 +120,8 @@ def build(verb: "Build") -> dict[str, Any]:
     begin = perf_counter()
     if verb.resume and verb.fresh:
         raise UsageError("--resume continues with a stopped build and --fresh begins again; choose one of them.")
+    if verb.corrected_poses is not None and verb.close_loops:
+        raise UsageError("--corrected-poses and --close-loops both move the map; choose one of them.")
     if verb.rules == "paper" and verb.sensor not in ("auto", "none"):
         raise UsageError(
             f"The paper's rules use every depth as it is; leave out --sensor {verb.sensor} or --rules paper."
@@ -142,8 +144,6 @@ def build(verb: "Build") -> dict[str, Any]:
         gravity=GravitySettings(camera_height_m=verb.camera_height_m),
         seed=verb.seed,
     )
-    if verb.corrected_poses is not None and verb.close_loops:
-        raise UsageError("--corrected-poses and --close-loops both move the map; choose one of them.")
     poses = None
     if verb.corrected_poses is not None:
         from avlmaps.recordings.formats.tables import on_clock_of, read_pose_file
@@ -213,7 +213,6 @@ def _openings(verb: "Build") -> "list[Callable[[], Recording]]":
 
 @contextmanager
 def _pool(verb: "Build") -> "Generator[RayPool | None]":
-    """Give the cluster that --ray names; None without it."""
     if verb.ray is None:
         yield None
         return
@@ -268,11 +267,9 @@ class Calibrate(OfRecording, Verb):
 
 
 def calibrate_array(verb: "Calibrate") -> dict[str, Any]:
-    """Refine an array, write it, and describe it.
+    """Refine an array, write it, and describe it."""
+    import numpy as np
 
-    Raises:
-        RecordingError: the file is there already, or the array cannot be refined.
-    """
     from avlmaps.core.errors import RecordingError
     from avlmaps.core.poses import FRAME
     from avlmaps.core.wording import option
@@ -290,17 +287,16 @@ def calibrate_array(verb: "Calibrate") -> dict[str, Any]:
     found = calibrate(recording.audio, recording.walk, verb.between)
     write_microphones(verb.out, found.microphones)
     array = found.microphones
-    late_s = [0.0] * len(array) if array.delay_s is None else array.delay_s.tolist()
+    late_s = np.zeros(len(array)) if array.delay_s is None else array.delay_s
+    columns = {
+        "position_m": array.position_m, "moved_m": found.moved_m, "sd_m": found.place_sd_m, "delay_s": late_s,
+        "delay_sd_s": found.delay_sd_s,
+    }  # fmt: skip
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     return {
         "recording": str(verb.recording),
         "out": str(verb.out),
-        "microphones": [
-            {"position_m": at, "moved_m": moved, "sd_m": sd, "delay_s": late, "delay_sd_s": late_sd}
-            for at, moved, sd, late, late_sd in zip(
-                array.position_m.tolist(), found.moved_m.tolist(), found.place_sd_m.tolist(), late_s,
-                found.delay_sd_s.tolist(), strict=True,
-            )
-        ],
+        "microphones": [dict(zip(columns, row, strict=True)) for row in rows],
         "held_heights": found.held_heights,
         "turned": [channel + 1 for channel in found.turned],
         "frame": FRAME,

@@ -93,18 +93,17 @@ class Edit(MapVerb):
 
 
 def _made(verb: Edit, editor: "Editor") -> "EditMade | None":
-    asked = [
-        name for name in ("rename", "rename_room", "merge", "split", "forbid", "pin", "undo") if getattr(verb, name)
-    ]
-    if len(asked) > 1 or (asked and verb.list):
-        named = " and ".join(f"--{name.replace('_', '-')}" for name in (*asked, *(("list",) if verb.list else ())))
-        raise UsageError(f"{named} do not go together; make one edit at a time.")
-    does = asked[0] if asked else ""
-    flag = f"--{does.replace('_', '-')}" if does else "a list of edits"
-    idle = [name for name in ("to", "at", "room", "box", "plane") if getattr(verb, name) and name not in _TAKES[does]]
+    asked = [name for name in (*_TAKES, "list") if getattr(verb, name)]
+    flags = [f"--{name.replace('_', '-')}" for name in asked]
+    if len(asked) > 1:
+        raise UsageError(f"{' and '.join(flags)} do not go together; make one edit at a time.")
+    does = asked[0] if asked else "list"
+    idle = [name for name in ("to", "at", "room", "box", "plane") if getattr(verb, name)]
+    idle = [name for name in idle if name not in _TAKES.get(does, ())]
     if idle:
+        flag = "a list of edits" if does == "list" else flags[0]
         raise UsageError(f"--{idle[0]} says nothing to {flag}; see `avlmaps edit --help`.")
-    if not does:
+    if does == "list":
         return None
     name = "" if does == "merge" or getattr(verb, does) in ("thing", "it", "last") else getattr(verb, does)
     return editor.make(
@@ -115,7 +114,7 @@ def _made(verb: Edit, editor: "Editor") -> "EditMade | None":
 
 _TAKES = {
     "rename": ("to", "at"), "rename_room": ("to",), "merge": ("to",), "split": ("at", "plane", "box"),
-    "forbid": ("box", "room"), "pin": ("at",), "undo": (), "": (),
+    "forbid": ("box", "room"), "pin": ("at",), "undo": (),
 }  # fmt: skip
 
 
@@ -206,7 +205,7 @@ class Merge(ModelVerb):
 
 
 def merge(verb: Merge) -> dict[str, Any]:
-    """Merge two maps and return by what the place was found, and what changed."""
+    """Merge two maps, and return by what the place was found, and what changed."""
     from avlmaps.days.merge import merge_maps
     from avlmaps.query.avlmap import AVLMap
 

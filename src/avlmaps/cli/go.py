@@ -130,7 +130,6 @@ def go(verb: "Go") -> dict[str, Any]:
 
 
 def _read(verb: "Go", translator: "Translator") -> "Translation":
-    """Return the program of the sentence, with a note for each option that has no effect on it."""
     if verb.explain:
         from avlmaps.language.translator import explanation
 
@@ -173,11 +172,7 @@ def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None")
 def drive(
     verb: "Go", avlmap: "AVLMap", robot: "RobotDriver", translator: "Translator", translation: "Translation"
 ) -> dict[str, Any]:
-    """Run the program of a command on a robot, and close the robot's connection after it.
-
-    Raises:
-        Interrupted: a signal came; its ``halt`` says how the robot stands.
-    """
+    """Run the program of a command on a robot, and close its connection; ``Interrupted`` says how the robot stands."""
     from avlmaps.navigate.interrupts import Interrupted
 
     try:
@@ -235,7 +230,7 @@ def robot_settings(verb: "Go", translation: "Translation") -> "RobotSettings":
 
 
 def _choice(verb: "Go", asked: "Outcome") -> int:
-    """Return the number that a person types at a terminal; 0 where nobody is there, or none of the numbers came."""
+    """Return the number that a person types at a terminal, 0 for anything else."""
     if verb.json or not sys.stdin.isatty():
         return 0
     say(asked.error or "")

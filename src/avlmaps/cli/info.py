@@ -190,12 +190,7 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
 
 
 def info_lines(answer: dict[str, Any], *, verbose: bool) -> list[str]:
-    """Lay out what `build` and `info` report; entries without a layout of their own are printed as they are.
-
-    Args:
-        answer: of the verb.
-        verbose: print every entry; else what a person decides by, and what to do next.
-    """
+    """Lay out what `build` and `info` report: every entry, or what a person decides by, and what to do next."""
     shown = {key: value for key, value in answer.items() if key != "plot" and (verbose or key in _BRIEF)}
     lines = _entry_lines(shown, _LAYOUTS if verbose else _LAYOUTS | _BRIEF_LAYOUTS)
     drawn = [f"wrote {answer['plot']}"] if "plot" in answer else []
@@ -235,11 +230,10 @@ def _entry_lines(entries: dict[str, Any], layouts: dict[str, Callable[[Any], lis
 
 
 def _sound_lines(sounds: list[dict[str, Any]]) -> list[str]:
-    """Lay out sounds with their best names; names that are hardly likely only where there is no better one."""
     lines = [f"sounds: {len(sounds)}"]
     for sound in sounds:
         names = list(zip(sound.get("names", []), sound.get("confidences", []), strict=True))
-        shown = [pair for pair in names if pair[1] >= _LIKELY] or names[:1]
+        shown = [pair for pair in names if pair[1] >= _LIKELY] or names[:1]  # an unlikely name only as the best one
         named = ": " + ", ".join(f"{name} {confidence:.2f}" for name, confidence in shown) if shown else ""
         begin_s, end_s = max(sound["onset_s"], 0.0), sound["offset_s"]
         lines.append(f"  {begin_s:8.2f} - {end_s:.2f} s at {place_text(sound['position'])}{named}")

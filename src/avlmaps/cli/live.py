@@ -166,7 +166,6 @@ def _recording(verb: Live) -> _Source:
 
 
 def _robot(verb: Live) -> _Source:
-    """Return what gives the frames of a running robot; z is up in ROS's world (REP 103), and its stamps are dates."""
     from avlmaps.live.replay import join_source
 
     given = verb.recording, verb.as_fast_as_possible, verb.audio, verb.rate != 1.0, verb.format != "auto"
@@ -181,6 +180,7 @@ def _robot(verb: Live) -> _Source:
             "--same-device is of a device that says directions; name its topic (--topics directions=TOPIC)."
         )
     source = join_source(verb.source, topics)  # before the map's folder is made
+    # Z is up in ROS's world (REP 103), and its stamps are dates.
     return _Source((0.0, 0.0, 1.0), 0.0, verb.microphones, lambda live, over: source.play(live, verb.give_up_s, over))
 
 
@@ -215,11 +215,7 @@ def live_source(live: "LiveMap") -> "MapSource":
 
 
 def serve_while(live: "LiveMap", drive: Callable[[Callable[[], bool]], None], port: int, *, browse: bool) -> None:
-    """Serve a live map on this machine until Ctrl-C, while a drive gives it frames in a thread, and close it.
-
-    Raises:
-        ServeError: the port is taken.
-    """
+    """Serve a live map on this machine until Ctrl-C, while a drive gives it frames in a thread, and close it."""
     from avlmaps.cli.view import open_browser, run_page
     from avlmaps.live.replay import end_drive
     from avlmaps.serve.service import Service, listening_socket, url_of

@@ -29,11 +29,7 @@ _ATTACHED = {
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit.
-
-    Args:
-        arguments: the words after ``avlmaps``; those of this process if None.
-    """
+    """Run the words after ``avlmaps``, by default those of this process, and exit."""
     _settle_streams()
     try:
         try:
@@ -204,8 +200,8 @@ def _drop(stream: TextIO) -> None:
 def _models_in_force(verb: object) -> Iterator[None]:
     """Load models as a verb's words say while it runs, here and in processes that it starts."""
     options = {"folder": "models", "device": "device", "precision": "precision", "batch": "batch"}
-    given = {name: getattr(verb, option, None) for name, option in options.items()}
-    given: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    values = ((name, getattr(verb, option, None)) for name, option in options.items())
+    given: dict[str, Any] = {name: value for name, value in values if value is not None}
     if not given:
         yield
         return

@@ -117,11 +117,7 @@ def list_profiles() -> dict[str, Any]:
 def check_backends(names: Sequence[str]) -> list[dict[str, str]]:
     """Load backends and hold each to its protocol; ``fault`` says what it lacks or breaks.
 
-    Args:
-        names: ``name`` or ``module:name``; without any, every backend whose packages and files are here.
-
-    Raises:
-        BackendError: there is none of a name.
+    A name is ``name`` or ``module:name``; without any, every backend is loaded whose packages and files are here.
     """
     from avlmaps.core.errors import NonConformanceError
     from avlmaps.core.registry import backends, load
@@ -154,7 +150,6 @@ def _wrapped(text: str, margin: str) -> list[str]:
 
 
 def _backend_lines(backends: list[dict[str, Any]]) -> list[str]:
-    """Lay out backends, and once under them how each model that is not here is got."""
     columns = ("module", "backend", "state", "licence")
     cells = [(b["module"], b["name"], b["state"], b["licence"]) for b in backends]
     missing: dict[str, list[str]] = {}

@@ -21,11 +21,7 @@ class UsageError(Exception):
 
 
 class AnsweredError(Exception):
-    """A verb failed and its answer, which is printed already, says why.
-
-    Attributes:
-        status: exit status.
-    """
+    """A verb failed and its answer, which is printed already, says why; ``status`` is the exit status."""
 
     def __init__(self, message: str, status: int = 1) -> None:
         super().__init__(message)

@@ -112,11 +112,6 @@ class ShellSession:
     """One map that stays open, and what was queried last."""
 
     def __init__(self, given: Shell, start: "GroundPose | None" = None) -> None:
-        """Open the map.
-
-        Raises:
-            MapError: the map cannot be opened.
-        """
         self.given, self._start = given, start
         self._robot: RobotDriver | None = None
         self._last: Query | None = None
@@ -226,7 +221,7 @@ class ShellSession:
 
 
 def _driven(answer: dict[str, Any]) -> Reply:
-    """Return the reply to a command that was planned or driven; why it failed goes to standard error as well."""
+    """Why it failed goes to standard error as well."""
     failed = going.failure(answer)
     if failed is not None:
         sys.stderr.write(f"avlmaps: {printable(failed['message'])}\n")
@@ -295,11 +290,7 @@ def piped_lines(stream: TextIO) -> Lines:
 
 
 def answer_lines(session: ShellSession, lines: Lines, as_json: bool) -> tuple[int, int]:
-    """Answer every line; an error is one sentence, and the next line follows.
-
-    Returns:
-        How many lines failed, and how many there were.
-    """
+    """Answer every line, also after one that fails; return how many failed, and how many there were."""
     failed = done = 0
     while True:
         try:

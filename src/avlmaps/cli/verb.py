@@ -174,11 +174,7 @@ class Reading:
     """Direction against gravity in the poses' world, such as 0,0,1."""
 
     def corrections(self) -> "Corrections":
-        """Return the value behind them.
-
-        Raises:
-            UsageError: one of them is not of its form, or not possible.
-        """
+        """Return the value behind them, or raise ``UsageError`` where one is not of its form, or not possible."""
         from avlmaps.core.errors import RecordingError
         from avlmaps.recordings.corrections import Corrections, GivenCamera, PoseKind
 
@@ -230,11 +226,7 @@ class OfRecording:
     """What you know better than the recording's files."""
 
     def named_topics(self) -> dict[str, str]:
-        """Return what ``--topics`` says: names by what they are for.
-
-        Raises:
-            UsageError: a word is not of its form.
-        """
+        """Return what ``--topics`` says: names by what they are for."""
         for word in self.topics:
             if not all(word.partition("=")):
                 raise UsageError(f"--topics takes words like rgb=/camera/color/image_raw, not {word!r}.")
@@ -282,11 +274,7 @@ class Building(OfRecording, ModelVerb):
     """Replace a finished map at --out that was built from another recording or with other settings."""
 
     def encoders(self) -> "Encoders":
-        """Return the encoders of the profile, with those of ``--model`` instead of some.
-
-        Raises:
-            UsageError: the words of --model do not say any.
-        """
+        """Return the encoders of the profile, with those of ``--model`` instead of some."""
         from avlmaps.perception.encoders import encoders_of, profile, read_choices
 
         try:

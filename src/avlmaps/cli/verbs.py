@@ -11,7 +11,7 @@ from functools import cache
 from importlib import import_module
 from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, Union
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, Union, get_type_hints
 
 import tyro
 
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
 
 
 def _own(name: str) -> type[Verb]:
-    """Load one of our verbs; the others stay where they are, since one command needs no other's modules."""
     return getattr(import_module(f"avlmaps.cli.{_KNOWN[name]}"), name.title().replace("-", ""))
 
 
@@ -71,12 +70,11 @@ def __getattr__(name: str) -> Any:
 
 
 def read_command(words: Sequence[str]) -> Verb:
-    """Read the words after ``avlmaps``.
+    """Read the words after ``avlmaps``; ``SystemExit`` where they request help, which is printed.
 
     Raises:
         BackendError: the verb is one of a package that is not installed.
         UsageError: they cannot be read.
-        SystemExit: they request help, which is printed; its status is 0.
     """
     name = words[0] if words else ""
     if name not in _OWN:
@@ -91,8 +89,6 @@ def read_command(words: Sequence[str]) -> Verb:
 
 
 def _any_verb(verbs: dict[str, type[Verb]]) -> Any:
-    """Return the union of the verbs, with one line of each."""
-
     def described(name: str, verb: type[Verb]) -> Any:
         return Annotated[verb, tyro.conf.subcommand(name, description=(verb.__doc__ or "").partition("\n")[0])]
 
@@ -135,13 +131,14 @@ def meant(words: Sequence[str], printed: str, verbs: Mapping[str, type[Verb]]) -
 
 def _options(verb: type[Any]) -> tuple[str, ...]:
     """Return the options of a verb as they are typed, those of its groups among them."""
-    names = ["--help"]
+    names, hints = ["--help"], get_type_hints(verb, include_extras=True)
     for each in dataclasses.fields(verb):
-        group = each.default_factory
+        group, notes = each.default_factory, getattr(hints[each.name], "__metadata__", ())
         if isinstance(group, type) and dataclasses.is_dataclass(group):
             names += _options(group)
-        else:
-            names.append(f"--{each.name.replace('_', '-')}")
+        elif tyro.conf.Positional not in notes:
+            given = next((note.name for note in notes if getattr(note, "name", None)), each.name)
+            names.append(f"--{given.replace('_', '-')}")
     return tuple(names)
 
 
@@ -165,12 +162,7 @@ def _at_home(value: Any) -> Any:
 
 
 def read_verb(verb: type[V], words: Sequence[str], prog: str) -> V:
-    """Read the words of one verb; ``prog`` ends in its name.
-
-    Raises:
-        UsageError: they cannot be read.
-        SystemExit: they request help, which is printed; its status is 0.
-    """
+    """Read the words of one verb, as `read_command` does; ``prog`` ends in its name."""
     printed = io.StringIO()
     try:
         with redirect_stderr(printed):

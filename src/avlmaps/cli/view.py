@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.serve.service import Service
     from avlmaps.serve.settings import ServeSettings
-    from avlmaps.view.route import MakeRobot
 
 _ANSWER_S = 600.0  # the contents of a large map take their time, and the page waits for them
 
@@ -63,7 +62,9 @@ class View(Asking, MapVerb):
     def run(self) -> None:
         _require_fitting(self)
         if self.out is not None:
-            answer = _written(self, self.out)
+            from avlmaps.view.page import write_page
+
+            answer = write_page(self.out, _maps(self), self.questions)
             emit(answer, _lines(answer), self.json)
         else:
             _serve(self)
@@ -89,12 +90,6 @@ def _maps(verb: View) -> "list[AVLMap]":
     return [AVLMap.open(path, settings) for path in (verb.map, verb.other) if path is not None]
 
 
-def _written(verb: View, out: Path) -> dict[str, Any]:
-    from avlmaps.view.page import write_page
-
-    return write_page(out, _maps(verb), verb.questions)
-
-
 def _lines(answer: dict[str, Any]) -> list[str]:
     lines = [f"query: {one['question']}: {'found' if one['found'] else 'not found'}" for one in answer["questions"]]
     counts = zip(answer["voxels"], answer["voxels_of_maps"], strict=True)
@@ -106,27 +101,22 @@ def _lines(answer: dict[str, Any]) -> list[str]:
     return [*lines, f"wrote {answer['page']} ({size_of(answer['bytes'])})"]
 
 
-def _robot(scene: str) -> "MakeRobot":
-    from avlmaps.navigate.robots import open_robot_scene
-
-    return open_robot_scene(scene).robot
-
-
 def _serve(verb: View) -> None:
     import secrets
 
     from avlmaps.core.machine import is_loopback
+    from avlmaps.navigate.robots import open_robot_scene
     from avlmaps.serve.service import Service, listening_socket
     from avlmaps.serve.settings import Limits, ServeSettings
 
     token = None if is_loopback(verb.host) else secrets.token_urlsafe(24)
-    limits = Limits(answer_s=_ANSWER_S)
     settings = ServeSettings(
-        host=verb.host.strip("[]"), port=verb.port, token=token, query=verb.query_settings(), limits=limits
-    )
+        host=verb.host.strip("[]"), port=verb.port, token=token, query=verb.query_settings(),
+        limits=Limits(answer_s=_ANSWER_S),
+    )  # fmt: skip
     named = _named(verb)
     with listening_socket(settings) as opened:
-        robot = None if verb.scene is None else _robot(verb.scene)
+        robot = None if verb.scene is None else open_robot_scene(verb.scene).robot
         service = Service.open(named, settings, say, robot, warm=False)
         first = next(iter(named))
         if verb.scene is not None:

@@ -94,22 +94,14 @@ class Tool:
 
 @dataclass(frozen=True, slots=True)
 class AgentServer:
-    """Answers agents' messages.
-
-    Attributes:
-        name: of the server.
-        instructions: what an agent reads first.
-        tools: by their names.
-        error: returns the answer to what a call raised.
-        prompts: conversations to begin with.
-        resources: what can be read, by address: its description, and what returns its text.
-    """
+    """Answers agents' messages."""
 
     name: str
-    instructions: str
-    tools: Mapping[str, Tool]
-    error: Callable[[Exception], Mapping[str, Any]]
+    instructions: str  # what an agent reads first
+    tools: Mapping[str, Tool]  # by their names
+    error: Callable[[Exception], Mapping[str, Any]]  # returns the answer to what a call raised
     prompts: Sequence[Prompt] = ()
+    # What can be read, by address: its description, and what returns its text.
     resources: Mapping[str, tuple[dict[str, Any], Callable[[], Awaitable[str]]]] = field(default_factory=dict)
 
     async def answer(self, message: Any, tell: Callable[[dict[str, Any]], None] | None = None) -> Any:

@@ -18,7 +18,7 @@ from starlette.routing import BaseRoute, Mount, Route
 
 from avlmaps.core.files import decode_json
 from avlmaps.core.version import __version__
-from avlmaps.serve.agents import AgentServer, agent_endpoint, agent_server
+from avlmaps.serve.agents import agent_endpoint, agent_server
 from avlmaps.serve.guard import AccessGuard, App
 from avlmaps.serve.lanes import JSON_TYPE, Cancellation, RequestError, streamed
 from avlmaps.serve.operations import CONTENT_POLICY, OPERATIONS, Operation, document, html_page
@@ -31,13 +31,10 @@ _POLL_S = 2.0
 
 
 def create_app(service: Service, mounts: Mapping[str, Starlette] | None = None, agents: bool = True) -> App:
-    """Return the ASGI application of a server.
+    """Return the ASGI application of a server; ``agents`` are served under ``/mcp``.
 
-    Args:
-        service: maps, lanes and settings.
-        mounts: further applications by path, such as ``{"/drive": driving.app}``; the guard stands before them, too.
-            One may name in ``state.operations`` what the OpenAPI document says of it.
-        agents: whether agents are served, under ``/mcp``.
+    ``mounts`` are further applications by path, such as ``{"/drive": driving.app}``; the guard stands before them, too.
+    One may name in ``state.operations`` what the OpenAPI document says of it.
     """
     mounts = mounts or {}
     token, names = service.settings.token, service.shelf.names
@@ -61,7 +58,8 @@ def create_app(service: Service, mounts: Mapping[str, Starlette] | None = None, 
         if one.path is not None
     ]
     if agents:
-        routes.append(agents_route(agent_server(service), service.settings.limits.body_bytes))
+        endpoint = agent_endpoint(agent_server(service), service.settings.limits.body_bytes)
+        routes.append(Route("/mcp", endpoint, methods=["POST"]))
     routes += [Mount(path, app=app) for path, app in mounts.items()]
 
     @asynccontextmanager
@@ -90,11 +88,6 @@ def create_app(service: Service, mounts: Mapping[str, Starlette] | None = None, 
     return AccessGuard(app, service.settings)
 
 
-def agents_route(server: AgentServer, most_bytes: int) -> Route:
-    """Return the address of an agents' server."""
-    return Route("/mcp", agent_endpoint(server, most_bytes), methods=["POST"])
-
-
 async def _look_for_replaced_maps(service: Service) -> None:
     while True:
         await asyncio.sleep(_POLL_S)
@@ -104,10 +97,8 @@ async def _look_for_replaced_maps(service: Service) -> None:
 def http_error(error: Exception, where: str) -> Response:
     """Return the answer to an address or a method that there is not, as JSON; ``where`` is what lists them."""
     status = error.status_code if isinstance(error, HTTPException) else 500
-    message = {
-        404: f"There is no such address; {where}.",
-        405: f"This address does not take this method; {where}.",
-    }.get(status, "The request cannot be read.")
+    sentences = {404: "There is no such address", 405: "This address does not take this method"}
+    message = f"{sentences[status]}; {where}." if status in sentences else "The request cannot be read."
     headers = dict(error.headers or {}) if isinstance(error, HTTPException) else {}
     return Response(encoded({"error": {"kind": "usage", "message": message}}), status, headers, JSON_TYPE)
 
@@ -135,7 +126,7 @@ async def _answered(service: Service, operation: Operation, request: Request) ->
     in_path = {name: value for name, value in request.path_params.items() if name != "map"}
     query = read({**values, **in_path}, operation.query)
     lane = service.slow if operation.slow or files else service.quick
-    tag = f'"{served.version}"'
+    tag = f'"{served.version}-{__version__}"'  # another release draws and names another way, and has another page
 
     def job(watch: Cancellation) -> Any:
         made = operation.work(WorkInput(served, service.settings.limits, files, watch), query)
@@ -169,7 +160,7 @@ def _event(name: str, data: bytes) -> bytes:
 
 
 async def values_of(request: Request, operation: Operation, most_bytes: int) -> tuple[dict[str, Any], Files]:
-    """Return the values and the files of a request, as they came; ``requests.read`` makes a request of them."""
+    """Return the values and the files of a request; ``requests.read`` makes a request of them."""
     pairs: list[tuple[str, Any]] = request.query_params.multi_items()
     if request.method != "POST":
         return _values(pairs, operation), {}
@@ -188,16 +179,11 @@ async def values_of(request: Request, operation: Operation, most_bytes: int) -> 
     if pairs:
         raise RequestError("Values come in the address or in the body, not in both.")
     values = json_object(body)
-    files = files_in(values, operation.files, most_bytes)
-    return values, files
+    return values, files_in(values, operation.files, most_bytes)
 
 
 def json_object(body: bytes) -> dict[str, Any]:
-    """Return the values of a body.
-
-    Raises:
-        RequestError: it is no JSON object.
-    """
+    """Return the values of a body, or raise ``RequestError`` where it is no JSON object."""
     try:
         values = decode_json(body.removeprefix(BOM_UTF8))
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as fault:

@@ -129,12 +129,9 @@ class Pyramid:
     def tile(
         self, number: int, corner: tuple[int, int, int], heat: Float32[np.ndarray, " m"] | None = None
     ) -> bytes | None:
-        """Return the bytes of a tile; None where there is none.
+        """Return the bytes of the tile of a level (0 is the finest) at i, j, k; None where there is none.
 
-        Args:
-            number: of its level; 0 is the finest.
-            corner: i, j, k.
-            heat: of each voxel of the map, in [0, 1]; a coarser voxel has the highest of its own.
+        ``heat`` is of each voxel of the map, in [0, 1]; a coarser voxel has the highest of its own.
         """
         if not 0 <= number < len(self.levels):
             return None
@@ -182,13 +179,7 @@ def _png(figure: "Figure") -> bytes:
 def small_picture(
     served: "ServedMap", answer: Answer | None = None, places: "Sequence[Sequence[float]] | None" = None
 ) -> bytes:
-    """Return a small PNG: the map from above, the heat, the goals numbered.
-
-    Args:
-        served: the map.
-        answer: its heat and goals are drawn.
-        places: to number instead of the goals, metres, recording frame.
-    """
+    """Return a small PNG: the map from above, the heat of an answer, its goals (or other places) numbered."""
     view, space = served.top_down, served.avlmap.space
     ground = np.where(view.seen[..., None], 0.72 * view.rgb + 0.28 * 255.0, 246.0)
     if answer is not None and answer.heat is not None:

@@ -91,11 +91,7 @@ class AccessGuard:
             await JSONResponse(said, error.status, headers)(scope, receive, sent)
 
     def _check(self, request: Request) -> Response | None:
-        """Return a redirection where a browser brings the token in the address, else None.
-
-        Raises:
-            RequestError: the request is refused.
-        """
+        """Return a redirection where a browser brings the token in the address, else None."""
         path = request.scope["path"]
         size = 0 if path in _UNREAD_PATHS else _length(_header(request, "content-length") or "0")
         if self._settings.limits.body_bytes < size:

@@ -42,11 +42,7 @@ class Cancellation:
         self._gone.set()
 
     def step(self, stage: str, done: int = 0, total: int = 0) -> None:
-        """Report a step.
-
-        Raises:
-            CancelledWorkError: nobody waits for the answer.
-        """
+        """Report a step, or raise ``CancelledWorkError`` where nobody waits for the answer."""
         if self._gone.is_set():
             raise CancelledWorkError("The query was given up.")
         if self._report is not None:
@@ -72,14 +68,9 @@ class Lane:
     """A few threads and a bounded queue before them."""
 
     def __init__(self, name: str, workers: int, waiting: int, answer_s: float) -> None:
-        """Start a lane.
+        """Start some workers, for which further pieces of work may be waiting.
 
-        Args:
-            name: of its threads.
-            workers: pieces of work at one time.
-            waiting: further pieces that wait.
-            answer_s: longest time from coming to the answer. Work that runs by then gives up at its next step, and
-                holds its thread until then.
+        After ``answer_s`` from its coming, work that runs gives up at its next step, and holds its thread until then.
         """
         self._threads = ThreadPoolExecutor(workers, thread_name_prefix=f"avlmaps-{name}")
         self._most, self._waiting, self._answer_s = workers + waiting, waiting, answer_s
@@ -87,11 +78,7 @@ class Lane:
         self._lock = threading.Lock()
 
     async def run(self, work: Callable[[Cancellation], T], report: Report | None = None) -> T:
-        """Run a piece of work in one of the threads.
-
-        Raises:
-            RequestError: the queue is full, or the answer took too long.
-        """
+        """Run a piece of work in a thread; ``RequestError`` where the queue is full, or the answer took too long."""
         with self._lock:
             if self.taken >= self._most:
                 raise RequestError(
@@ -160,14 +147,7 @@ _ABSOLUTE = re.compile(r"(?<![\w.:/~<>-])(?:/[\w.@+~-]+){2,}|\b[A-Za-z]:\\[^\s]+
 
 
 class RequestError(AvlmapsError):
-    """A request that is refused.
-
-    Attributes:
-        status: HTTP status.
-        kind: word for programs.
-        choices: answers that would do, where the request is a question back.
-        headers: further headers of the response.
-    """
+    """A request that is refused, with a kind for programs, and the choices where it asks back."""
 
     def __init__(
         self, message: str, status: int = 400, kind: str = "usage", choices: Sequence[str] = (), **headers: str

@@ -28,41 +28,23 @@ from avlmaps.serve.drawn import TilesAnswer
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """One thing that a client can do.
+    """One thing that a client can do."""
 
-    Attributes:
-        name: ``operationId`` of the OpenAPI document; of what agents alone can do, their name of it.
-        path: below its mount, with ``{name}`` for values of the request; None for what agents alone can do.
-        about: one sentence.
-        query: the type of the request.
-        answer: the type of the answer's JSON, or a media type.
-        work: does it.
-        methods: of HTTP. GET has its values in the address; POST takes JSON, with files in base64, or a form.
-        files: names of the files that it takes; a photo may be the body itself.
-        needs: the files without which it does nothing.
-        slow: whether it waits for other slow work, as all but queries in words do.
-        status: of HTTP, where it is done.
-        tool: as agents call it; "" where they cannot.
-        brief: ``about`` for agents, who read it before every conversation.
-        read_only: whether it changes nothing, in the map or in the world.
-        destructive: whether what it changes cannot be taken back.
-    """
-
-    name: str
-    path: str | None
-    about: str
-    query: type[msgspec.Struct]
-    answer: Any
+    name: str  # ``operationId`` of the OpenAPI document; of what agents alone can do, their name of it
+    path: str | None  # below its mount, with ``{name}`` for values of the request; None for what agents alone can do
+    about: str  # one sentence
+    query: type[msgspec.Struct]  # the request
+    answer: Any  # the type of the answer's JSON, or a media type
     work: Callable[..., Any]
-    slow: bool = False
-    methods: tuple[str, ...] = ("GET",)
-    files: tuple[str, ...] = ()
-    needs: tuple[str, ...] = ()
-    status: int = 200
-    tool: str = ""
-    brief: str = ""
-    read_only: bool = True
-    destructive: bool = False
+    slow: bool = False  # whether it waits for other slow work, as all but queries in words do
+    methods: tuple[str, ...] = ("GET",)  # GET has its values in the address; POST takes JSON (files in base64), a form
+    files: tuple[str, ...] = ()  # that it takes, by name; a photo may be the body itself
+    needs: tuple[str, ...] = ()  # the files without which it does nothing
+    status: int = 200  # where it is done
+    tool: str = ""  # as agents call it; "" where they cannot
+    brief: str = ""  # ``about`` for agents, who read it before every conversation
+    read_only: bool = True  # whether it changes nothing, in the map or in the world
+    destructive: bool = False  # whether what it changes cannot be taken back
 
 
 _BYTES = "application/octet-stream"

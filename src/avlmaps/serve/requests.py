@@ -37,8 +37,8 @@ _NUMBER = r"-?\d{1,6}(\.\d{1,9})?"
 _FOCAL, _OFFSET = r"[1-9]\d{0,4}(\.\d{1,9})?", r"\d{1,5}(\.\d{1,9})?"
 
 
+# A pattern for the document alone: what does not have it is refused with a sentence of its own.
 def _shown(pattern: str) -> dict[str, str]:
-    """Return a pattern for the document alone: what does not have it is refused with a sentence of its own."""
     return {"pattern": pattern}
 
 

@@ -49,20 +49,13 @@ class Service:
         robot: "MakeRobot | None" = None,
         warm: bool = True,
     ) -> "Service":
-        """Open the maps and start the lanes.
-
-        Raises:
-            MapError: a map cannot be opened.
-        """
+        """Open the maps, or raise ``MapError``, and start the lanes; see `Shelf`."""
         settings = settings or ServeSettings()
         limits = settings.limits
         shelf = Shelf(maps, limits, note, settings.query, robot, warm)
-        return cls(
-            settings,
-            shelf,
-            Lane("quick", limits.quick_workers, limits.waiting, limits.answer_s),
-            Lane("slow", limits.slow_workers, limits.waiting, limits.answer_s),
-        )
+        workers = {"quick": limits.quick_workers, "slow": limits.slow_workers}
+        lanes = (Lane(name, count, limits.waiting, limits.answer_s) for name, count in workers.items())
+        return cls(settings, shelf, *lanes)
 
     def close(self) -> None:
         """End the lanes after the work that they have."""
@@ -93,11 +86,7 @@ _TOKEN_BYTES = 4096
 
 
 def read_token(path: Path | None) -> str | None:
-    """Return the token of a file, else that of the environment, else None.
-
-    Raises:
-        ServeError: the file cannot be read or is empty.
-    """
+    """Return the token of a file, else that of the environment, else None."""
     if path is None:
         return os.environ.get(TOKEN_VARIABLE) or None
     try:
@@ -111,11 +100,7 @@ def read_token(path: Path | None) -> str | None:
 
 
 def listening_socket(settings: ServeSettings) -> socket.socket:
-    """Return a socket that listens.
-
-    Raises:
-        ServeError: the port is taken, or the address is none of this machine's.
-    """
+    """Return a socket that listens; ``ServeError`` where the port is taken, or the address is not this machine's."""
     host, port = settings.host, settings.port
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
@@ -144,15 +129,7 @@ def run_http(
 ) -> None:
     """Serve until SIGTERM or SIGINT; what runs by then is finished, up to a time.
 
-    Args:
-        app: the ASGI application.
-        service: its service.
-        opened: a bound socket.
-        started: is called when the server answers.
-        ending: is called at the signal, before what runs is finished.
-
-    Raises:
-        ServeError: the TLS files cannot be used.
+    ``started`` is called when the server answers, ``ending`` at the signal, before what runs is finished.
     """
     import ssl
 

@@ -37,25 +37,14 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServeSettings:
-    """How a server listens.
+    """How a server listens."""
 
-    Attributes:
-        host: address to listen on; every address but loopback needs a token.
-        port: 0 takes a free one.
-        token: clients must send it as ``Authorization: Bearer TOKEN``; None for no token.
-        allowed_hosts: more names in the Host header that are answered, such as that of a reverse proxy.
-        tls_certificate: PEM file of the certificate and its chain; None for plain HTTP.
-        tls_key: PEM file of its key.
-        query: settings of queries.
-        limits: limits of each request.
-    """
-
-    host: str = "127.0.0.1"
-    port: int = DEFAULT_PORT
-    token: str | None = field(default=None, repr=False)
-    allowed_hosts: tuple[str, ...] = ()
-    tls_certificate: Path | None = None
-    tls_key: Path | None = None
+    host: str = "127.0.0.1"  # every address but loopback needs a token
+    port: int = DEFAULT_PORT  # 0 takes a free one
+    token: str | None = field(default=None, repr=False)  # that clients send as ``Authorization: Bearer TOKEN``
+    allowed_hosts: tuple[str, ...] = ()  # more names in the Host header, such as that of a reverse proxy
+    tls_certificate: Path | None = None  # PEM file of the certificate and its chain; None for plain HTTP
+    tls_key: Path | None = None  # PEM file of its key
     query: QuerySettings = field(default_factory=QuerySettings)
     limits: Limits = field(default_factory=Limits)
 

@@ -40,12 +40,7 @@ _LONGEST_NAME = 100
 
 
 class ServedMap:
-    """One map of a server, and what is computed from it once.
-
-    Attributes:
-        name: as clients call it.
-        avlmap: the map.
-    """
+    """One map of a server, by the name that clients call it, and what is computed from it once."""
 
     def __init__(self, name: str, avlmap: AVLMap, robot: "MakeRobot | None" = None) -> None:
         self.name, self.avlmap, self._robot = name, avlmap, robot
@@ -65,21 +60,13 @@ class ServedMap:
         return f"{info.build_key[:16]}-{info.timings.finished}-{info.counts.sounds}".replace('"', "")
 
     def as_edited_now(self) -> "ServedMap":
-        """Return the map with the edits that its folder has by now.
-
-        Raises:
-            MapError: their log cannot be read.
-        """
+        """Return the map with the edits that its folder has by now; ``MapError`` where their log cannot be read."""
         edited = ServedMap(self.name, self.avlmap.as_edited_now(), self._robot)
         _ = edited.avlmap.edited
         return edited
 
     def prepare(self) -> None:
-        """Compute what every query needs, so that the first one is as quick as the others.
-
-        Raises:
-            MapError: a large file of the map is damaged.
-        """
+        """Compute what every query needs, so that the first one is as quick as the others."""
         avlmap, data = self.avlmap, self.avlmap.data
         there = {"pixels": True, "views": bool(len(data.keyframes)), "sounds": bool(len(data.sounds))}
         if len(avlmap.space):
@@ -132,19 +119,12 @@ class ServedMap:
 
 @dataclass(frozen=True, slots=True)
 class MapSource:
-    """Where a map comes from that may be replaced.
-
-    Attributes:
-        path: its folder.
-        stamp: returns another value for another map; None where there is none at the moment.
-        open: returns the map, or raises ``MapError``.
-        tells: whether a replacement is worth a line in the log.
-    """
+    """Where a map comes from that may be replaced."""
 
     path: Path
-    stamp: Callable[[], object | None]
+    stamp: Callable[[], object | None]  # another value for another map; None while there is no map
     open: "Callable[[], AVLMap]"
-    tells: bool = True
+    tells: bool = True  # whether a replacement is worth a line in the log
 
     @classmethod
     def of(cls, path: Path) -> "MapSource":
@@ -229,18 +209,10 @@ class Shelf:
         robot: "MakeRobot | None" = None,
         warm: bool = True,
     ) -> None:
-        """Open maps.
+        """Open maps by their names (see ``named_maps``), or raise ``MapError``.
 
-        Args:
-            maps: folders, or other places of maps, by name; see ``named_maps``.
-            limits: how much each map may remember.
-            note: is given a line when a map was replaced.
-            settings: of each map's queries.
-            robot: puts a simulated robot into a map's scene, for the commands of its page.
-            warm: whether each map computes now what every query needs.
-
-        Raises:
-            MapError: one of them cannot be opened.
+        ``note`` is given a line when a map was replaced; ``robot`` puts a simulated one into a map's scene, for the
+        commands of its page; ``warm`` maps compute now what every query needs.
         """
         cache_bytes = (limits or Limits()).cache_bytes
         self._note = note
@@ -264,11 +236,7 @@ class Shelf:
         return {name: slot.path for name, slot in self._slots.items()}
 
     def get(self, name: str | None = None) -> ServedMap:
-        """Return the map of a name; without a name the only map.
-
-        Raises:
-            RequestError: there is no map of this name, or there are several and no name.
-        """
+        """Return the map of a name; without a name the only map, or ``RequestError`` where there are several."""
         if name is None and len(self._slots) > 1:
             raise RequestError(f"This server has {len(self._slots)} maps; name one of: {', '.join(self.names)}.")
         name = self.names[0] if name is None else name
@@ -292,11 +260,7 @@ class Shelf:
 
 
 def named_maps(words: Sequence[str]) -> dict[str, Path]:
-    """Return folders by name, from words such as ``home.avlmap`` or ``upstairs=/data/home.avlmap``.
-
-    Raises:
-        ServeError: two maps have one name, or a name has characters that an address cannot hold.
-    """
+    """Return folders by name, from words such as ``home.avlmap`` or ``upstairs=/data/home.avlmap``."""
     maps: dict[str, Path] = {}
     for word in words:
         given, mark, rest = word.partition("=")

@@ -1,4 +1,4 @@
-"""The work of each request: from a request's values to its answer, in a thread of a lane.
+"""The work of each request, as ``operations`` lists it: from its values to its answer, in a thread of a lane.
 
 What cannot be answered raises an ``AvlmapsError``; ``lanes.described`` gives it a status and takes paths out of it.
 """
@@ -59,7 +59,7 @@ from avlmaps.serve.shelf import ServedMap, Shelf
 
 @dataclass(frozen=True, slots=True)
 class WorkInput:
-    """What a piece of work is given."""
+    """The map, the files and the limits of a request."""
 
     map: ServedMap
     limits: Limits
@@ -112,7 +112,6 @@ class SoundsAnswer(TypedDict):
 
 
 def list_maps(shelf: Shelf) -> MapsAnswer:
-    """Return the server's maps."""
     return {"maps": [_entry(one, shelf.is_stale(one.name)) for one in map(shelf.get, shelf.names)]}
 
 
@@ -132,19 +131,16 @@ def _entry(one: ServedMap, stale: bool) -> MapEntry:
 
 
 def describe_map(task: WorkInput, query: requests.NoQuery) -> dict[str, Any]:
-    """Return what ``avlmaps info --json`` prints, with the map's name for its path."""
     described = map_answer(task.map.avlmap)
     notices = [without_folders(notice) for notice in described["notices"]]  # they name the recording's files
     return {**described, "path": task.map.name, "notices": notices}
 
 
 def lists_of(task: WorkInput) -> MapLists:
-    """Return the lists of a task's map, which the server stores."""
     return MapLists(task.map.avlmap, task.map.once, task.watch.step)
 
 
 def list_contents(task: WorkInput, query: requests.ThingsQuery) -> ContentsAnswer:
-    """Return what ``avlmaps things --json`` prints."""
     lists = lists_of(task)
     answer: ContentsAnswer = {
         "map": task.map.name,
@@ -167,39 +163,32 @@ def _noted(task: WorkInput, answer: Noted) -> Noted:
 
 
 def list_things(task: WorkInput, query: requests.ListedThingsQuery) -> ListedThingsAnswer:
-    """Return a page of the things that are meant."""
     page = page_of_things(lists_of(task), Wanted(**msgspec.structs.asdict(query)))
     return _noted(task, ListedThingsAnswer(map=task.map.name, frame=FRAME, **page))
 
 
 def list_sounds(task: WorkInput, query: requests.NoQuery) -> SoundsAnswer:
-    """Return the sounds of a map."""
     return _noted(task, SoundsAnswer(map=task.map.name, frame=FRAME, sounds=lists_of(task).sounds()))
 
 
 def list_rooms(task: WorkInput, query: requests.RoomsQuery) -> RoomsAnswer:
-    """Return what ``avlmaps rooms --json`` prints."""
     return _noted(task, RoomsAnswer(map=task.map.name, frame=FRAME, rooms=lists_of(task).rooms(query.least)))
 
 
 def list_sources(task: WorkInput, query: requests.SourcesQuery) -> SourcesAnswer:
-    """Return what ``avlmaps sources --json`` prints."""
     found = task.map.avlmap.sources(query.sound, prior=query.prior == "lexicon", least=query.least)
     return {"map": task.map.name, "frame": FRAME, "sources": [one.to_json() for one in found]}
 
 
 def list_changes(task: WorkInput, query: requests.ChangesQuery) -> ChangesAnswer:
-    """Return what ``avlmaps changes --json`` prints."""
     return {**task.map.avlmap.changes(query.since, first_seen=query.first_seen), "map": task.map.name}
 
 
 def list_edits(task: WorkInput, query: requests.NoQuery) -> EditsAnswer:
-    """Return what ``avlmaps edit --list --json`` prints."""
     return {**task.map.avlmap.edit.history(), "map": task.map.name}
 
 
 def edit(task: WorkInput, query: requests.EditQuery) -> EditsAnswer:
-    """Correct the map, and return all edits; later queries know it."""
     editor = task.map.avlmap.as_edited_now().edit
     name = (query.edit if query.does == "undo" else query.name) or ""
     made = editor.make(
@@ -210,7 +199,6 @@ def edit(task: WorkInput, query: requests.EditQuery) -> EditsAnswer:
 
 
 def sound_clip(task: WorkInput, query: requests.SoundQuery) -> File:
-    """Return the FLAC file of a sound."""
     sounds, number = task.map.avlmap.data.sounds, query.sound
     if not 0 <= number < len(sounds):
         raise RequestError(f"The map has {len(sounds)} sounds, counted from 0; there is no {number}.", 404)
@@ -224,7 +212,6 @@ def sound_clip(task: WorkInput, query: requests.SoundQuery) -> File:
 
 
 def ask_map(task: WorkInput, query: requests.AskQuery) -> Answer:
-    """Answer a sentence or parts, with the files of the request."""
     attachments = requests.attachments(task.files, task.limits)
     return task.map.avlmap.ask(
         query.sentence or "",
@@ -243,12 +230,10 @@ def ask_map(task: WorkInput, query: requests.AskQuery) -> Answer:
 
 
 def ask(task: WorkInput, query: requests.AskQuery) -> QueryAnswer:
-    """Return what ``avlmaps query --json`` prints."""
     return ask_map(task, query).to_dict()
 
 
 def locate(task: WorkInput, query: requests.LocateQuery) -> LocateAnswer:
-    """Return what ``avlmaps locate --json`` prints."""
     photo = requests.attachments(task.files, task.limits).get(requests.PHOTO)
     if not isinstance(photo, Photo):
         raise RequestError("There is no photo; send one as the file 'photo' of a form, or as the body.")
@@ -260,7 +245,6 @@ def locate(task: WorkInput, query: requests.LocateQuery) -> LocateAnswer:
 
 
 def place(task: WorkInput, query: requests.PlaceQuery) -> PlaceAnswer:
-    """Return what is at a place."""
     avlmap = task.map.avlmap
     point = np.array([query.x, query.y, 0.0 if query.z is None else query.z])
     if query.z is None:
@@ -270,14 +254,12 @@ def place(task: WorkInput, query: requests.PlaceQuery) -> PlaceAnswer:
 
 
 def path(task: WorkInput, query: requests.PathQuery) -> PathAnswer:
-    """Return the path between two places."""
     avlmap = task.map.avlmap
     finder = task.map.once("stairs", lambda: PathFinder(avlmap, WALKER)) if query.stairs else task.map.paths
     return finder.answer(place_of(query.start), place_of(query.goal))
 
 
 def picture(task: WorkInput, query: requests.PictureQuery) -> File:
-    """Return a PNG of an answer, or of the map."""
     asks = query.object or query.sound or query.area or (query.sentence or "").strip() or task.files
     if not asks and query.intrinsics is None:
         content = map_picture(task.map) if query.size == "full" else small_picture(task.map)
@@ -293,12 +275,10 @@ def _pyramid(task: WorkInput) -> Pyramid:
 
 
 def tiles(task: WorkInput, query: requests.NoQuery) -> TilesAnswer:
-    """Return the list of tiles."""
     return _pyramid(task).index(task.map.version)
 
 
 def tile(task: WorkInput, query: requests.TilesQuery) -> File:
-    """Return one tile."""
     heat = None
     if query.heat is not None:
         shown = ask_map(task, requests.AskQuery(sentence=query.heat)).heat
@@ -309,12 +289,13 @@ def tile(task: WorkInput, query: requests.TilesQuery) -> File:
     return File(content, "application/octet-stream")
 
 
+_BYTES = "application/octet-stream"
+
 # For agents.
 _MOST_KINDS, _MOST_HEARD = 12, 2
 
 
 def describe_building(task: WorkInput, query: NoQuery) -> dict[str, Any]:
-    """Return the floors with their rooms, and how many things of each name there are."""
     avlmap, lists = task.map.avlmap, lists_of(task)
     where, things = lists.avlmap.where, lists.things()
     floors = where.floors_of(_places([room.position for room in where.rooms]))
@@ -339,7 +320,6 @@ def describe_building(task: WorkInput, query: NoQuery) -> dict[str, Any]:
 
 
 def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, Any]:
-    """Return the things of a room, or near a place, or of a name; a page of them."""
     lists = lists_of(task)
     rooms, names = lists.avlmap.where.names, query.name
     known = [name for name in names if task.map.avlmap.knows(name)]
@@ -364,7 +344,6 @@ def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, A
 
 
 def tool_rooms(task: WorkInput, query: requests.RoomsToolQuery) -> dict[str, Any]:
-    """Return the rooms of a floor, each with the number of things in it; a page of them."""
     lists = lists_of(task)
     where = lists.avlmap.where
     count = Counter(one.room for one in things_with_rooms(lists, Wanted()))
@@ -392,7 +371,6 @@ def tool_rooms(task: WorkInput, query: requests.RoomsToolQuery) -> dict[str, Any
 
 
 def tool_sounds(task: WorkInput, query: requests.SoundsToolQuery) -> dict[str, Any]:
-    """Return the sounds with their likeliest names, times and places; a page of them."""
     lists, names = lists_of(task), {name.casefold() for name in query.name}
     where, sounds = lists.avlmap.where, lists.sounds()
     rooms = where.rooms_of(_places([sound["position"] for sound in sounds]))
@@ -433,23 +411,17 @@ def _places(positions: Sequence[Sequence[float]]) -> Float[np.ndarray, "m 3"]:
 
 
 def seen_last(task: WorkInput, query: requests.LastSeenQuery) -> Any:
-    """Return where a thing is and when it was seen last."""
     return last_seen(task.map.avlmap, query.thing, query.top)
 
 
 def goal_near(task: WorkInput, query: requests.GoalNearQuery) -> Any:
-    """Return goals by the length of their paths from a place."""
     reply = ask_map(task, AskQuery(sentence=query.sentence, top=20))
     return goals_near(task.map.paths, reply, place_of(query.near), query.top)
 
 
 def encoded(answer: Any) -> bytes:
-    """Return an answer as JSON bytes."""
     # NumPy's numbers are floats that msgspec does not know
     return printable_json(msgspec.json.encode(shortened(answer), enc_hook=float).decode()).encode()
-
-
-_BYTES = "application/octet-stream"
 
 
 def viewer(task: WorkInput, query: ViewQuery) -> File:
@@ -460,7 +432,6 @@ def viewer(task: WorkInput, query: ViewQuery) -> File:
 
 
 def drawn_map(task: WorkInput, query: NoQuery) -> dict[str, Any]:
-    """Return what the page needs before it draws the first voxel."""
     from avlmaps.view.labels import palettes
 
     told = {"map": task.map.page.layout.describe(), "palettes": palettes(), "robot": task.map.guide.has_robot}
@@ -468,22 +439,18 @@ def drawn_map(task: WorkInput, query: NoQuery) -> dict[str, Any]:
 
 
 def drawn_voxels(task: WorkInput, query: NoQuery) -> File:
-    """Return the voxels in the order of drawing (``layout.RECORD``)."""
     return File(task.map.page.layout.records, _BYTES)
 
 
 def drawn_labels(task: WorkInput, query: NoQuery) -> File:
-    """Return four bytes for each voxel: thing, room, name, confidence of the name."""
     return File(task.map.page.labels.voxels.tobytes(), _BYTES)
 
 
 def drawn_contents(task: WorkInput, query: NoQuery) -> dict[str, Any]:
-    """Return things, sounds and rooms with the colours of the page."""
     return task.map.page.describe_contents()
 
 
 def drawn_voxel(task: WorkInput, query: requests.VoxelQuery) -> dict[str, Any]:
-    """Return what one voxel is taken for."""
     page, number = task.map.page, query.voxel
     if not 0 <= number < len(page.layout):
         raise RequestError(f"There is no voxel {number}; the page draws {len(page.layout):,}.", 404)
@@ -491,7 +458,6 @@ def drawn_voxel(task: WorkInput, query: requests.VoxelQuery) -> dict[str, Any]:
 
 
 def keyframe(task: WorkInput, query: requests.KeyframeQuery) -> File:
-    """Return the picture of a keyframe."""
     number, keyframes = query.keyframe, task.map.avlmap.data.keyframes
     jpeg = task.map.page.layout.thumbnail(number)
     if jpeg is None:

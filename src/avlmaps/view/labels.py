@@ -47,9 +47,11 @@ def drawn_sources(avlmap: "AVLMap") -> list[dict[str, Any]]:
         joined = known.joined(source.events, source.name)
         height = float(avlmap.space.level(np.array(source.position))[2])
         regions = [
-            {"probability": share, "outlines": [_placed(corners, height) for corners in outlines]}
+            {
+                "probability": share,
+                "outlines": [_placed(one, height) for one in _outlines(joined.density.region(share), known.plan)],
+            }
             for share in SHARES
-            for outlines in [list(_outlines(joined.density.region(share), known.plan))]
         ]
         told.append(source.to_json() | {"regions": regions})
     return told
@@ -95,7 +97,7 @@ class Labels:
 
     @classmethod
     def of(cls, layout: Layout) -> "Labels":
-        """Compute all of it; a map whose models are not here has less, and its notes say why."""
+        """Compute all; a map whose models are not here has less, and its notes say why."""
         avlmap, notes = layout.avlmap, []
         things = _or_note(avlmap.things, notes)
         sounds = _or_note(avlmap.sounds, notes)
@@ -117,8 +119,8 @@ class Labels:
         for thing in self.things:
             points, half_m = level(thing.points), 0.5 * layout.avlmap.space.grid.voxel_size_m
             things.append(
-                thing.to_json()
-                | {
+                {
+                    **thing.to_json(),
                     "label": 1 + self.names.index(thing.name) if thing.name in self.names else NONE,
                     "low": (points.min(axis=0) - half_m).round(4).tolist(),
                     "high": (points.max(axis=0) + half_m).round(4).tolist(),
@@ -164,7 +166,6 @@ def _padded(names: tuple[str, ...]) -> list[int]:
 
 
 def _or_note(find: "Callable[[], Sequence[Any]]", notes: list[str]) -> "Sequence[Any]":
-    """Return what is found; nothing, and the reason in the notes, where the map or this install lacks a model."""
     try:
         return find()
     except AvlmapsError as fault:
@@ -183,7 +184,6 @@ def _thing_labels(count: int, things: "Sequence[Thing]") -> tuple[tuple[str, ...
 def _room_labels(
     avlmap: "AVLMap", rooms: "Sequence[Room]", rows: Int[np.ndarray, " m"]
 ) -> tuple[tuple[str, ...], UInt8[np.ndarray, " m"]]:
-    """Give each of some voxels the room that it lies in."""
     names = numbered([room.name for room in rooms])[:_MOST]
     regions = avlmap.room_regions
     if not names or not len(rows) or regions is None:
@@ -220,17 +220,10 @@ _MOST_VIEWS = 12  # keyframes that are named of those which saw a voxel
 
 
 class MapOnPage:
-    """One map on the page. Safe to use from several threads.
-
-    Attributes:
-        avlmap: the map.
-        layout: how it is drawn.
-    """
+    """One map on the page, or in a file with up to ``most`` voxels. Safe to use from several threads."""
 
     def __init__(self, avlmap: "AVLMap", most: int | None = None) -> None:
-        """Lay out a map, for a file with up to ``most`` voxels."""
-        self.avlmap = avlmap
-        self.layout = Layout(avlmap, most)
+        self.avlmap, self.layout = avlmap, Layout(avlmap, most)
         self._labels: Labels | None = None
         self._lock = threading.Lock()
 

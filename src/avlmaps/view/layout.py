@@ -34,22 +34,13 @@ class Layout:
     """One map for a page.
 
     Attributes:
-        avlmap: the map.
         order: (m,) the map's row of each voxel that is drawn, in the order of drawing.
         levels: of detail.
         low: (3,) index of the map's lowest corner.
     """
 
     def __init__(self, avlmap: "AVLMap", most: int | None = None) -> None:
-        """Lay out a map.
-
-        Args:
-            avlmap: the map.
-            most: voxels that are drawn at most; of a larger map one voxel of each small block, see ``detail_order``.
-
-        Raises:
-            MapError: it is too wide to be drawn.
-        """
+        """Lay out a map by up to ``most`` voxels, or raise ``MapError`` where it is too wide to be drawn."""
         self.avlmap = avlmap
         index = np.asarray(avlmap.space.index)
         self.order, self.levels = detail_order(index, most)
@@ -83,14 +74,13 @@ class Layout:
     @property
     def duration_s(self) -> float:
         """The last moment of the map, seconds from the start of the recording; never 0."""
-        stored = self.avlmap
-        ends = [*np.asarray(stored.data.keyframes.stamp_s), *np.asarray(stored.data.sounds.offset_s)]
-        latest = float(np.asarray(stored.data.voxels.last_seen_s).max(initial=0.0))
-        return max(1e-3, latest, *map(float, ends)) if ends else max(1e-3, latest)
+        data = self.avlmap.data
+        stamps = data.keyframes.stamp_s, data.sounds.offset_s, data.voxels.last_seen_s
+        return max(1e-3, *(float(np.asarray(each).max(initial=0.0)) for each in stamps))
 
     def describe(self) -> dict[str, Any]:
         """Return all that the page needs before it draws the first voxel."""
-        stored, space = self.avlmap, self.avlmap.space
+        avlmap, space = self.avlmap, self.avlmap.space
         # Of a very large map an even picture of it is measured.
         level = space.level(space.centres_of(self.order[:_MEASURED])) if len(space) else np.zeros((1, 3))
         low, high = np.percentile(level, [0.1, 99.9], axis=0)
@@ -99,11 +89,11 @@ class Layout:
         least, most = np.maximum(level.min(axis=0), low - reach), np.minimum(level.max(axis=0), high + reach)
         cameras = camera_path(space)
         ceiling = float(cameras[:, 2].max()) + _HEADROOM_M if len(cameras) else float(level[:, 2].max())
-        camera = stored.data.rig.rgb
-        storeys = {} if self.avlmap.storeys is None else {"storeys": _storeys(self.avlmap.storeys, low[2], high[2])}
+        camera = avlmap.data.rig.rgb
+        storeys = {} if avlmap.storeys is None else {"storeys": _storeys(avlmap.storeys, low[2], high[2])}
         return {
-            "name": stored.path.name,
-            "summary": repr(self.avlmap).partition(": ")[2].removesuffix(")"),
+            "name": avlmap.path.name,
+            "summary": repr(avlmap).partition(": ")[2].removesuffix(")"),
             "voxels": len(self),
             "voxels_of_map": len(space),
             "voxel_size_m": space.grid.voxel_size_m,
@@ -119,14 +109,13 @@ class Layout:
             "ceiling_m": ceiling,
             "duration_s": self.duration_s,
             "frame": FRAME,
-            "profile": stored.data.info.profile,
+            "profile": avlmap.data.info.profile,
             "field_of_view": [camera.width / camera.fx, camera.height / camera.fy],
             "keyframes": self._keyframes(),
             **storeys,
         }
 
     def _keyframes(self) -> list[dict[str, Any]]:
-        """Return where each keyframe's camera was, and when; level frame."""
         keyframes, turn = self.avlmap.data.keyframes, self.avlmap.space.level_from_world
         poses = np.asarray(keyframes.world_from_camera, np.float64)
         return [
@@ -143,9 +132,7 @@ class Layout:
     def thumbnail(self, number: int) -> bytes | None:
         """Return the JPEG of a keyframe, None where there is none."""
         keyframes = self.avlmap.data.keyframes
-        if not 0 <= number < len(keyframes):
-            return None
-        return keyframes.jpeg(number).tobytes() or None
+        return (keyframes.jpeg(number).tobytes() or None) if 0 <= number < len(keyframes) else None
 
 
 def _storeys(storeys: "Storeys", low_m: float, high_m: float) -> list[dict[str, Any]]:
@@ -180,15 +167,10 @@ _MOST_BLOCKS = 4
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One level of detail.
+    """One level of detail."""
 
-    Attributes:
-        count: voxels that are drawn at this level: the first ones of the order.
-        edge: of the blocks that they stand for, in voxels.
-    """
-
-    count: int
-    edge: int
+    count: int  # voxels that are drawn at this level: the first ones of the order
+    edge: int  # of the blocks that they stand for, in voxels
 
 
 def detail_order(
@@ -197,12 +179,9 @@ def detail_order(
     """Return the order in which voxels are drawn, and how many of them make up each level.
 
     A level holds one voxel of every block that holds any, and the last level holds all voxels. Within a level the
-    order is drawn at random (always the same), so that any part of a level is spread over the whole map.
-
-    Args:
-        index: which voxels; each once.
-        most: voxels that are drawn at most. Where there are more, the last level is one of blocks of which some are
-            left out, and ``count`` of that level is what all of them would be.
+    order is drawn at random (always the same), so that any part of a level is spread over the whole map. Where there
+    are more than ``most`` voxels, the last level is one of blocks of which some are left out, and its ``count`` is what
+    all of them would be.
     """
     n = len(index)
     rng = np.random.default_rng(_SEED)
@@ -235,9 +214,7 @@ def _one_of_each(index: Int[np.ndarray, "n 3"], shift: int, chosen: np.ndarray) 
         key *= span[axis]
         key += (index[:, axis] >> shift) - low[axis]
     if int(span[0]) * int(span[1]) * int(span[2]) > _MOST_BLOCKS * len(index):
-        _, key = np.unique(
-            key, return_inverse=True
-        )  # a few far voxels: a table of all blocks would be larger than the map
+        _, key = np.unique(key, return_inverse=True)  # a table of all blocks would be larger than the map
     first = np.full(int(key.max()) + 1, -1, np.int64)
     first[key[::-1]] = np.arange(len(index) - 1, -1, -1)  # the last one written stays
     first[key[chosen]] = -1

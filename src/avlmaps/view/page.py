@@ -47,16 +47,10 @@ def live_page() -> bytes:
 def write_page(
     out: Path, maps: "Sequence[AVLMap]", questions: "Sequence[str | tuple[str, Question]]" = ()
 ) -> dict[str, Any]:
-    """Write one file that opens from the disk without a network: the maps, their contents, and some questions' heat.
+    """Write one file that opens from the disk without a network: one map or two, their contents, some questions' heat.
 
-    Args:
-        out: the file.
-        maps: one, or two that are compared.
-        questions: sentences, or queries with their titles, answered now and stored in the file; by default some that
-            fit the first map.
-
-    Returns:
-        The file, its size, and the questions with what became of them.
+    The questions, sentences or queries with their titles, are answered now; by default some that fit the first map. It
+    returns the file, its size, and the questions with what became of them.
 
     Raises:
         QueryError: a question is not understood, or the file cannot be written.

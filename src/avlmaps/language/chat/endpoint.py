@@ -28,6 +28,7 @@ MOST_BYTES = 1 << 20
 _PREFIX = "AVLMAPS_CHAT_"
 _MODELS_WAIT_S = 10.0
 _SHORTEST_KEY = 8
+_BOUNDED = frozenset({"timeout_s", "retries", "rounds", "temperature", "max_tokens"})
 _BUSY = frozenset({408, 425, 429, 500, 502, 503, 504, 529})
 _STATUSES = {401: "key", 403: "key", 404: "model", 429: "busy"}
 _SENTENCES = {
@@ -62,6 +63,12 @@ class ChatSettings:
     replay: Path | None = None  # JSONL: written with every exchange where it is missing, else read instead of asking
 
     def __post_init__(self) -> None:
+        for name, kind in get_type_hints(type(self), include_extras=True).items():
+            if name in _BOUNDED:
+                try:
+                    msgspec.convert(getattr(self, name), kind)
+                except msgspec.ValidationError as fault:
+                    raise LanguageError(f"The chat setting {name} is out of bounds ({fault}); give another.") from None
         if not self._is_address():
             shown = "What was given" if "@" in self.base_url else repr(self.base_url)  # a password is not repeated
             raise LanguageError(
@@ -150,6 +157,8 @@ class Replay:
 
     def __init__(self, path: Path) -> None:
         self.path, self.recording = path, not path.exists()
+        if self.recording and not os.access(path.parent, os.W_OK):  # said before an answer is paid for
+            raise LanguageError(f"The replay file {path} cannot be written: its folder is not there, or read-only.")
         self._answers: dict[str, list[ModelReply]] = {}
         try:
             raw = b"" if self.recording else path.read_bytes()

@@ -239,7 +239,7 @@ def points_of(message: Any, name: str) -> Float[np.ndarray, "n 3"]:
                 "itemsize": step,
             }
         )
-        cloud = np.frombuffer(content.tobytes(), row, count)
+        cloud = np.frombuffer(np.ascontiguousarray(content), row, count)
     except (KeyError, ValueError) as error:
         raise RecordingError(
             f"The point cloud {name} has no x, y and z that can be read ({error}) in the fields {', '.join(fields)} of "

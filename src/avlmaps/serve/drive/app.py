@@ -23,8 +23,8 @@ from starlette.routing import Route
 
 from avlmaps.core.files import state_file
 from avlmaps.core.wording import option
-from avlmaps.serve.agents import AgentServer, Tool, described, text_of, token_count
-from avlmaps.serve.app import EVENTS, agents_route, http_error, json_object, json_response
+from avlmaps.serve.agents import AgentServer, Tool, agent_endpoint, described, text_of, token_count
+from avlmaps.serve.app import EVENTS, http_error, json_object, json_response
 from avlmaps.serve.drive.orders import ConfirmRequest, Dispatcher, OrderLog, PlanRequest, Who
 from avlmaps.serve.drive.robots import Machine
 from avlmaps.serve.lanes import Lane, Report, RequestError
@@ -56,8 +56,7 @@ class DriveService:
 
     async def plan(self, query: PlanRequest, who: Who) -> dict[str, Any]:
         """Plan an order; one that waits here is void after the next stop or order."""
-        begun = self.dispatcher.begun
-        given = query.words, query.program, who, begun, query.choose
+        given = query.words, query.program, who, self.dispatcher.begun, query.choose
         return await self.orders.run(lambda _: self.dispatcher.plan(*given))
 
     async def confirm(self, query: ConfirmRequest, who: Who) -> dict[str, Any]:
@@ -67,12 +66,12 @@ class DriveService:
     async def stop(self, query: NoQuery, who: Who) -> dict[str, Any]:
         """Stop the robot: the brake at once, here; the robot's confirmation in a thread."""
         self.dispatcher.brake_now()
-        run = copy_context().run
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self.stops, lambda: run(self.dispatcher.stop, who))
+        return await asyncio.get_running_loop().run_in_executor(
+            self.stops, copy_context().run, self.dispatcher.stop, who
+        )
 
     async def status(self, query: NoQuery, who: Who) -> dict[str, Any]:
-        """Return what the robot is at."""
+        """Return where the robot is and what it does."""
         return await self.orders.run(lambda _: self.dispatcher.status())
 
     async def events(self) -> AsyncIterator[bytes]:
@@ -115,7 +114,7 @@ class DriveService:
         """The application."""
         routes = [Route("/", _about, methods=["GET"])]
         routes += [Route(one.path or "", _endpoint(self, one), methods=list(one.methods)) for one in OPERATIONS]
-        routes.append(agents_route(drive_agents(self), _MOST_BODY))
+        routes.append(Route("/mcp", agent_endpoint(drive_agents(self), _MOST_BODY), methods=["POST"]))
         wrong = {HTTPException: lambda _, error: http_error(error, "GET /drive/ lists them")}
         app = Starlette(routes=routes, exception_handlers=wrong, lifespan=self.lifespan)
         app.router.redirect_slashes = False
@@ -203,8 +202,7 @@ def open_driving(robot_file: Path, maps: Service, log: Path | None = None) -> Dr
 
     Raises:
         ServeError: a real robot would be driven without a token.
-        NavigationError: the robot's file cannot be read, the robot cannot be reached or stopped, or the log cannot be
-            written.
+        NavigationError: the robot cannot be reached or stopped, or its file or the log cannot be used.
         RequestError: there is no such map.
     """
     machine = Machine(robot_file)

@@ -71,10 +71,7 @@ class Who:
 
 _REFUSALS = {
     "stopped": (409, "The robot was stopped, or took another order, meanwhile; plan again."),
-    "token": (
-        403,
-        "This token confirms no plan: it was used, replaced by an order or a stop, or never given.",
-    ),
+    "token": (403, "This token confirms no plan: it was used, replaced by an order or a stop, or never given."),
     "expired": (410, "The plan is older than {:g} s; plan again, and confirm sooner."),
     "usage": (400, "An order is a command (words) or a program, and not both."),
     "map-changed": (409, "The map was replaced since the plan was made; plan again."),
@@ -124,8 +121,7 @@ class PlanBook:
     def add(self, plan: OrderPlan, now_s: float, begun: int | None = None) -> str:
         """Keep a plan that was requested when ``cleared`` was ``begun``, and return its token; the oldest goes.
 
-        Raises:
-            RequestError: the robot was stopped, or took another order, while the plan was computed.
+        It is refused where the robot was stopped, or took another order, while the plan was computed.
         """
         if begun not in (None, self.cleared):
             raise _refused("stopped")
@@ -136,11 +132,7 @@ class PlanBook:
         return token
 
     def take(self, token: str, now_s: float) -> OrderPlan:
-        """Return the plan of a token and forget both; the digest is looked up, so that the time shows nothing.
-
-        Raises:
-            RequestError: there is no such token, or it is too old.
-        """
+        """Return the plan of a token and forget both; the digest is looked up, so that the time shows nothing."""
         plan, until_s = self._waiting.pop(token_digest(token), (None, 0.0))
         if plan is None:
             raise _refused("token")
@@ -154,46 +146,32 @@ class PlanBook:
         self._waiting.clear()
 
 
-Words = Annotated[str, Meta(max_length=MOST_CHARACTERS, description="A command, such as 'go to the sofa'.")]
-Program = Annotated[str, Meta(max_length=20_000, description="Skills as a program, instead of a command.")]
-Choose = Annotated[
-    tuple[int, ...], Meta(max_length=20, description="Which choice is meant where several things fit: its number.")
-]
-Token = Annotated[str, Meta(min_length=1, max_length=200, description="The token of the plan that is confirmed.")]
-
-
 class PlanRequest(Request):
     """A command or a program to plan; nothing moves."""
 
-    words: Words = ""
-    program: Program = ""
-    choose: Choose = ()
+    words: Annotated[str, Meta(max_length=MOST_CHARACTERS, description="A command, such as 'go to the sofa'.")] = ""
+    program: Annotated[str, Meta(max_length=20_000, description="Skills as a program, instead of a command.")] = ""
+    choose: Annotated[
+        tuple[int, ...], Meta(max_length=20, description="Which choice is meant where several things fit: its number.")
+    ] = ()
 
 
 class ConfirmRequest(Request):
     """The token of a plan that a person has read."""
 
-    token: Token
+    token: Annotated[str, Meta(min_length=1, max_length=200, description="The token of the plan that is confirmed.")]
 
 
 class OrderLog:
     """Appends entries; a line is whole or not there, also when several processes write."""
 
     def __init__(self, path: Path) -> None:
-        """Take its file.
-
-        Raises:
-            NavigationError: it cannot be opened for writing.
-        """
+        """Take its file, or raise ``NavigationError`` where it cannot be opened for writing."""
         self.path = path
         self._append(b"")
 
     def write(self, event: str, entry: Mapping[str, Any]) -> None:
-        """Append an entry and wait until it is on the disk.
-
-        Raises:
-            NavigationError: it cannot be written; then nothing may move.
-        """
+        """Append an entry and wait until it is on the disk; where it cannot be written nothing may move."""
         time = datetime.now(UTC).isoformat(timespec="milliseconds")
         line = json.dumps({"time": time, "event": event, **entry}, ensure_ascii=False, allow_nan=False)
         self._append(printable_json(line).encode() + b"\n")
@@ -228,11 +206,8 @@ class RunningOrder:
 class Dispatcher:
     """Decides what moves the robot.
 
-    Attributes:
-        machine: the robot.
-        log: of orders.
-        fault: why the robot may still drive although it was stopped last; "" where it stood.
-        change: a number that grows with each change of the status.
+    ``fault`` is why it may still drive although it was stopped last, "" where it stood; ``change`` is a number that
+    grows with each change of the status.
     """
 
     def __init__(
@@ -255,11 +230,7 @@ class Dispatcher:
     # Planning.
 
     def connect(self) -> None:
-        """Connect to the robot.
-
-        Raises:
-            NavigationError: it cannot be reached, or cannot stand on the map.
-        """
+        """Connect to the robot; ``NavigationError`` where it cannot be reached, or cannot stand on the map."""
         self._ready(self._current())
 
     def _ready(self, now: ServedMap) -> "Obstacles":
@@ -270,7 +241,7 @@ class Dispatcher:
 
     @property
     def begun(self) -> int:
-        """A mark of now, for plans: one that is requested now is void after the next stop or order."""
+        """A number for plans that are requested now: they are void after the next stop or order."""
         return self._book.cleared
 
     def plan(
@@ -278,11 +249,8 @@ class Dispatcher:
     ) -> dict[str, Any]:
         """Plan a command or a program on the map, and return the plan with its token.
 
-        ``begun`` is the mark of when it was requested; that of now by default. ``choose`` answers the question which of
-        several things is meant.
-
-        Raises:
-            RequestError: there is no plan, and so no token; the sentence says why.
+        ``begun`` is of when it was requested, now by default; ``choose`` answers which of several things is meant.
+        ``RequestError`` says why there is no plan, and so no token.
         """
         begun = self.begun if begun is None else begun
         with self._refusing(who, words=words, program=program):
@@ -348,11 +316,7 @@ class Dispatcher:
     # Driving.
 
     def confirm(self, token: str, who: Who) -> dict[str, Any]:
-        """Start the plan of a token.
-
-        Raises:
-            RequestError: nothing is started; the sentence says why.
-        """
+        """Start the plan of a token; ``RequestError`` says why nothing is started."""
         with self._refusing(who), self._preparing:
             order = self._begun(token)
             try:
@@ -494,13 +458,8 @@ class Dispatcher:
         with self._lock:
             order, last, fault, waiting = self._running, self._last, self.fault, len(self._book)
         state = "idle" if order is None else "stopping" if order.brake.pulled else "driving"
-        running = None
-        if order is not None:
-            plan = order.plan
-            running = {
-                "order": plan.order, "words": plan.words, "reading": plan.reading, "program": plan.program,
-                "lines": list(order.lines),
-            }  # fmt: skip
+        said = "order", "words", "reading", "program"
+        running = order and {**{name: getattr(order.plan, name) for name in said}, "lines": list(order.lines)}
         return {
             "state": "unstopped" if fault and order is None else state,
             "robot": self.machine.name,

@@ -42,11 +42,7 @@ class RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
 
     @classmethod
     def read(cls, path: Path) -> "RobotFile":
-        """Read a robot's file.
-
-        Raises:
-            NavigationError: it cannot be read, or its entries do not fit together.
-        """
+        """Read a robot's file, or raise ``NavigationError`` where its entries do not fit together."""
         try:
             with path.open("rb") as stream:
                 read = msgspec.json.decode(stream.read(_MOST_BYTES), type=cls)
@@ -64,27 +60,13 @@ class RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
 
 
 class Machine:
-    """One robot, as a driving server drives it.
+    """One robot, as a driving server drives it, by its file.
 
     A simulated one stays where it stopped, also when the map is replaced. A real one has a guard: a second process that
-    cancels its goals when this one dies.
-
-    Attributes:
-        name: as people know it.
-        identity: another word for another robot, or another file of the same.
-        is_real: whether it is no simulated one.
-        map: name of the map that it drives by; None where the server has one.
-        shape: of its body.
-        guess: whether it drives to the best guess.
-        pace_s: time of one action of a simulated robot, seconds.
+    cancels its goals when this one dies. ``identity`` is another word for another robot, or another file of the same.
     """
 
     def __init__(self, path: Path) -> None:
-        """Read a robot's file; nothing is connected yet.
-
-        Raises:
-            NavigationError: it, or the file of a real robot's frames, cannot be read.
-        """
         self._read = read = RobotFile.read(path)
         self.is_real = read.robot != "simulated"
         self.name = f"{read.robot} robot" if self.is_real else f"simulated robot in {read.scene}"
@@ -128,11 +110,7 @@ class Machine:
 
     @property
     def driver(self) -> RobotDriver:
-        """What drives it.
-
-        Raises:
-            NavigationError: it is not connected.
-        """
+        """What drives it; ``NavigationError`` where it is not connected."""
         if self._connected is None:
             raise NavigationError("The robot is not connected; check that it runs, and plan again.")
         return self._connected[2]
