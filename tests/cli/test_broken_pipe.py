@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.cli.verbs import VERBS
+from avlmaps.cli.verbs import installed
 
 READER_GONE = 141
 
@@ -64,7 +64,7 @@ def test_another_broken_pipe_is_an_error(
     def break_off(_: object) -> None:
         raise BrokenPipeError(32, "Broken pipe")
 
-    monkeypatch.setattr(VERBS["profiles"], "run", break_off)
+    monkeypatch.setattr(installed()[0]["profiles"], "run", break_off)
     status, out, err = run("profiles", "--json")
     assert status == 1 and "Broken pipe" in err
     assert json.loads(out)["error"]["kind"] == "system"

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.cli.verbs import VERBS
+from avlmaps.cli.verbs import installed
 
 SNAPSHOTS = Path(__file__).parent / "snapshots"
 
 
-@pytest.mark.parametrize("verb", ["", *VERBS])
+@pytest.mark.parametrize("verb", ["", *installed()[0]])
 def test_help_is_as_it_was(verb: str, run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "100")
     status, out, _ = run(*([verb] if verb else []), "--help")

@@ -10,7 +10,7 @@ import pytest
 
 from avlmaps.cli.build import Build
 from avlmaps.cli.go import Go
-from avlmaps.cli.verbs import VERBS, read_verb
+from avlmaps.cli.verbs import installed, read_verb
 from avlmaps.core.progress import NOTICE
 
 ERRORS = (
@@ -82,7 +82,7 @@ def test_an_error_is_one_json_object(words, status, kind, built: Path, walk: Pat
 
 
 def test_every_verb_is_among_them() -> None:
-    assert {words[0] for words, *_ in ERRORS} == set(VERBS)
+    assert {words[0] for words, *_ in ERRORS} == set(installed()[0])
 
 
 def test_a_command_line_that_cannot_be_read_says_what_is_wrong(run) -> None:

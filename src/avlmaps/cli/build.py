@@ -133,13 +133,10 @@ def build(verb: "Build") -> dict[str, Any]:
     recording = openings[0]()
     for notice in recording.notices:
         say(f"note: {notice}")
+    per_submap = SUBMAP_FRAMES if verb.submaps or verb.corrected_poses or verb.close_loops else 0
     settings = BuildSettings(
         voxel_size_m=verb.voxel_size_m,
-        frames=FrameSettings(
-            step=verb.frame_step,
-            max_bad_share=verb.max_bad_share,
-            per_submap=SUBMAP_FRAMES if verb.submaps or verb.corrected_poses or verb.close_loops else 0,
-        ),
+        frames=FrameSettings(step=verb.frame_step, max_bad_share=verb.max_bad_share, per_submap=per_submap),
         fusion=FusionSettings(max_depth_m=verb.max_depth_m, sensor=verb.sensor),
         gravity=GravitySettings(camera_height_m=verb.camera_height_m),
         seed=verb.seed,
@@ -159,18 +156,11 @@ def build(verb: "Build") -> dict[str, Any]:
                 openings, verb.out, used, pool, resolved, cache=cache, allow=verb.allow, overwrite=verb.overwrite
             )
         else:
+            workers = None if pool is None else cluster_workers(pool, openings[0], cache)
             data = build_map(
-                recording,
-                verb.out,
-                used,
-                resolved,
-                cache=cache,
-                workers=None if pool is None else cluster_workers(pool, openings[0], cache),
-                allow=verb.allow,
-                resume=not verb.fresh,
-                overwrite=verb.overwrite,
-                finds=with_findings,
-            )
+                recording, verb.out, used, resolved, cache=cache, workers=workers, allow=verb.allow,
+                resume=not verb.fresh, overwrite=verb.overwrite, finds=with_findings,
+            )  # fmt: skip
             avlmap = AVLMap(data, path=user_path(verb.out))
     answer: dict[str, Any] = {}
     if poses is not None:

@@ -95,10 +95,8 @@ class Go(Asking, MapVerb):
         except LanguageError as unread:
             if not self.json:
                 raise
-            choices = list(getattr(unread, "choices", ()))
-            emit(
-                {"ok": False, "error": error_answer(kind_of(unread), str(unread)), "choices": choices}, (), as_json=True
-            )
+            error, choices = error_answer(kind_of(unread), str(unread)), list(getattr(unread, "choices", ()))
+            emit({"ok": False, "error": error, "choices": choices}, (), as_json=True)
             raise AnsweredError(str(unread)) from None
         failed = failure(answer)
         emit({**answer, "error": failed}, go_lines(answer), self.json)

@@ -116,10 +116,8 @@ def _consistency(recording: "Recording") -> dict[str, Any] | None:
 
 def _consistency_lines(found: dict[str, Any]) -> list[str]:
     numbers = [f"{found['pairs']} pairs of frames see the same place"]
-    if found["agreeing"] is not None:
-        numbers.append(f"{found['agreeing']:.1%} of their points agree")
-    if found["likeness"] is not None:
-        numbers.append(f"brightness correlates by {found['likeness']:.2f}")
+    numbers += [] if found["agreeing"] is None else [f"{found['agreeing']:.1%} of their points agree"]
+    numbers += [] if found["likeness"] is None else [f"brightness correlates by {found['likeness']:.2f}"]
     lines = [f"consistency: {found['verdict']} ({', '.join(numbers)})"]
     lines += [f"  {one['verdict']} ({one['reason']}): {one['sentence']}" for one in found["findings"]]
     return lines + [f"  {sentence}" for sentence in found["unchecked"]]

@@ -85,17 +85,12 @@ def _live(verb: Live) -> dict[str, Any]:
     first = _days_before(verb)
     used = verb.encoders()
     source = _robot(verb) if verb.source == "ros2" else _recording(verb)
+    settings = replace(BuildSettings() if verb.every_frame else SPARSE, voxel_size_m=verb.voxel_size_m)
     with LiveMap(
-        verb.out,
-        used,
-        up_in_world=source.up_in_world,
-        settings=replace(BuildSettings() if verb.every_frame else SPARSE, voxel_size_m=verb.voxel_size_m),
-        live=LiveSettings(gates=not verb.every_frame),
-        overwrite=verb.overwrite,
-        begins_s=source.begins_s,
-        microphones=source.microphones,
+        verb.out, used, up_in_world=source.up_in_world, settings=settings, overwrite=verb.overwrite,
+        live=LiveSettings(gates=not verb.every_frame), begins_s=source.begins_s, microphones=source.microphones,
         same_device=verb.same_device,
-    ) as live:
+    ) as live:  # fmt: skip
         if verb.serve or verb.view:
             serve_while(live, lambda over: source.play(live, over), verb.port, browse=verb.view)
         else:

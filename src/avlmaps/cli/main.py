@@ -5,7 +5,7 @@ import os
 import select
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from avlmaps.cli import output
 from avlmaps.core.errors import AskError, AvlmapsError, BackendError
 from avlmaps.core.printable import printable
-from avlmaps.core.progress import end_bars
+from avlmaps.core.progress import announce_compiling, end_bars
 from avlmaps.core.wording import Spelling, options_as
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _wants_json(words: Sequence[str]) -> bool:
 
 def _run(verb: "Verb") -> int:
     try:
-        with _models_in_force(verb), _compiling(verb):
+        with _models_in_force(verb), announce_compiling() if verb.compiles else nullcontext():
             verb.run()
     except output.AnsweredError as error:
         return _complain(error, error.status)
@@ -111,21 +111,7 @@ def _swapped(verb: "Verb") -> str | None:
     place, words = getattr(verb, "map", None), getattr(verb, "sentence", None)
     if place is None or not words or place.exists() or not Path(words, "map.json").is_file():
         return None
-    return f"{words} is the map, and it comes first: avlmaps {_name_of(verb)} {words} {str(place)!r}"
-
-
-def _name_of(verb: "Verb") -> str:
-    from avlmaps.cli.verbs import VERBS
-
-    return next((name for name, kind in VERBS.items() if isinstance(verb, kind)), "query")
-
-
-def _compiling(verb: "Verb") -> AbstractContextManager[None]:
-    if not verb.compiles:
-        return nullcontext()
-    from avlmaps.core.progress import announce_compiling
-
-    return announce_compiling()
+    return f"{words} is the map, and it comes first: avlmaps {type(verb).__name__.lower()} {words} {str(place)!r}"
 
 
 def _fail(verb: "Verb", error: BaseException, message: str, status: int) -> int:

@@ -44,8 +44,7 @@ class Profiles(ModelVerb):
         if self.check is not None:
             self._check(self.check)
             return
-        answer = list_profiles()
-        lines: list[str] = []
+        answer, lines = list_profiles(), list[str]()
         for entry in answer["profiles"]:
             lines += [*_wrapped(f"{entry['name']}: {entry['about']}", ""), *_backend_lines(entry["backends"])]
         if answer["other_backends"]:
@@ -69,15 +68,11 @@ class Profiles(ModelVerb):
             raise BackendError(f"The profile {profile!r} is not installed; get it with: {get}")
         found = brought(next(iter(fetchers)), "the fetcher")(self.source or "")
         whole = sum(note.bytes for note in found.manifest.files.values())
-        answer = {
-            "fetched": found.manifest.id,
-            "folder": str(found.folder),
-            "bytes": whole,
-            "received_bytes": found.received_bytes,
-        }
-        came = f"{found.received_bytes / 1e6:.0f} MB came now" if found.received_bytes else "all was here already"
+        folder, received = str(found.folder), found.received_bytes
+        answer = {"fetched": found.manifest.id, "folder": folder, "bytes": whole, "received_bytes": received}
+        came = f"{received / 1e6:.0f} MB came now" if received else "all was here already"
         lines = [
-            f"{found.manifest.id}: {len(found.manifest.files)} files, {whole / 1e6:.0f} MB, in {found.folder} ({came})",
+            f"{found.manifest.id}: {len(found.manifest.files)} files, {whole / 1e6:.0f} MB, in {folder} ({came})",
             "build with them: avlmaps build REC --out MAP --profile light",
         ]
         emit(answer, lines, self.json)

@@ -63,12 +63,7 @@ class Query(Asking, InFrame, MapVerb):
         self._asked()  # what does not fit together is said before a map is opened
         super().run()
 
-    def opened(self) -> "AVLMap":
-        from avlmaps.query.avlmap import AVLMap
-
-        return AVLMap.open(self.map, self._settings())
-
-    def _settings(self) -> "QuerySettings":
+    def settings(self) -> "QuerySettings":
         from avlmaps.query.settings import query_settings
 
         settings = query_settings(self.rules, self.query_settings())
@@ -95,7 +90,7 @@ class Query(Asking, InFrame, MapVerb):
         from avlmaps.query.asking import ask
 
         asked = self._asked()
-        if avlmap.settings != (settings := self._settings()):
+        if avlmap.settings != (settings := self.settings()):
             avlmap = type(avlmap)(avlmap.data, avlmap.encoders, path=avlmap.path, settings=settings)
         with announce_compiling(now=False):
             found = ask(avlmap, asked)

@@ -80,14 +80,10 @@ def serve(verb: "Serve") -> None:
 
     logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(name)s: %(message)s")
     settings = ServeSettings(
-        host=verb.host,
-        port=verb.port,
-        token=None if verb.stdio else read_token(verb.token_file),
-        allowed_hosts=verb.allow_host,
-        tls_certificate=verb.tls_cert,
-        tls_key=verb.tls_key,
+        host=verb.host, port=verb.port, token=None if verb.stdio else read_token(verb.token_file),
+        allowed_hosts=verb.allow_host, tls_certificate=verb.tls_cert, tls_key=verb.tls_key,
         query=verb.query_settings(),
-    )
+    )  # fmt: skip
     maps = named_maps([verb.map, *verb.more])
     if verb.stdio:
         _serve_stdio(Service.open(maps, settings, say))

@@ -105,11 +105,15 @@ class MapVerb(ModelVerb):
         answer = self.answer(self.opened())
         emit(answer, self.lines(answer), self.json)
 
+    def settings(self) -> "QuerySettings | None":
+        """Return the settings of its queries."""
+        return None
+
     def opened(self) -> "AVLMap":
         """Return the map."""
         from avlmaps.query.avlmap import AVLMap
 
-        return AVLMap.open(self.map)
+        return AVLMap.open(self.map, self.settings())
 
     def answer(self, avlmap: "AVLMap") -> Mapping[str, Any]:
         """Return the answer of an open map, as JSON has it."""
@@ -189,13 +193,10 @@ class Reading:
                 ) from None
         try:
             return Corrections(
-                depth_unit_m=self.depth_unit,
-                intrinsics=tuple(cameras),
-                poses=tuple(map(PoseKind, self.poses)),
-                camera_axes=self.camera_axes,
-                pose_delay_s=self.pose_delay,
+                depth_unit_m=self.depth_unit, intrinsics=tuple(cameras), poses=tuple(map(PoseKind, self.poses)),
+                camera_axes=self.camera_axes, pose_delay_s=self.pose_delay,
                 up_in_world=None if self.up is None else _direction(self.up),
-            )
+            )  # fmt: skip
         except RecordingError as error:
             raise UsageError(str(error)) from None
 
@@ -234,13 +235,8 @@ class OfRecording:
 
     def opening(self) -> dict[str, Any]:
         """Return the arguments of ``open_recording`` behind them."""
-        return {
-            "format": self.format,
-            "audio": self.audio,
-            "topics": self.named_topics(),
-            "corrections": self.reading.corrections(),
-            "microphones": self.microphones,
-        }
+        given = {"format": self.format, "audio": self.audio, "microphones": self.microphones}
+        return {**given, "topics": self.named_topics(), "corrections": self.reading.corrections()}
 
     def opening_words(self) -> list[str]:
         """Return the options that were given, as another verb takes them."""

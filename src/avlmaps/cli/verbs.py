@@ -11,7 +11,7 @@ from functools import cache
 from importlib import import_module
 from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, Union, get_type_hints
+from typing import Annotated, Any, TypeVar, Union, get_type_hints
 
 import tyro
 
@@ -40,10 +40,6 @@ _KNOWN = {
 _OWN = tuple(name for name, file in _KNOWN.items() if file)
 
 
-if TYPE_CHECKING:
-    VERBS: dict[str, type[Verb]]
-
-
 def _own(name: str) -> type[Verb]:
     return getattr(import_module(f"avlmaps.cli.{_KNOWN[name]}"), name.title().replace("-", ""))
 
@@ -61,12 +57,6 @@ def installed() -> tuple[dict[str, type[Verb]], dict[str, str]]:
         missing[name] = f"The verb {name} is not installed; get it with: {how_to_get('verbs', name)}"
     ordered = {name: found[name] for name in (*_KNOWN, *sorted(found)) if name in found}
     return ordered, missing
-
-
-def __getattr__(name: str) -> Any:
-    if name == "VERBS":  # those of other packages are loaded when the list is needed
-        return installed()[0]
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def read_command(words: Sequence[str]) -> Verb:

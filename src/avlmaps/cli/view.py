@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from socket import socket
 
-    from avlmaps.query.avlmap import AVLMap
     from avlmaps.serve.service import Service
     from avlmaps.serve.settings import ServeSettings
 
@@ -62,9 +61,11 @@ class View(Asking, MapVerb):
     def run(self) -> None:
         _require_fitting(self)
         if self.out is not None:
+            from avlmaps.query.avlmap import AVLMap
             from avlmaps.view.page import write_page
 
-            answer = write_page(self.out, _maps(self), self.questions)
+            maps = [AVLMap.open(path, self.query_settings()) for path in (self.map, self.other) if path is not None]
+            answer = write_page(self.out, maps, self.questions)
             emit(answer, _lines(answer), self.json)
         else:
             _serve(self)
@@ -81,13 +82,6 @@ def _require_fitting(verb: View) -> None:
         raise UsageError(f"--out takes a file that ends in .html; {verb.out.name!r} does not.")
     if verb.out.exists() and not verb.overwrite:
         raise UsageError(f"{verb.out} exists; give another --out, or replace it with --overwrite.")
-
-
-def _maps(verb: View) -> "list[AVLMap]":
-    from avlmaps.query.avlmap import AVLMap
-
-    settings = verb.query_settings()
-    return [AVLMap.open(path, settings) for path in (verb.map, verb.other) if path is not None]
 
 
 def _lines(answer: dict[str, Any]) -> list[str]:

@@ -6,10 +6,8 @@ is stored beside the map and never in it.
 Everything is in the level frame. A grid's cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_size_m``.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import atan2, cos, sin
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import cv2
@@ -31,8 +29,7 @@ DRONE = BodyShape(radius_m=0.25, height_m=1.6, flies_m=1.0, ignores=("table",))
 """A small drone at the height of a person's chest: it flies over tables, and what is called a table stops it not."""
 WALKER = BodyShape(radius_m=0.25, height_m=1.8, step_m=0.2, climbs=True)
 """A person or a legged robot: it takes stairs."""
-SHAPES: Mapping[str, BodyShape] = MappingProxyType({"base": BASE, "drone": DRONE})
-"""The shapes by name."""
+SHAPES = {"base": BASE, "drone": DRONE}
 _LOST_M = 0.002  # a movement must fall short by this to show where it was stopped
 _WIDER_RAD = (0.0, 0.5, -0.5, 1.0, -1.0)  # how far beside the likeliest point it looks for one that can be
 _FAR_CELLS = 2.0**40  # farther off no grid reaches
@@ -180,18 +177,12 @@ def costmap_of(obstacles: Obstacles, radius_m: float, contacts: Bool[np.ndarray,
     cost = 1.0 + np.float32(_NEAR_COST) * lacking * lacking
     cost[holes] += np.float32(_HOLE_COST)
     tall = obstacles.tall
+    opaque = occupied if tall is None else (tall & (obstacles.states != CellState.FREE)) | touched
     return Costmap(
-        origin_m=np.asarray(obstacles.origin_m, np.float64),
-        cell_size_m=cell_m,
-        radius_m=radius_m,
-        passable=(free | holes) & (room_m >= radius_m),
-        cost=cost.astype(np.float32),
-        room_m=room_m,
-        occupied=occupied,
-        opaque=occupied if tall is None else (tall & (obstacles.states != CellState.FREE)) | touched,
-        free=free,
+        np.asarray(obstacles.origin_m, np.float64), cell_m, radius_m, passable=(free | holes) & (room_m >= radius_m),
+        cost=cost.astype(np.float32), room_m=room_m, occupied=occupied, opaque=opaque, free=free,
         known=free | holes | occupied,
-    )
+    )  # fmt: skip
 
 
 def _distance(mask: Bool[np.ndarray, "nx ny"]) -> Float32[np.ndarray, "nx ny"]:

@@ -33,7 +33,7 @@ _OFF_M, _OFF_SHARE = 0.25, 0.2  # a straight drive that ends farther off, in met
 TOLERANCE_M = 0.15
 """A robot has arrived when it stands no farther from where it is to stop."""
 _MOST_PLANS, _MOST_MOVEMENTS = 40, 5_000  # after which it gives up a place; each contact takes a plan
-T = TypeVar("T")
+T = TypeVar("T", GroundPose, Moved)
 
 
 @runtime_checkable
@@ -122,19 +122,15 @@ class MapDriver:
     def __init__(self, obstacles: Obstacles, body: Body, shape: BodyShape = BASE) -> None:
         self.obstacles, self.body, self.shape = obstacles, body, shape
         self.contacts = ContactMap(obstacles, shape.radius_m)
-        self._last = self._of_body("say where it is", lambda: _posed(body.pose))
+        self._last = self._of_body("say where it is", lambda: body.pose)
         self.contacts.mark_free(self._last)
         self.held: Callable[[], str] = lambda: ""
         self._planner: Planner | None = None  # of the obstacles known by now; None where one came since
 
     @property
     def pose(self) -> GroundPose:
-        """Where the body is.
-
-        Raises:
-            NavigationError: it fails to say so.
-        """
-        self._last = self._of_body("say where it is", lambda: _posed(self.body.pose))
+        """Where the body is; ``NavigationError`` where it fails to say so."""
+        self._last = self._of_body("say where it is", lambda: self.body.pose)
         return self._last
 
     @property
@@ -260,7 +256,11 @@ class MapDriver:
 
     def _of_body(self, do: str, call: Callable[[], T]) -> T:
         try:
-            return call()
+            answer = call()
+            pose = getattr(answer, "pose", answer)
+            if not isinstance(pose, GroundPose):
+                raise TypeError(f"{type(pose).__name__} is no GroundPose")
+            return answer
         except Exception as fault:
             why = f"{type(fault).__name__}: {printable(fault, 200)}"
             raise NavigationError(f"The body failed to {do} ({why}); it may still move: use its own stop.") from fault
@@ -370,7 +370,7 @@ class MapDriver:
             trip.fault = why
             return False
         before = self.pose
-        moved = self._of_body("move", lambda: _moved(self.body.act(action)))
+        moved = self._of_body("move", lambda: self.body.act(action))
         trip.actions.append(action)
         planned = before.after(action)
         return self._noted(trip, before, planned, moved)
@@ -400,14 +400,3 @@ class MapDriver:
         if planned_m and self.contacts.mark_contact(before, planned, moved.pose):
             self._planner = None
         return False
-
-
-def _posed(pose: GroundPose) -> GroundPose:
-    if not isinstance(pose, GroundPose):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise TypeError(f"{type(pose).__name__} is no GroundPose")
-    return pose
-
-
-def _moved(moved: Moved) -> Moved:
-    _posed(moved.pose)
-    return moved

@@ -174,10 +174,8 @@ def _absence(factor: Factor) -> str:
 class Seeker:
     """Finds in a map what a program means.
 
-    Attributes:
-        notes: what a person should know: words half understood, guesses.
-        heats: what the map answered; another seeker on the same map need not ask again.
-        choices: the things that fitted equally where the last error asks which is meant.
+    ``notes`` are what a person should know: words half understood, guesses; ``choices`` the things that fitted equally
+    where the last error asks which is meant.
     """
 
     def __init__(
@@ -190,7 +188,7 @@ class Seeker:
         heats: Heats | None = None,
         choose: Sequence[int] | None = (),
     ) -> None:
-        """Take a map, a function for each note, the storey that the robot is on, and what the map answered before.
+        """Take a map, a function for each note, the robot's storey, and ``heats``, what the map answered before.
 
         ``choose`` answers which of several things that fit equally is meant, one number from 1 for each name in the
         order of the program. None: the best or the nearest, without a question.
@@ -208,14 +206,10 @@ class Seeker:
     def heat(
         self, skill: str, obj: object, sound: object, img: object, area: object, at: object, *, primary: bool
     ) -> Heatmap:
-        """Return the heatmap of the one thing that is given.
+        """Return the heatmap of the one thing that is given; ``primary`` is what is sought itself.
 
-        Of a sound ``at`` says ``robot`` or ``source``; the map's settings overrule it. ``primary`` is what is sought
-        itself.
-
-        Raises:
-            ProgramError: not exactly one is given, it is of the wrong kind, or it has no such place.
-            QueryError: the map cannot answer the query.
+        Of a sound ``at`` says ``robot`` or ``source``; the map's settings overrule it. ``ProgramError`` says that not
+        exactly one is given, or of another kind; ``QueryError`` that the map cannot answer.
         """
         given = {"obj": obj, "sound": sound, "img": img, "area": area}
         named = [name for name, value in given.items() if value is not None]

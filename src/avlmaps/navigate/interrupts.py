@@ -21,29 +21,19 @@ UNCONFIRMED_STATUS = 3
 
 @dataclass(frozen=True, slots=True)
 class Halt:
-    """How a robot stands after an interrupt.
+    """How a robot stands after an interrupt."""
 
-    Attributes:
-        stopped: whether it confirmed that no goal of ours is active, and is seen to stand.
-        note: how that is known, or what is not, in part of a sentence.
-    """
-
-    stopped: bool
-    note: str
+    stopped: bool  # whether it confirmed that no goal of ours is active, and is seen to stand
+    note: str  # how that is known, or what is not, in part of a sentence
 
 
 class Interrupted(KeyboardInterrupt):
-    """A signal asks to stop.
-
-    Attributes:
-        name: of the signal, such as SIGTERM.
-        halt: how the robot stands; None where no robot was reached yet.
-    """
+    """A signal asks to stop."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
         self.number, self.name = number, signal.Signals(number).name
-        self.halt: Halt | None = None
+        self.halt: Halt | None = None  # how the robot stands; None where no robot was reached yet
 
     @property
     def status(self) -> int:
@@ -60,7 +50,7 @@ class Interrupted(KeyboardInterrupt):
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Return the object that the command line prints under --json."""
+        """Return it as --json prints it."""
         stopped = None if self.halt is None else self.halt.stopped
         return {"ok": False, "error": str(self), "signal": self.name, "robot_stopped": stopped}
 
@@ -96,7 +86,6 @@ class _Raiser:
     """
 
     def __init__(self) -> None:
-        """Hear of each signal, in a thread of its own."""
         self._raised_s = float("-inf")
         self._main, self._gate, self._closed = threading.get_ident(), threading.Lock(), False
         self._ear, self._bell = socket.socketpair()
@@ -115,7 +104,6 @@ class _Raiser:
         return now_s - self._raised_s < _LONGEST_STOP_S
 
     def _dropped(self, unraisable: "sys.UnraisableHookArgs") -> None:
-        """Hear of an exception that the interpreter dropped."""
         if not isinstance(unraisable.exc_value, Interrupted):
             self._usual_hook(unraisable)
             return

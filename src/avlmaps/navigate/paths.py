@@ -99,8 +99,7 @@ class PathFinder:
     def between(self, start: Spot, place: Spot) -> Route | None:
         """Return where a body that comes from a start stops for a place, and the path to it; None where there is none.
 
-        Raises:
-            MapError: the map holds too little to find a floor.
+        Like all that plans, it raises ``MapError`` where the map holds too little to find a floor.
         """
         storeys = self.avlmap.storeys
         if storeys is None or start.storey == place.storey:
@@ -133,12 +132,7 @@ class PathFinder:
         return Route(stop, points, way.length_m, way.cost, (start.storey,))
 
     def answer(self, start: Float[np.ndarray, " n"], place: Float[np.ndarray, " n"]) -> PathAnswer:
-        """Return the path between two places as JSON; see ``spot`` for the numbers of a place.
-
-        Raises:
-            NavigationError: a coordinate is not finite.
-            MapError: the map holds too little to find a floor.
-        """
+        """Return the path between two places as JSON; see ``spot`` for the numbers of a place."""
         if not (np.isfinite(start).all() and np.isfinite(place).all()):
             raise NavigationError("A coordinate is not a finite number; give metres, such as 1.5,2.0.")
         one, other = self.spot(start), self.spot(place)
@@ -216,8 +210,7 @@ class NearGoalsAnswer(TypedDict):
 def goals_near(finder: PathFinder, answer: Answer, near: Float[np.ndarray, " n"], top: int = 3) -> NearGoalsAnswer:
     """Return the goals of an answer by the length of the path to each; those that no path reaches come last.
 
-    Goals of half the best score and less are left out: near and wrong helps nobody. ``near`` is where the body is; see
-    ``PathFinder.spot``. It raises ``MapError`` where the map holds too little to find a floor.
+    Goals of half the best score and less are left out: near and wrong helps nobody. ``near`` is where the body is.
     """
     start = finder.spot(near)
     likely = [goal for goal in answer.goals if goal.score >= 0.5 * answer.goals[0].score]

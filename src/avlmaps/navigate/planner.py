@@ -213,7 +213,11 @@ class Planner:
         ends = np.array([self.costmap.in_cells(out), self.costmap.in_cells(goal)])
         between = self._cells.path(self.costmap.cell_of(out), self.costmap.cell_of(goal)) + 0.5
         corners = np.concatenate([ends[:1], between, ends[1:]])
-        return self._measured(self._straightened(corners), None if out is start else start)
+        step = np.round(np.diff(corners, axis=0), 6)
+        turns = np.r_[True, (step[1:] != step[:-1]).any(axis=1), True]
+        turns |= np.arange(len(corners)) % _EVERY == 0
+        points = straightened(corners[turns], self.costmap.passable, self.costmap.cost)
+        return self._measured(points, None if out is start else start)
 
     def entry(self, start: Float[np.ndarray, "2"], part: int | None = None) -> Float64[np.ndarray, "2"] | None:
         """Return where a body joins the cells that can be passed (of a part): at the place itself where it can."""
@@ -269,17 +273,9 @@ class Planner:
         order = order[distance_m[order] <= reach_m]
         return cells[order], distance_m[order]
 
-    def _straightened(self, corners: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
-        passable, cost = self.costmap.passable, self.costmap.cost
-        step = np.round(np.diff(corners, axis=0), 6)
-        turns = np.r_[True, (step[1:] != step[:-1]).any(axis=1), True]
-        turns |= np.arange(len(corners)) % _EVERY == 0
-        return straightened(corners[turns], passable, cost)
-
     def _measured(self, points: Float[np.ndarray, "n 2"], before: Float[np.ndarray, "2"] | None) -> PlannedPath:
         costmap = self.costmap
-        passable, cells_cost = costmap.passable, costmap.cost
-        cost = line_costs(points[:-1], points[1:], passable, cells_cost).sum()
+        cost = line_costs(points[:-1], points[1:], costmap.passable, costmap.cost).sum()
         xy = costmap.origin_m + points * costmap.cell_size_m
         if before is not None:
             xy = np.concatenate([[before], xy])

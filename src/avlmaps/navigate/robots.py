@@ -49,11 +49,8 @@ class RealRobot(Protocol):
     def __call__(self, obstacles: "Obstacles") -> RobotDriver:
         """Connect, with a guard that cancels the robot's goals when this process dies.
 
-        Goals are moved to where the robot can stand among the map's obstacles.
-
-        Raises:
-            NavigationError: it cannot be reached, or does not know where it is.
-            BackendError: what the connection needs is not installed.
+        Goals are moved to where the robot can stand among the map's obstacles. It raises ``NavigationError`` where the
+        robot cannot be reached, or does not know where it is, ``BackendError`` where a package is missing.
         """
         ...
 
@@ -86,11 +83,7 @@ class RobotScene(Protocol):
 
 
 def open_robot_scene(name: str) -> RobotScene:
-    """Open a scene by its name, such as ``house:7``.
-
-    Raises:
-        AvlmapsError: there is no such scene, or nothing that opens scenes is installed.
-    """
+    """Open a scene by its name, such as ``house:7``; ``AvlmapsError`` where there is none, or no simulator."""
     for entry in entry_points(SCENES_GROUP):
         return brought(entry, "the simulator", NavigationError)(name)
     get = install_command(distribution=SIMULATOR.name)

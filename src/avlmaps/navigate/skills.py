@@ -236,11 +236,8 @@ class Robot:
         """Drive to the middle between the nearest points of two things."""
         first, second = self.seeker.pair(a, b, self._here)
         middle = middle_between(first.outline, second.outline)
-        both = Destination(
-            f"between {first.name or 'a place'} and {second.name or 'a place'}",
-            Outline.at(middle),
-            self._on_floor(middle, first, second),
-        )
+        name = f"between {first.name or 'a place'} and {second.name or 'a place'}"
+        both = Destination(name, Outline.at(middle), self._on_floor(middle, first, second))
         self._go("move_in_between", both, both.place)
 
     def move_to_left(self, target: Target, distance_m: float = 0.5) -> None:

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Float32, Int, UInt8
+from jaxtyping import Float32, Int, UInt8
 from msgspec import Meta
 
 from avlmaps.core.poses import FRAME
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from avlmaps.query.avlmap import AVLMap
     from avlmaps.serve.shelf import ServedMap
 
 SIDE = 64
@@ -109,11 +108,6 @@ class Pyramid:
         self.levels = [Level.of(index, rgb, 0)]
         while len(self.levels[-1].index) > _COARSE and len(self.levels) < _MOST_LEVELS:
             self.levels.append(Level.of(index, rgb, len(self.levels)))
-
-    @classmethod
-    def of(cls, avlmap: "AVLMap") -> "Pyramid":
-        """Return the pyramid of a map."""
-        return cls(avlmap.space.index, avlmap.colors, avlmap.space.grid.voxel_size_m)
 
     def index(self, version: str) -> TilesAnswer:
         """Return the list of tiles."""
@@ -184,7 +178,8 @@ def small_picture(
     ground = np.where(view.seen[..., None], 0.72 * view.rgb + 0.28 * 255.0, 246.0)
     if answer is not None and answer.heat is not None:
         heat = view.heat(answer.heat.shown)[..., None]
-        colour = _heat_colours(heat[..., 0])
+        levels = np.clip(255.0 * (0.15 + 0.8 * heat[..., 0]), 0, 255).astype(np.uint8)
+        colour = cv2.applyColorMap(levels, cv2.COLORMAP_INFERNO)[..., ::-1].astype(np.float64)
         opacity = 0.85 * np.power(heat / max(float(heat.max(initial=0.0)), 1e-9), 0.8)
         ground = ground * (1.0 - opacity) + colour * opacity
     left, _, bottom, _ = view.extent
@@ -209,8 +204,3 @@ def _mark(picture: UInt8[np.ndarray, "h w 3"], at: tuple[int, int], text: str) -
     (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.4, 1)
     corner = at[0] - width // 2, at[1] + height // 2
     cv2.putText(picture, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.4, (255, 255, 255), 1, cv2.LINE_AA)
-
-
-def _heat_colours(heat: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w 3"]:
-    levels = np.clip(255.0 * (0.15 + 0.8 * heat), 0, 255).astype(np.uint8)
-    return cv2.applyColorMap(levels, cv2.COLORMAP_INFERNO)[..., ::-1].astype(np.float64)

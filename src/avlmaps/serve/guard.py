@@ -100,10 +100,8 @@ class AccessGuard:
         if not self._is_ours(host):
             raise RequestError(
                 "The Host header names no host of this server; connect by its own name or address, or start it with "
-                f"{flag('allow-host', 'NAME')}.",
-                421,
-                "host",
-            )
+                f"{flag('allow-host', 'NAME')}.", 421, "host",
+            )  # fmt: skip
         self._check_site(request, host)
         if self._token is None or path in _OPEN_PATHS:
             return None
@@ -131,11 +129,10 @@ class AccessGuard:
             return False
 
     def _check_site(self, request: Request, host: str) -> None:
-        same = urlsplit(_header(request, "origin")).netloc.lower() == host.lower()
+        other = urlsplit(_header(request, "origin")).netloc.lower() != host.lower()
         site, mode = _header(request, "sec-fetch-site"), request.headers.get("sec-fetch-mode", "navigate")
-        if not (same or "origin" not in request.headers) or (
-            site in ("cross-site", "same-site") and mode != "navigate"
-        ):
+        by_page = site in ("cross-site", "same-site") and mode != "navigate"
+        if by_page or (other and "origin" in request.headers):
             raise RequestError("Pages of other sites may not use this server.", 403, "origin")
 
     def _is_token(self, given: str) -> bool:
@@ -147,11 +144,8 @@ class AccessGuard:
         if not (scheme.lower() == "bearer" and self._is_token(given.strip())) and not self._is_token(kept):
             raise RequestError(
                 "This server needs a token; send the header 'Authorization: Bearer TOKEN', or add ?token=TOKEN to the "
-                "address in a browser.",
-                401,
-                "token",
-                WWW_Authenticate='Bearer realm="avlmaps"',
-            )
+                "address in a browser.", 401, "token", WWW_Authenticate='Bearer realm="avlmaps"',
+            )  # fmt: skip
 
 
 class _LimitedBody:

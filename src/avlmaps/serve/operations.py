@@ -10,17 +10,8 @@ import msgspec
 
 from avlmaps.core.version import __version__
 from avlmaps.navigate.paths import PathAnswer
+from avlmaps.query import schema as answers
 from avlmaps.query.places import PlaceAnswer
-from avlmaps.query.schema import (
-    ChangesAnswer,
-    ContentsAnswer,
-    EditsAnswer,
-    ErrorAnswer,
-    LocateAnswer,
-    QueryAnswer,
-    RoomsAnswer,
-    SourcesAnswer,
-)
 from avlmaps.serve import requests as ask
 from avlmaps.serve import work
 from avlmaps.serve.drawn import TilesAnswer
@@ -53,7 +44,7 @@ OPERATIONS = (
     Operation("describeMap", "", "Describe a map, as `avlmaps info` does.",
               ask.NoQuery, dict, work.describe_map, slow=True),
     Operation("listContents", "/contents", "List things, sounds and rooms, as `avlmaps things` does.",
-              ask.ThingsQuery, ContentsAnswer, work.list_contents, slow=True),
+              ask.ThingsQuery, answers.ContentsAnswer, work.list_contents, slow=True),
     Operation("listThings", "/things", "List the things of a map, a room or a day, or near a place; a page of them.",
               ask.ListedThingsQuery, work.ListedThingsAnswer, work.list_things, slow=True),
     Operation("listSounds", "/sounds", "List the sounds of a map.",
@@ -61,15 +52,15 @@ OPERATIONS = (
     Operation("getSound", "/sounds/{sound}/clip", "Return the clip of a sound, counted from 0.",
               ask.SoundQuery, "audio/flac", work.sound_clip, slow=True),
     Operation("listRooms", "/rooms", "List the rooms of a map, as `avlmaps rooms` does.",
-              ask.RoomsQuery, RoomsAnswer, work.list_rooms, slow=True),
+              ask.RoomsQuery, answers.RoomsAnswer, work.list_rooms, slow=True),
     Operation("listSources", "/sources", "List where the sounds came from, as `avlmaps sources` does.",
-              ask.SourcesQuery, SourcesAnswer, work.list_sources, slow=True),
+              ask.SourcesQuery, answers.SourcesAnswer, work.list_sources, slow=True),
     Operation("listChanges", "/changes", "List what is new, moved and gone since a day, as `avlmaps changes` does.",
-              ask.ChangesQuery, ChangesAnswer, work.list_changes, slow=True),
+              ask.ChangesQuery, answers.ChangesAnswer, work.list_changes, slow=True),
     Operation("listEdits", "/edits", "List what people corrected, as `avlmaps edit --list` does.",
-              ask.NoQuery, EditsAnswer, work.list_edits, slow=True),
+              ask.NoQuery, answers.EditsAnswer, work.list_edits, slow=True),
     Operation("editMap", "/edit", "Correct the map, as `avlmaps edit` does; later queries know it.",
-              ask.EditQuery, EditsAnswer, work.edit, slow=True, methods=_POST),
+              ask.EditQuery, answers.EditsAnswer, work.edit, slow=True, methods=_POST),
     Operation("describe_map", None, "Start here: floors, kinds of room, and how many things of each name.",
               ask.NoQuery, dict, work.describe_building, slow=True, tool="describe_map"),
     Operation("list_rooms", None, "List the rooms, each with the number of its things.",
@@ -79,12 +70,12 @@ OPERATIONS = (
     Operation("list_sounds", None, "List recorded sounds: name, time, the robot's position then.",
               ask.SoundsToolQuery, dict, work.tool_sounds, slow=True, tool="list_sounds"),
     Operation("ask", "/ask", "Query a map in a sentence or part by part, as `avlmaps query` does.",
-              ask.AskQuery, QueryAnswer, work.ask, methods=_BOTH, files=_FILES, tool="ask",
+              ask.AskQuery, answers.QueryAnswer, work.ask, methods=_BOTH, files=_FILES, tool="ask",
               brief="Find places by a sentence, or by parts (object, sound, area, photo, clip). With found=false goals "
               "are guesses."),
     Operation("locate", "/locate", "Return the camera pose of a photo, as `avlmaps locate` does.",
-              ask.LocateQuery, LocateAnswer, work.locate, slow=True, methods=_POST, files=_FILES[:1], needs=_FILES[:1],
-              tool="locate_photo", brief="Return the pose of the camera that took a photo here."),
+              ask.LocateQuery, answers.LocateAnswer, work.locate, slow=True, methods=_POST, files=_FILES[:1],
+              needs=_FILES[:1], tool="locate_photo", brief="Return the pose of the camera that took a photo here."),
     Operation("describePlace", "/place", "Return what is at a place.",
               ask.PlaceQuery, PlaceAnswer, work.place, tool="describe_place",
               brief="Return what is at a place: names, kind of room, last seen."),
@@ -149,12 +140,12 @@ def document(
     }  # fmt: skip
     every = [("/maps/{map}", one) for one in OPERATIONS if one.path is not None]
     every += [(mount, one) for mount, operations in mounts.items() for one in operations if one.path is not None]
-    types = [work.MapsAnswer, ErrorAnswer]
+    types = [work.MapsAnswer, answers.ErrorAnswer]
     types += [one.answer for _, one in every if isinstance(one.answer, type) and one.answer is not dict]
     types = list(dict.fromkeys(types))
     schemas, components = msgspec.json.schema_components(types, ref_template="#/components/schemas/{name}")
     of = {dict: {"type": "object"}, **dict(zip(types, schemas, strict=True))}
-    errors = {status: _content(about, of[ErrorAnswer]) for status, about in _ERRORS.items()}
+    errors = {status: _content(about, of[answers.ErrorAnswer]) for status, about in _ERRORS.items()}
     paths["/maps"]["get"]["responses"] = {"200": _content("The maps.", of[work.MapsAnswer]), **errors}
     named = {"name": "map", "in": "path", "required": True, "schema": {"type": "string", "examples": list(maps)}}
     for mount, one in every:

@@ -77,23 +77,20 @@ class ThingsQuery(Request):
     structure: Annotated[bool, Meta(description="walls and floors too")] = False
 
 
-class ListedThingsQuery(ThingsQuery):
-    """Which things are listed, in which order, and how many at once."""
-
-    room: Annotated[Name | None, Meta(description="one, or all of a kind")] = None
-    near: Annotated[Name | None, Meta(description="x,y,z, level x,y, or a thing's name: nearest first")] = None
-    top: Annotated[Page | None, Meta(description="most things of a page; all by default")] = None
-    page: Page = 1
-    at: Annotated[Short | None, Meta(description=f"of a map of several days: {_DAY}")] = None
-
-
 class ThingsToolQuery(ThingsQuery):
     """Which things an agent reads."""
 
     room: Annotated[Name | None, Meta(description="one, or all of a kind")] = None
-    near: Annotated[Name | None, Meta(description="x,y,z or a thing's name: nearest first")] = None
+    near: Annotated[Name | None, Meta(description="x,y,z, level x,y, or a thing's name: nearest first")] = None
     top: Top = 10
     page: Page = 1
+
+
+class ListedThingsQuery(ThingsToolQuery):
+    """Which things are listed, in which order, and how many at once."""
+
+    top: Annotated[Page | None, Meta(description="most things of a page; all by default")] = None
+    at: Annotated[Short | None, Meta(description=f"of a map of several days: {_DAY}")] = None
 
 
 class RoomsQuery(Request):
@@ -384,10 +381,8 @@ def decode_photo(content: bytes, limits: Limits) -> UInt8[np.ndarray, "h w 3"]:
 
     size = encoded_size(content)
     if size is not None and not 0 < size[0] * size[1] <= limits.picture_pixels:
-        raise RequestError(
-            f"The photo has {size[0]}x{size[1]} pixels; photos have 1 to {limits.picture_pixels:,}. Send a smaller.",
-            413, "photo",
-        )  # fmt: skip
+        most = f"{limits.picture_pixels:,}"
+        raise RequestError(f"The photo has {size[0]}x{size[1]} pixels; send one of 1 to {most}.", 413, "photo")
     # The pose is that of the picture as its pixels lie, so a camera's turn flag must not rotate it.
     bgr = None
     with suppress(RecordingError):

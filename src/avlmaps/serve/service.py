@@ -156,20 +156,11 @@ def run_http(
 
     settings = service.settings
     config = uvicorn.Config(
-        app,
-        log_config=None,
-        log_level=logging.WARNING,
-        access_log=False,
-        server_header=False,
-        proxy_headers=False,
-        ws="none",
-        limit_concurrency=settings.limits.connections,
-        timeout_keep_alive=30,
-        timeout_graceful_shutdown=round(settings.limits.shutdown_s),
-        ssl_certfile=settings.tls_certificate,
+        app, log_config=None, log_level=logging.WARNING, access_log=False, server_header=False, proxy_headers=False,
+        ws="none", lifespan="on", limit_concurrency=settings.limits.connections, timeout_keep_alive=30,
+        timeout_graceful_shutdown=round(settings.limits.shutdown_s), ssl_certfile=settings.tls_certificate,
         ssl_keyfile=settings.tls_key,
-        lifespan="on",
-    )
+    )  # fmt: skip
     try:
         config.load()
     except (OSError, ssl.SSLError) as error:

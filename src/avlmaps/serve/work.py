@@ -20,34 +20,12 @@ from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable_json, shortened
 from avlmaps.navigate.costmap import WALKER
 from avlmaps.navigate.paths import PathAnswer, PathFinder, goals_near
+from avlmaps.query import schema, selection
 from avlmaps.query.answer import Answer
 from avlmaps.query.editor import edit_text
 from avlmaps.query.modalities.image import Photo
 from avlmaps.query.places import PlaceAnswer, column_point, describe_place, last_seen, place_of
-from avlmaps.query.schema import (
-    ChangesAnswer,
-    ContentsAnswer,
-    EditsAnswer,
-    Frame,
-    LocateAnswer,
-    Notes,
-    QueryAnswer,
-    RoomsAnswer,
-    SoundAnswer,
-    SourcesAnswer,
-    locate_answer,
-)
-from avlmaps.query.selection import (
-    MapLists,
-    ThingsPage,
-    Wanted,
-    beyond,
-    map_answer,
-    page_of,
-    page_of_things,
-    selected,
-    things_with_rooms,
-)
+from avlmaps.query.selection import MapLists, Wanted
 from avlmaps.query.words import unknown_note
 from avlmaps.serve import requests
 from avlmaps.serve.drawn import Pyramid, TilesAnswer, full_picture, map_picture, small_picture
@@ -95,20 +73,20 @@ class MapsAnswer(TypedDict):
     maps: list[MapEntry]
 
 
-class ListedThingsAnswer(ThingsPage):
+class ListedThingsAnswer(selection.ThingsPage):
     """A page of the things that are meant, most confident or nearest first."""
 
     map: str
-    frame: Frame
+    frame: schema.Frame
 
 
 class SoundsAnswer(TypedDict):
     """Sounds of a map in the order of their onset."""
 
     map: str
-    frame: Frame
-    sounds: list[SoundAnswer]
-    notes: NotRequired[Notes]
+    frame: schema.Frame
+    sounds: list[schema.SoundAnswer]
+    notes: NotRequired[schema.Notes]
 
 
 def list_maps(shelf: Shelf) -> MapsAnswer:
@@ -131,7 +109,7 @@ def _entry(one: ServedMap, stale: bool) -> MapEntry:
 
 
 def describe_map(task: WorkInput, query: requests.NoQuery) -> dict[str, Any]:
-    described = map_answer(task.map.avlmap)
+    described = selection.map_answer(task.map.avlmap)
     notices = [without_folders(notice) for notice in described["notices"]]  # they name the recording's files
     return {**described, "path": task.map.name, "notices": notices}
 
@@ -140,9 +118,9 @@ def lists_of(task: WorkInput) -> MapLists:
     return MapLists(task.map.avlmap, task.map.once, task.watch.step)
 
 
-def list_contents(task: WorkInput, query: requests.ThingsQuery) -> ContentsAnswer:
+def list_contents(task: WorkInput, query: requests.ThingsQuery) -> schema.ContentsAnswer:
     lists = lists_of(task)
-    answer: ContentsAnswer = {
+    answer: schema.ContentsAnswer = {
         "map": task.map.name,
         "frame": FRAME,
         "things": lists.things(query.least, query.name, query.structure),
@@ -152,7 +130,7 @@ def list_contents(task: WorkInput, query: requests.ThingsQuery) -> ContentsAnswe
     return _noted(task, answer)
 
 
-Noted = TypeVar("Noted", ContentsAnswer, ListedThingsAnswer, SoundsAnswer, RoomsAnswer)
+Noted = TypeVar("Noted", schema.ContentsAnswer, ListedThingsAnswer, SoundsAnswer, schema.RoomsAnswer)
 
 
 def _noted(task: WorkInput, answer: Noted) -> Noted:
@@ -163,7 +141,7 @@ def _noted(task: WorkInput, answer: Noted) -> Noted:
 
 
 def list_things(task: WorkInput, query: requests.ListedThingsQuery) -> ListedThingsAnswer:
-    page = page_of_things(lists_of(task), Wanted(**msgspec.structs.asdict(query)))
+    page = selection.page_of_things(lists_of(task), Wanted(**msgspec.structs.asdict(query)))
     return _noted(task, ListedThingsAnswer(map=task.map.name, frame=FRAME, **page))
 
 
@@ -171,24 +149,24 @@ def list_sounds(task: WorkInput, query: requests.NoQuery) -> SoundsAnswer:
     return _noted(task, SoundsAnswer(map=task.map.name, frame=FRAME, sounds=lists_of(task).sounds()))
 
 
-def list_rooms(task: WorkInput, query: requests.RoomsQuery) -> RoomsAnswer:
-    return _noted(task, RoomsAnswer(map=task.map.name, frame=FRAME, rooms=lists_of(task).rooms(query.least)))
+def list_rooms(task: WorkInput, query: requests.RoomsQuery) -> schema.RoomsAnswer:
+    return _noted(task, schema.RoomsAnswer(map=task.map.name, frame=FRAME, rooms=lists_of(task).rooms(query.least)))
 
 
-def list_sources(task: WorkInput, query: requests.SourcesQuery) -> SourcesAnswer:
+def list_sources(task: WorkInput, query: requests.SourcesQuery) -> schema.SourcesAnswer:
     found = task.map.avlmap.sources(query.sound, prior=query.prior == "lexicon", least=query.least)
     return {"map": task.map.name, "frame": FRAME, "sources": [one.to_json() for one in found]}
 
 
-def list_changes(task: WorkInput, query: requests.ChangesQuery) -> ChangesAnswer:
+def list_changes(task: WorkInput, query: requests.ChangesQuery) -> schema.ChangesAnswer:
     return {**task.map.avlmap.changes(query.since, first_seen=query.first_seen), "map": task.map.name}
 
 
-def list_edits(task: WorkInput, query: requests.NoQuery) -> EditsAnswer:
+def list_edits(task: WorkInput, query: requests.NoQuery) -> schema.EditsAnswer:
     return {**task.map.avlmap.edit.history(), "map": task.map.name}
 
 
-def edit(task: WorkInput, query: requests.EditQuery) -> EditsAnswer:
+def edit(task: WorkInput, query: requests.EditQuery) -> schema.EditsAnswer:
     editor = task.map.avlmap.as_edited_now().edit
     name = (query.edit if query.does == "undo" else query.name) or ""
     made = editor.make(
@@ -205,35 +183,25 @@ def sound_clip(task: WorkInput, query: requests.SoundQuery) -> File:
     try:
         content = sounds.clips[number].read_bytes()
     except FileNotFoundError:
-        raise RequestError(
-            "The map is being replaced and its old clips are gone; try again in a second.", 503
-        ) from None
+        raise RequestError("The map is being replaced, its old clips are gone; try again in a second.", 503) from None
     return File(content, "audio/flac")
 
 
 def ask_map(task: WorkInput, query: requests.AskQuery) -> Answer:
     attachments = requests.attachments(task.files, task.limits)
+    photo, clip = (name if name in attachments else None for name in (requests.PHOTO, requests.CLIP))
+    camera = None if query.intrinsics is None else intrinsics_of(query.intrinsics)
     return task.map.avlmap.ask(
-        query.sentence or "",
-        min(query.top, task.limits.goals),
-        None if query.intrinsics is None else intrinsics_of(query.intrinsics),
-        attachments,
-        object=query.object,
-        sound=query.sound,
-        area=query.area,
-        image=requests.PHOTO if requests.PHOTO in attachments else None,
-        clip=requests.CLIP if requests.CLIP in attachments else None,
-        primary=query.primary,
-        at=query.at,
-        near=query.near,
-    )
+        query.sentence or "", min(query.top, task.limits.goals), camera, attachments, object=query.object,
+        sound=query.sound, area=query.area, image=photo, clip=clip, primary=query.primary, at=query.at, near=query.near,
+    )  # fmt: skip
 
 
-def ask(task: WorkInput, query: requests.AskQuery) -> QueryAnswer:
+def ask(task: WorkInput, query: requests.AskQuery) -> schema.QueryAnswer:
     return ask_map(task, query).to_dict()
 
 
-def locate(task: WorkInput, query: requests.LocateQuery) -> LocateAnswer:
+def locate(task: WorkInput, query: requests.LocateQuery) -> schema.LocateAnswer:
     photo = requests.attachments(task.files, task.limits).get(requests.PHOTO)
     if not isinstance(photo, Photo):
         raise RequestError("There is no photo; send one as the file 'photo' of a form, or as the body.")
@@ -241,7 +209,7 @@ def locate(task: WorkInput, query: requests.LocateQuery) -> LocateAnswer:
     camera = None if query.intrinsics is None else Pinhole(*intrinsics_of(query.intrinsics), **size)
     task.watch.step("locating")
     found = task.map.avlmap.locate(photo.rgb, camera, None if camera is not None else photo.focal_35mm)
-    return locate_answer(found, task.map.avlmap.data.info.doubts)
+    return schema.locate_answer(found, task.map.avlmap.data.info.doubts)
 
 
 def place(task: WorkInput, query: requests.PlaceQuery) -> PlaceAnswer:
@@ -271,7 +239,8 @@ def picture(task: WorkInput, query: requests.PictureQuery) -> File:
 
 
 def _pyramid(task: WorkInput) -> Pyramid:
-    return task.map.once("tiles", lambda: Pyramid.of(task.map.avlmap))
+    avlmap, space = task.map.avlmap, task.map.avlmap.space
+    return task.map.once("tiles", lambda: Pyramid(space.index, avlmap.colors, space.grid.voxel_size_m))
 
 
 def tiles(task: WorkInput, query: requests.NoQuery) -> TilesAnswer:
@@ -325,7 +294,7 @@ def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, A
     known = [name for name in names if task.map.avlmap.knows(name)]
     unknown = [name for name in names if name not in known]
     wanted = Wanted(**{**msgspec.structs.asdict(query), "name": known})
-    chosen, near = selected(lists, wanted) if known or not names else ([], None)
+    chosen, near = selection.selected(lists, wanted) if known or not names else ([], None)
     rows: list[dict[str, Any]] = [
         {
             **{key: one.thing[key] for key in ("name", "confidence", "position", "size")},
@@ -336,7 +305,7 @@ def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, A
         for one in chosen
     ]
     about: dict[str, Any] = {"near": near}
-    if notes := [unknown_note(unknown[0])] if unknown else beyond(lists, query.room, near):
+    if notes := [unknown_note(unknown[0])] if unknown else selection.beyond(lists, query.room, near):
         about["note"] = notes[0]
     if not names and len(rows) > query.top:
         about["names"] = _kinds([row["name"] for row in rows])
@@ -346,7 +315,7 @@ def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, A
 def tool_rooms(task: WorkInput, query: requests.RoomsToolQuery) -> dict[str, Any]:
     lists = lists_of(task)
     where = lists.avlmap.where
-    count = Counter(one.room for one in things_with_rooms(lists, Wanted()))
+    count = Counter(one.room for one in selection.things_with_rooms(lists, Wanted()))
     floors = where.floors_of(_places([room.position for room in where.rooms]))
     if query.floor is not None and not 0 <= query.floor < where.floor_count:
         raise RequestError(f"There is no floor {query.floor}; the map has {where.floor_count}, counted from 0.")
@@ -390,7 +359,7 @@ def tool_sounds(task: WorkInput, query: requests.SoundsToolQuery) -> dict[str, A
 
 
 def _paged(task: WorkInput, key: str, rows: list[dict[str, Any]], top: int, page: int) -> dict[str, Any]:
-    shown, pages = page_of(rows, top, page, key)
+    shown, pages = selection.page_of(rows, top, page, key)
     paging = {"page": page, "pages": pages} if pages > 1 else {}
     return {"map": task.map.name, "frame": FRAME, "total": len(rows), **paging, key: shown}
 
@@ -402,7 +371,7 @@ def _kinds(names: Iterable[str]) -> dict[str, int]:
     return dict(ordered[:_MOST_KINDS]) | ({"other names": rest} if rest else {})
 
 
-def _first_name(sound: SoundAnswer) -> str:
+def _first_name(sound: schema.SoundAnswer) -> str:
     return sound["names"][0] if sound["names"] else "sound"
 
 

@@ -62,17 +62,10 @@ class Guide:
         photo: str | None = None,
         clip: str | None = None,
     ) -> dict[str, Any]:
-        """Read a command, plan it on the map, and drive it where there is a robot.
+        """Read a command, plan it on the map, and drive it where there is a robot; return what was planned and driven.
 
-        Args:
-            command: what a person says.
-            start: where it begins without a robot, level frame; where the walk began if None.
-            folder: whose files a program may read.
-            photo: file in the folder that "this photo" means.
-            clip: file in the folder that "this recording" means.
-
-        Returns:
-            The readings, the program, what was planned and driven, and where it ended (``pose``: x, y, heading).
+        Without a robot it begins at ``start``, level frame, by default where the walk began. A program may read the
+        files of ``folder``; ``photo`` and ``clip`` in it are what "this photo" and "this recording" mean.
 
         Raises:
             LanguageError: the command is not understood.

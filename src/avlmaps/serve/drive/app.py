@@ -176,25 +176,17 @@ def drive_agents(service: DriveService) -> AgentServer:
         async def call(arguments: dict[str, Any], report: Report) -> list[dict[str, Any]]:
             # A stop is never refused for what came with it.
             wanted = read({} if one.path == _STOP else arguments, one.query)
-            if isinstance(wanted, PlanRequest):
-                _require_showable(wanted)
+            if isinstance(wanted, PlanRequest) and (length := token_count(wanted.program)) > MOST_PROGRAM:
+                raise RequestError(
+                    f"The program has about {length} tokens, more than the {MOST_PROGRAM} that a person can check in "
+                    "one answer; plan it in parts.", 413, "too-long",
+                )  # fmt: skip
             return [text_of(await one.work(service, wanted, _AGENT))]
 
         return Tool(described(one, tool_schema(one, {})), call)
 
     tools = {one.tool: tool(one) for one in OPERATIONS}
     return AgentServer("avlmaps-drive", INSTRUCTIONS, tools, lambda error: service.maps.described(error)[1])
-
-
-def _require_showable(wanted: PlanRequest) -> None:
-    length = token_count(wanted.program)
-    if length > MOST_PROGRAM:
-        raise RequestError(
-            f"The program has about {length} tokens, more than the {MOST_PROGRAM} that a person can check in one "
-            "answer; plan it in parts.",
-            413,
-            "too-long",
-        )
 
 
 def open_driving(robot_file: Path, maps: Service, log: Path | None = None) -> DriveService:

@@ -287,20 +287,12 @@ class Dispatcher:
             raise RequestError(f"There is no plan: {outcome.error}", 422, kind, outcome.choices)
         path = path_in_world(outcome, now.avlmap, _floor_m(now))
         return OrderPlan(
-            order=secrets.token_hex(8),
-            words=words,
-            reading=translation.plan or _reading(outcome),
-            program=translation.program,
-            notes=list(dict.fromkeys((*translation.notes, *outcome.notes))),
-            path=np.round(path, 3).tolist(),
-            path_m=round(outcome.path_m, 3),
-            subgoals=[move.to_json() for move in outcome.subgoals],
-            map=now.name,
-            version=now.version,
-            robot=self.machine.identity,
-            start=start,
-            choose=settings.choose,
-        )
+            order=secrets.token_hex(8), words=words, reading=translation.plan or _reading(outcome),
+            program=translation.program, notes=list(dict.fromkeys((*translation.notes, *outcome.notes))),
+            path=np.round(path, 3).tolist(), path_m=round(outcome.path_m, 3),
+            subgoals=[move.to_json() for move in outcome.subgoals], map=now.name, version=now.version,
+            robot=self.machine.identity, start=start, choose=settings.choose,
+        )  # fmt: skip
 
     def _read(self, words: str, program: str, now: ServedMap, choose: tuple[int, ...]) -> Translation:
         if bool(words.strip()) == bool(program.strip()):
@@ -400,7 +392,7 @@ class Dispatcher:
 
     def stop(self, who: Who) -> dict[str, Any]:
         """Stop the robot at once, and forget every plan; never raises."""
-        order, until_s = self._brake(), monotonic() + _LONGEST_STOP_S
+        order, until_s = self.brake_now(), monotonic() + _LONGEST_STOP_S
         stands, note = self._halt()
         thread = None if order is None else order.thread
         while thread is not None and thread.is_alive() and monotonic() < until_s:
@@ -419,11 +411,8 @@ class Dispatcher:
         self._changed()
         return answer
 
-    def brake_now(self) -> None:
-        """Pull the brake without waiting for the robot; `stop` follows."""
-        self._brake()
-
-    def _brake(self) -> RunningOrder | None:
+    def brake_now(self) -> RunningOrder | None:
+        """Pull the brake without waiting for the robot; `stop` follows. It returns the order that runs."""
         with self._lock:
             self._book.clear()
             if self._running is not None:
@@ -478,10 +467,8 @@ class Dispatcher:
             place = now.avlmap.space.world(np.array([pose.x_m, pose.y_m, _floor_m(now)]))
         except AvlmapsError:
             return None
-        return {
-            "position": [round(float(value), 3) for value in place],
-            "heading_deg": round(degrees(pose.heading_rad), 1),
-        }
+        position = [round(float(value), 3) for value in place]
+        return {"position": position, "heading_deg": round(degrees(pose.heading_rad), 1)}
 
 
 def _floor_m(now: ServedMap) -> float:
