@@ -77,19 +77,25 @@ class ThingsQuery(Request):
     structure: Annotated[bool, Meta(description="walls and floors too")] = False
 
 
-class ThingsToolQuery(ThingsQuery):
-    """Which things an agent reads."""
+class PlacedThingsQuery(ThingsQuery):
+    """Which things are listed, and where."""
 
     room: Annotated[Name | None, Meta(description="one, or all of a kind")] = None
     near: Annotated[Name | None, Meta(description="x,y,z, level x,y, or a thing's name: nearest first")] = None
+
+
+class ThingsToolQuery(PlacedThingsQuery):
+    """Which things an agent reads."""
+
     top: Top = 10
     page: Page = 1
 
 
-class ListedThingsQuery(ThingsToolQuery):
+class ListedThingsQuery(PlacedThingsQuery):
     """Which things are listed, in which order, and how many at once."""
 
     top: Annotated[Page | None, Meta(description="most things of a page; all by default")] = None
+    page: Page = 1
     at: Annotated[Short | None, Meta(description=f"of a map of several days: {_DAY}")] = None
 
 

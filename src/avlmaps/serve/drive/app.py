@@ -66,9 +66,8 @@ class DriveService:
     async def stop(self, query: NoQuery, who: Who) -> dict[str, Any]:
         """Stop the robot: the brake at once, here; the robot's confirmation in a thread."""
         self.dispatcher.brake_now()
-        return await asyncio.get_running_loop().run_in_executor(
-            self.stops, copy_context().run, self.dispatcher.stop, who
-        )
+        run = copy_context().run
+        return await asyncio.get_running_loop().run_in_executor(self.stops, lambda: run(self.dispatcher.stop, who))
 
     async def status(self, query: NoQuery, who: Who) -> dict[str, Any]:
         """Return where the robot is and what it does."""
