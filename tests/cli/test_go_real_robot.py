@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("roslibpy")
+pytest.importorskip("autobahn")
 from ros_bridge import FakeRobot
 
 from avlmaps.cli.go import Go, drive

@@ -9,7 +9,7 @@ from typing import Any
 import httpx
 import pytest
 
-pytest.importorskip("roslibpy")
+pytest.importorskip("autobahn")
 from ros_bridge import FakeRobot
 
 from avlmaps.core.motion import GroundPose

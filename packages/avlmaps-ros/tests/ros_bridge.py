@@ -1,6 +1,6 @@
 """A robot behind a rosbridge, in this process: a websocket server that speaks the protocol, after a script.
 
-It runs on twisted's one reactor, as the client does; roslibpy brings autobahn, whose server this is.
+It runs on twisted's one reactor, as the client does.
 """
 
 import json

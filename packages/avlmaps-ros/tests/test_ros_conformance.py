@@ -4,9 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-
-pytest.importorskip("roslibpy")
-
 from conformance import *  # noqa: F403 - the laws
 from ros_bridge import FakeRobot
 

@@ -7,9 +7,6 @@ from time import sleep
 
 import numpy as np
 import pytest
-
-pytest.importorskip("roslibpy")
-
 from ros_bridge import FakeRobot, in_thread
 
 from avlmaps.core.errors import NavigationError
@@ -42,7 +39,7 @@ PLACE = np.array([2.0, 1.0, 0.4])
 
 
 def quick(**changes: float) -> RosSettings:
-    from dataclasses import replace
+    from msgspec.structs import replace
 
     return replace(QUICK, **changes)
 

@@ -29,21 +29,11 @@ def matrix(transform: GroundTransform) -> np.ndarray:
     return np.array([[c, -s, transform.x_m], [s, c, transform.y_m], [0, 0, 1]])
 
 
-@given(transforms, transforms)
-def test_composition_is_that_of_matrices(a, b):
-    np.testing.assert_allclose(matrix(a @ b), matrix(a) @ matrix(b), atol=1e-9)
-
-
 @given(transforms, poses)
 def test_there_and_back_is_the_identity(transform, pose):
     assert same(transform.inverse().pose(transform.pose(pose)), pose)
     assert same(transform.pose(transform.inverse().pose(pose)), pose)
-    np.testing.assert_allclose(matrix(transform @ transform.inverse()), np.eye(3), atol=1e-9)
-
-
-@given(transforms, transforms, transforms)
-def test_composition_is_associative(a, b, c):
-    np.testing.assert_allclose(matrix((a @ b) @ c), matrix(a @ (b @ c)), atol=1e-8)
+    np.testing.assert_allclose(matrix(transform) @ matrix(transform.inverse()), np.eye(3), atol=1e-9)
 
 
 @given(transforms, poses)

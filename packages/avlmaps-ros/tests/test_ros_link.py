@@ -51,8 +51,8 @@ def test_a_token_is_not_sent_in_the_clear_nor_with_blanks(url, token):
         Link(url, token)
 
 
-def test_without_roslibpy_the_package_is_named(monkeypatch):
-    monkeypatch.setattr("avlmaps_ros.link.find_spec", lambda name: None)
+def test_without_autobahn_the_package_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "avlmaps_ros.wire", None)
     with pytest.raises(BackendError, match=re.escape(install_command(distribution="avlmaps-ros"))):
         open_ros_driver("nav2", "ws://127.0.0.1:9")
 
@@ -85,11 +85,10 @@ def test_one_frame_for_both_is_refused():
 
 
 def test_a_process_loads_twisted_only_to_connect_and_ends_without_a_word_though_it_never_closes_its_driver():
-    pytest.importorskip("roslibpy")
     code = """
         import sys
         from avlmaps_ros import open_ros_driver
-        loaded = sorted(set(sys.modules) & {"twisted", "roslibpy", "autobahn", "torch"})
+        loaded = sorted(set(sys.modules) & {"twisted", "autobahn", "torch"})
         assert not loaded, loaded
         from ros_bridge import FakeRobot
         import numpy as np
@@ -110,21 +109,8 @@ def test_a_process_loads_twisted_only_to_connect_and_ends_without_a_word_though_
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "done", "")
 
 
-def test_an_environment_that_asks_for_another_transport_is_told_of(monkeypatch):
-    pytest.importorskip("roslibpy", minversion="2.1")
-    import avlmaps_ros.wire  # noqa: F401 - after which twisted it is, in this process
-
-    monkeypatch.setenv("ROSLIBPY_TRANSPORT", "asyncio")
-    with pytest.raises(NavigationError, match="ROSLIBPY_TRANSPORT"):
-        Link("ws://127.0.0.1:9")
-
-
 class TestListening:
     """Against sockets of the test's own."""
-
-    @pytest.fixture(autouse=True)
-    def _needs_roslibpy(self):
-        pytest.importorskip("roslibpy")
 
     def test_nobody_there_says_how_to_start_the_bridge(self):
         import socket

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError
-from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps_ros import Frames, GroundTransform, RosSettings, open_ros_driver
 from avlmaps_ros.own_map import OwnGrid, grid_in, on_own_map
@@ -19,7 +18,7 @@ poses = st.tuples(st.floats(-20, 20), st.floats(-20, 20), st.floats(-pi, pi))
 
 
 def own(values: np.ndarray, cell_m: float = 0.1, corner: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> OwnGrid:
-    return OwnGrid(values.astype(np.int8), cell_m, GroundPose(*corner), "map")
+    return OwnGrid(values.astype(np.int8), cell_m, GroundTransform(*corner), "map")
 
 
 @given(lie=poses, corner=poses, seed=st.integers(0, 1000))
@@ -52,13 +51,13 @@ def test_grids_that_lie_alike_are_taken_cell_by_cell(seed):
 
 def test_a_costmap_lets_the_body_stand_where_its_inflation_does():
     values = np.array([[0, 50, 98, 99, 100, -1]])
-    grid = OwnGrid(values.astype(np.int8), 0.1, GroundPose(0.0, 0.0, 0.0), "map", is_costmap=True)
+    grid = OwnGrid(values.astype(np.int8), 0.1, GroundTransform(), "map", is_costmap=True)
     states = on_own_map(OURS, grid, Frames()).states[:, 0]
     assert [CellState(state).name for state in states] == ["FREE"] * 3 + ["OCCUPIED"] * 2 + ["UNKNOWN"]
 
 
 def test_a_grid_of_another_frame_is_refused():
-    local = OwnGrid(np.zeros((2, 2), np.int8), 0.1, GroundPose(0.0, 0.0, 0.0), "odom")
+    local = OwnGrid(np.zeros((2, 2), np.int8), 0.1, GroundTransform(), "odom")
     with pytest.raises(NavigationError, match=r"frame 'odom' and its goals are in 'map'"):
         on_own_map(OURS, local, Frames())
 
@@ -94,7 +93,6 @@ def test_what_is_no_grid_is_left_out(changes):
 
 @pytest.mark.parametrize("ros", [1, 2])
 def test_over_a_bridge_a_goal_that_only_the_robot_knows_to_be_blocked_is_moved(ros):
-    pytest.importorskip("roslibpy")
     from ros_bridge import FakeRobot
 
     told = message()
@@ -122,7 +120,6 @@ def test_over_a_bridge_a_goal_that_only_the_robot_knows_to_be_blocked_is_moved(r
 
 
 def test_a_robot_without_that_map_is_told_of():
-    pytest.importorskip("roslibpy")
     from ros_bridge import FakeRobot
 
     with FakeRobot(2) as robot, pytest.raises(NavigationError, match=r"No map arrives on /map within 0.3 s"):

@@ -5,12 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps_ros.contact import STILL_M, STILL_S, Stillness
-from avlmaps_ros.messages import Transform, rigid
+from avlmaps_ros.messages import Transform
 from avlmaps_ros.session import Echoes
 from avlmaps_ros.tree import LiveTree
 
 LOOK_S = 0.02
-IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 class Clock:
@@ -22,7 +21,9 @@ class Clock:
 
 
 def moved(x_m: float) -> np.ndarray:
-    return rigid((x_m, 0.0, 0.0), IDENTITY)
+    place = np.eye(4)
+    place[0, 3] = x_m
+    return place
 
 
 class Robot:
@@ -114,7 +115,6 @@ def test_echoes_of_others_and_nonsense_are_left_out() -> None:
     echoes, others = Echoes(clock), Echoes(clock)
     for text in (others.next(), "", "x 1", echoes.next() + "x", echoes.next() + "0", "  ", "\u0661"):
         echoes.back(text)
-    assert not echoes.heard
     assert echoes.sent_before(clock() + 1.0) is None
     text = echoes.next()
     echoes.back(text)
@@ -129,7 +129,6 @@ def test_transforms_that_overtake_each_other_end_at_the_newest() -> None:
     for made_s in (1.0, 3.0, 2.0):
         clock.now_s += 0.01
         tree.take([Transform("map", "base", moved(made_s), made_s)], static=False)
-    assert tree.overtaken == 1
     seen = tree.seen("map", "base")
     assert seen is not None
     assert seen.pose.x_m == 3.0

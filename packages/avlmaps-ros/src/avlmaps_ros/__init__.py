@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from avlmaps_ros.base import RosDriver
     from avlmaps_ros.opening import open_ros_driver
-    from avlmaps_ros.settings import Frames, GroundTransform, RosSettings
-    from avlmaps_ros.transports import RosKind
+    from avlmaps_ros.settings import Frames, GroundTransform, RosKind, RosSettings
 
 _PLACES = {
-    "Frames": "settings", "GroundTransform": "settings", "RosDriver": "base", "RosKind": "transports",
+    "Frames": "settings", "GroundTransform": "settings", "RosDriver": "base", "RosKind": "settings",
     "RosSettings": "settings", "open_ros_driver": "opening",
 }  # fmt: skip
 

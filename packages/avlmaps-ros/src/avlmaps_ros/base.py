@@ -8,7 +8,6 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from math import isfinite, pi
 from time import monotonic
 from typing import Self
@@ -20,22 +19,9 @@ from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.interrupts import Halt
+from avlmaps_ros import goals
 from avlmaps_ros.contact import Contact
-from avlmaps_ros.goals import (
-    LEAST_M,
-    LONGEST_M,
-    ActionGoal,
-    End,
-    MovementPlan,
-    SentGoal,
-    Stage,
-    Standing,
-    Tasks,
-    Track,
-    ahead_of,
-    place_to_stand,
-    plan_turn,
-)
+from avlmaps_ros.goals import ActionGoal, End, MovementPlan, SentGoal, Stage, Track
 from avlmaps_ros.guard import GoalGuard
 from avlmaps_ros.session import AGAIN_S, Opener, Session, call_off, ended_within
 from avlmaps_ros.tree import Sighting
@@ -55,8 +41,6 @@ class RosDriver:
     """Drives a robot that plans and steers by itself. One movement at a time; ``stop`` may come from any thread.
 
     Attributes:
-        frames: the robot's frames, and how they lie to the map.
-        settings: names, patience, tolerances.
         guard: a second process that cancels when this one dies; None where nobody started one.
         elsewhere: returns why a place of another storey is not driven to, ``""`` for others; None for a map of one.
         held: see `Holdable`.
@@ -65,9 +49,9 @@ class RosDriver:
     def __init__(
         self,
         opener: Opener,
-        tasks: Tasks,
+        tasks: goals.Tasks,
         *,
-        standing: Standing | None = None,
+        standing: goals.Standing | None = None,
         level_from_world: Float[np.ndarray, "3 3"] | None = None,
         clock: Callable[[], float] = monotonic,
     ) -> None:
@@ -93,22 +77,20 @@ class RosDriver:
         return self._contact.pose
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
-        """Drive to a place, or as near to it as the robot can stand and see it; see `Driver`."""
         refused = "" if self.elsewhere is None else self.elsewhere(place)
         if refused:
             return self._move(lambda _: refused)
         wanted = self._level(place)
         looked_at = None if face is None else self._level(face)
-        return self._move(partial(self._plan_to, wanted=wanted, looked_at=looked_at))
+        return self._move(lambda start: self._tasks.plan_place(start, wanted, looked_at, self._standing))
 
     def turn(self, angle_rad: float) -> Arrival:
-        """Turn on the spot, to the left by a positive angle."""
-        return self._move(lambda start: plan_turn(start, angle_rad, self.settings, self._tasks.turn))
+        return self._move(lambda start: self._tasks.plan_turn(start, angle_rad))
 
     def forward(self, distance_m: float) -> Arrival:
         """Drive straight ahead; for a negative distance it turns round first, so that it sees where it goes."""
-        if not -LONGEST_M < distance_m <= -LEAST_M:
-            return self._move(lambda start: ahead_of(start, distance_m, self.settings, self._tasks.forward))
+        if not -goals.LONGEST_M < distance_m <= -goals.LEAST_M:
+            return self._move(lambda start: self._tasks.plan_ahead(start, distance_m))
         turned = self.turn(pi)
         if not turned.reached:
             return turned
@@ -202,11 +184,6 @@ class RosDriver:
         known = np.isfinite(place).all()  # NaN stays NaN, without a warning
         return (self._level_from_world @ np.asarray(place, np.float64))[:2] if known else np.full(2, np.nan)
 
-    def _plan_to(
-        self, start: GroundPose, wanted: Float[np.ndarray, "2"], looked_at: Float[np.ndarray, "2"] | None
-    ) -> MovementPlan | str:
-        return place_to_stand(start, wanted, looked_at, self._standing, self.settings, self._tasks.pose)
-
     def _move(self, planned: Callable[[GroundPose], MovementPlan | str]) -> Arrival:
         if not self._busy.acquire(blocking=False):
             return self._arrival(False, Track(self.pose), "The robot is still at another movement")
@@ -224,11 +201,7 @@ class RosDriver:
             self._busy.release()
 
     def _unready(self) -> str:
-        """Return why nothing may be sent now; "" where it may. Connect again, and call off what is owed, first.
-
-        Raises:
-            NavigationError: the robot is not there.
-        """
+        """Return why nothing may be sent now; "" where it may. Connect again, and call off what is owed, first."""
         contact = self._contact
         contact.renew()
         if self._owed is not None and not self._called_off(self._owed, self.settings.cancel_timeout_s):
@@ -268,7 +241,6 @@ class RosDriver:
             return session.heard.wait_for(lambda: self._others(), _NEXT_LIST_S)
 
     def _done(self, plan: MovementPlan, track: Track) -> Arrival:
-        """Do what was planned, and see whether it was done."""
         end, note = End.SUCCEEDED, ""
         for task in [task for task in plan.tasks if task.action not in self._absent] or plan.tasks[-1:]:
             goal = self._pursue(task, track)
@@ -292,7 +264,6 @@ class RosDriver:
         return self._arrival(True, track, plan.note)
 
     def _pursue(self, task: ActionGoal, track: Track) -> SentGoal:
-        """Send one goal and see it to its end, good or bad."""
         listed = self._contact.ear.servers.list_of(task.action)
         before = frozenset[str]() if listed is None else listed[1]
         goal = SentGoal(task, self.settings.answer_timeout_s, before)
@@ -388,7 +359,6 @@ class RosDriver:
         return ""
 
     def _silent_s(self, goal: SentGoal, sent_s: float, now_s: float) -> float:
-        """Return since when nothing shows that a server is there that had taken a goal."""
         if goal.heard_s is None:
             return 0.0
         served = self._contact.ear.servers.serves(goal.task.action)

@@ -18,19 +18,9 @@ _CLOCK_EVERY_S = 0.1
 
 
 class BridgeSession(ABC):
-    """One connection to rosbridge, over which topics come and go; nothing on it ever waits for a goal.
+    """One connection to rosbridge, over which topics come and go; nothing on it ever waits for a goal."""
 
-    Attributes:
-        name: address of the bridge.
-        heard: notified whenever something arrived or changed.
-    """
-
-    tf_kind: ClassVar[str]
-    """The type of /tf."""
-    clock_kind: ClassVar[str]
-    """The type of /clock."""
-    text_kind: ClassVar[str]
-    """The type of heartbeats and echoes."""
+    ros: ClassVar[int]
     lists_every_s: ClassVar[float | None]
 
     def __init__(self, url: str, token: str | None, settings: RosSettings, ear: Ear, timeout_s: float) -> None:
@@ -42,15 +32,19 @@ class BridgeSession(ABC):
         self.name = self.link.url
         link, tree = self.link, ear.tree
         self._beats, echo = self._named("avlmaps/heartbeat"), self._named("avlmaps/echo")
-        link.advertise(self._beats, self.text_kind)
+        between = "msg/" if self.ros == 2 else ""
+        transforms, text = f"tf2_msgs/{between}TFMessage", f"std_msgs/{between}String"
+        link.advertise(self._beats, text)
         if ear.wants_poses:
             prefix = settings.tf_namespace
-            link.subscribe(f"{prefix}/tf", self.tf_kind, lambda told: tree.hear(told, static=False))
-            link.subscribe(f"{prefix}/tf_static", self.tf_kind, lambda told: tree.hear(told, static=True))
-            link.subscribe("/clock", self.clock_kind, lambda told: tree.tick(_seconds(told)), _CLOCK_EVERY_S)
-            link.subscribe(self._beats, self.text_kind, lambda told: ear.beats.hear(_text(told)))
-            link.advertise(echo, self.text_kind)
-            link.subscribe(echo, self.text_kind, lambda told: ear.echoes.back(_text(told)))
+            link.subscribe(f"{prefix}/tf", transforms, lambda told: tree.hear(told, static=False))
+            link.subscribe(f"{prefix}/tf_static", transforms, lambda told: tree.hear(told, static=True))
+            link.subscribe(
+                "/clock", f"rosgraph_msgs/{between}Clock", lambda told: tree.tick(_seconds(told)), _CLOCK_EVERY_S
+            )
+            link.subscribe(self._beats, text, lambda told: ear.beats.hear(_text(told)))
+            link.advertise(echo, text)
+            link.subscribe(echo, text, lambda told: ear.echoes.back(_text(told)))
             link.repeat(_ECHO_EVERY_S, lambda: link.publish(echo, {"data": ear.echoes.next()}))
         self._greet()
 
@@ -67,10 +61,9 @@ class BridgeSession(ABC):
 
     @property
     def complaint(self) -> str:
-        complaints = self.link.complaints
-        binary = " (is it launched with bson_only_mode?)" if not complaints else ""
-        unread = f"{self.link.unread} messages came that cannot be read{binary}" if self.link.unread else ""
-        return complaints[-1] if complaints else unread
+        if self.link.complaint or not self.link.unread:
+            return self.link.complaint
+        return f"{self.link.unread} messages came that cannot be read (is it launched with bson_only_mode?)"
 
     def ask(self, server: str) -> bool:
         del server

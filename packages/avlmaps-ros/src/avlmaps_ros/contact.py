@@ -47,14 +47,7 @@ _QUICK_S = 2.0
 
 
 class Contact:
-    """One robot, over one session after the other.
-
-    Attributes:
-        frames: the robot's frames, and how they lie to the map.
-        settings: patience and names.
-        session: the connection that stands, or stood last.
-        ear: what has arrived over that session.
-    """
+    """One robot, over one session after the other; the ear belongs to the session."""
 
     def __init__(
         self, opener: Opener, frames: Frames, settings: RosSettings, clock: Callable[[], float] = monotonic
@@ -84,14 +77,7 @@ class Contact:
         return self._opener(ear, within_s), ear
 
     def renew(self, within_s: float | None = None) -> None:
-        """Connect again where the connection was lost.
-
-        Args:
-            within_s: ``connect_timeout_s`` by default.
-
-        Raises:
-            NavigationError: the robot is not there.
-        """
+        """Connect again where the connection was lost. ``NavigationError``: the robot is not there."""
         with self._renewing:
             if self.session.lost is not None:
                 self.session.close()
@@ -158,7 +144,6 @@ class Contact:
         return False
 
     def is_unseen_for(self, longest_s: float) -> bool:
-        """Return whether the pose is older than that."""
         seen = self.sighting()
         return seen is None or seen.age_s > longest_s
 
@@ -176,7 +161,6 @@ class Contact:
         return tree.why_not(self.frames.map_frame, self.frames.base_frame) + refused + says
 
     def loss(self) -> str:
-        """Return that the connection was lost, and how."""
         return f"The connection to the robot was lost ({(self.session.lost or '').rstrip('.')})"
 
     def sighting(self) -> Sighting | None:

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from avlmaps_ros.transports import RosKind
+from avlmaps_ros.settings import RosKind
 
 if TYPE_CHECKING:
     from avlmaps.live.live_map import LiveMap
@@ -38,7 +38,6 @@ class Ros2Source:
         self._inbox = open_ros2(self._topics)
 
     def play(self, live: "LiveMap", give_up_s: float, over: Callable[[], bool]) -> None:
-        """Give a live map what it publishes."""
         from avlmaps_ros.live.source import follow_ros2
 
         follow_ros2(live, self._topics, give_up_s, over=over, join=lambda _: self._inbox)

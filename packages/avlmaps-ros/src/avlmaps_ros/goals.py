@@ -16,13 +16,18 @@ from avlmaps_ros.settings import Frames, RosSettings
 
 _STEP_M = 0.05
 _MOST_PLACES = 20_000
+LEAST_M, LEAST_RAD = 0.01, 0.01  # a movement so small is none
+LONGEST_M = 1000.0  # of a straight drive
+_FAR_M = 1e6
+
+# From where to where, level x and y: where a body stops for a place and a note, or why it cannot.
+Standing = Callable[[Float[np.ndarray, "2"], Float[np.ndarray, "2"]], tuple[Float[np.ndarray, "2"], str] | str]
 
 
 class Stage(StrEnum):
     """How far a goal is, as far as we know."""
 
-    SENT = "sent"
-    """Its server may still accept it, at any moment; also one that does not know it now."""
+    SENT = "sent"  # its server may still accept it, at any moment; also one that does not know it now
     ACCEPTED = "accepted"
     OVER = "over"
 
@@ -33,20 +38,12 @@ class End(StrEnum):
     SUCCEEDED = "succeeded"
     CANCELLED = "cancelled"
     FAILED = "failed"
-    ABSENT = "absent"
-    """Nobody took it."""
+    ABSENT = "absent"  # nobody took it
 
 
 @dataclass(frozen=True, slots=True)
 class ActionGoal:
-    """One goal for one action server.
-
-    Attributes:
-        action: the server's name.
-        kind: the action's type.
-        arguments: the goal's message.
-        limit_s: how long it may take.
-    """
+    """One goal for one action server: its name, the action's type, the goal's message, and how long it may take."""
 
     action: str
     kind: str
@@ -62,16 +59,13 @@ class SentGoal:
     way, or wait to be accepted: it is over by its own result, or when it was called off for the whole answer time.
 
     Attributes:
-        task: the requested task.
         answer_s: longest time from sending a goal until its server accepts it.
         before: the goals that its server listed before it was sent, by the server's names.
         id: our name for it, unlike any other client's.
         alias: the server's name for it, where that is another and is known.
-        called_off_s: when it was first cancelled; None before.
-        heard_s: when the server last showed that it is at it, by the driver's clock; None before it did.
+        called_off_s: when it was first cancelled.
+        heard_s: when the server last showed that it is at it, by the driver's clock.
         shown: how often it did.
-        end: how it ended; None while it has not.
-        note: why, where the robot says.
     """
 
     task: ActionGoal
@@ -87,7 +81,6 @@ class SentGoal:
 
     @property
     def stage(self) -> Stage:
-        """How far it is."""
         if self.end is not None:
             return Stage.OVER
         return Stage.SENT if self.heard_s is None else Stage.ACCEPTED
@@ -98,18 +91,15 @@ class SentGoal:
         return frozenset(name for name in (self.id, self.alias) if name)
 
     def show(self, now_s: float) -> None:
-        """Take note that the server is at it."""
         self.heard_s = now_s
         self.shown += 1
 
     def over(self, end: End, note: str = "") -> None:
-        """Take note that it ended."""
         if self.end is None:
             self.note = note
             self.end = end
 
     def call_off(self, now_s: float) -> None:
-        """Take note that it is being cancelled."""
         self.called_off_s = now_s if self.called_off_s is None else self.called_off_s
 
     def unknown(self, now_s: float, note: str) -> None:
@@ -121,12 +111,9 @@ class SentGoal:
 
 @dataclass(frozen=True, slots=True)
 class MovementPlan:
-    """The message to send for a movement, and the test whether it was made.
+    """The tasks of a movement, of which the first whose server is there is done, and the test whether it was made.
 
-    Attributes:
-        tasks: the first whose server is there is done.
-        off: given where the robot stands afterwards, how it is not as it should be; empty where it is.
-        note: something to say even so.
+    ``off`` says, given where the robot stands afterwards, how it is not as it should be; "" where it is.
     """
 
     tasks: tuple[ActionGoal, ...]
@@ -141,7 +128,6 @@ class Track:
         self._places = [(start.x_m, start.y_m)]
 
     def passed(self, pose: GroundPose) -> None:
-        """Add where it is now."""
         x_m, y_m = self._places[-1]
         if abs(pose.x_m - x_m) + abs(pose.y_m - y_m) >= _STEP_M:
             self._places.append((pose.x_m, pose.y_m))
@@ -150,20 +136,13 @@ class Track:
 
     @property
     def places(self) -> Float[np.ndarray, "n 2"]:
-        """All of them, in order."""
         return np.array(self._places, np.float64)
 
 
 class Tasks(ABC):
-    """Makes the tasks of one kind of robot.
+    """Makes the tasks of one kind of robot. Of several tasks the first whose server is there is done."""
 
-    Attributes:
-        frames: the robot's frames, and how they lie to the map.
-        settings: names, patience, speeds.
-    """
-
-    called: ClassVar[str]
-    """The program that drives the robot, as notes name it."""
+    called: ClassVar[str]  # the program that drives the robot, as notes name it
 
     def __init__(self, frames: Frames, settings: RosSettings) -> None:
         self.frames, self.settings = frames, settings
@@ -173,84 +152,70 @@ class Tasks(ABC):
         """Return the task of standing at a pose, level frame."""
 
     def turn(self, start: GroundPose, angle_rad: float) -> tuple[ActionGoal, ...]:
-        """Return the tasks of a turn on the spot; the first whose server is there is done."""
         return (self.pose(start.turned(angle_rad)),)
 
     def forward(self, start: GroundPose, distance_m: float) -> tuple[ActionGoal, ...]:
-        """Return the tasks of a straight drive; the first whose server is there is done."""
         return (self.pose(start.ahead(distance_m)),)
 
+    def plan_place(
+        self,
+        start: GroundPose,
+        wanted: Float[np.ndarray, "2"],
+        looked_at: Float[np.ndarray, "2"] | None,
+        standing: Standing | None,
+    ) -> MovementPlan | str:
+        """Plan to stand at a place, or return why that cannot be.
 
-# From where to where, level x and y: where a body stops for a place and a note, or why it cannot.
-Standing = Callable[[Float[np.ndarray, "2"], Float[np.ndarray, "2"]], tuple[Float[np.ndarray, "2"], str] | str]
-TasksOf = Callable[[GroundPose, float], tuple[ActionGoal, ...]]
+        It looks at ``looked_at`` once there, else in the direction of its arrival.
+        """
+        if not np.abs(wanted).max() < _FAR_M or (looked_at is not None and not np.abs(looked_at).max() < _FAR_M):
+            return "NaN or a place beyond the Earth cannot be driven to"
+        note, xy = "", wanted
+        if standing is not None:
+            stop = standing(np.array([start.x_m, start.y_m]), wanted)
+            if isinstance(stop, str):
+                return stop
+            xy, note = stop
+        x_m, y_m = (float(value) for value in xy)
+        asked = None if looked_at is None else _bearing_rad(x_m, y_m, *looked_at)
+        travel = _bearing_rad(start.x_m, start.y_m, x_m, y_m)
+        ahead_rad = next((angle for angle in (asked, travel) if angle is not None), start.heading_rad)
+        target = GroundPose(x_m, y_m, ahead_rad)
 
-LEAST_M, LEAST_RAD = 0.01, 0.01  # a movement so small is none
-_FAR_M = 1e6
-LONGEST_M = 1000.0  # of a straight drive
+        def off(now: GroundPose) -> str:
+            away_m, turned = now.distance_m(target), abs(wrap_angle(now.heading_rad - target.heading_rad))
+            if away_m > self.settings.reached_m:
+                return f"it stands {away_m:.2f} m from where it was sent"
+            if asked is not None and turned > self.settings.reached_rad:
+                return f"it looks {degrees(turned):.0f} degrees past where it was to look"
+            return ""
 
+        return MovementPlan((self.pose(target),), off, note)
 
-def place_to_stand(
-    start: GroundPose,
-    wanted: Float[np.ndarray, "2"],
-    looked_at: Float[np.ndarray, "2"] | None,
-    standing: Standing | None,
-    settings: RosSettings,
-    task: Callable[[GroundPose], ActionGoal],
-) -> MovementPlan | str:
-    """Plan to stand at a place, or return why that cannot be.
+    def plan_turn(self, start: GroundPose, angle_rad: float) -> MovementPlan | str:
+        """Plan a turn on the spot, or return why that cannot be."""
+        if not abs(angle_rad) < 100.0:
+            return f"{angle_rad} rad is not an angle to turn by"
 
-    It looks at ``looked_at`` once there, else in the direction of its arrival.
-    """
-    if not np.abs(wanted).max() < _FAR_M or (looked_at is not None and not np.abs(looked_at).max() < _FAR_M):
-        return "NaN or a place beyond the Earth cannot be driven to"
-    note, xy = "", wanted
-    if standing is not None:
-        stop = standing(np.array([start.x_m, start.y_m]), wanted)
-        if isinstance(stop, str):
-            return stop
-        xy, note = stop
-    x_m, y_m = (float(value) for value in xy)
-    asked = None if looked_at is None else _bearing_rad(x_m, y_m, *looked_at)
-    travel = _bearing_rad(start.x_m, start.y_m, x_m, y_m)
-    target = GroundPose(x_m, y_m, next((angle for angle in (asked, travel) if angle is not None), start.heading_rad))
+        def off(now: GroundPose) -> str:
+            wrong = abs(wrap_angle(now.heading_rad - start.heading_rad - angle_rad))
+            allowed = min(self.settings.reached_rad, max(0.05, abs(angle_rad) / 2))
+            return f"it is {degrees(wrong):.0f} degrees from where it was to turn" if wrong > allowed else ""
 
-    def off(now: GroundPose) -> str:
-        away_m, turned = now.distance_m(target), abs(wrap_angle(now.heading_rad - target.heading_rad))
-        if away_m > settings.reached_m:
-            return f"it stands {away_m:.2f} m from where it was sent"
-        if asked is not None and turned > settings.reached_rad:
-            return f"it looks {degrees(turned):.0f} degrees past where it was to look"
-        return ""
+        return MovementPlan(() if abs(angle_rad) < LEAST_RAD else self.turn(start, angle_rad), off)
 
-    return MovementPlan((task(target),), off, note)
+    def plan_ahead(self, start: GroundPose, distance_m: float) -> MovementPlan | str:
+        """Plan a straight drive, or return why that cannot be."""
+        if not abs(distance_m) < LONGEST_M:
+            return f"{distance_m} m is not a distance to drive"
+        target = start.ahead(distance_m)
 
+        def off(now: GroundPose) -> str:
+            away_m = now.distance_m(target)
+            allowed = min(self.settings.reached_m, max(0.05, abs(distance_m) / 2))
+            return f"it is {away_m:.2f} m from where it was to drive" if away_m > allowed else ""
 
-def plan_turn(start: GroundPose, angle_rad: float, settings: RosSettings, tasks: TasksOf) -> MovementPlan | str:
-    """Plan a turn on the spot, or return why that cannot be."""
-    if not abs(angle_rad) < 100.0:
-        return f"{angle_rad} rad is not an angle to turn by"
-
-    def off(now: GroundPose) -> str:
-        wrong = abs(wrap_angle(now.heading_rad - start.heading_rad - angle_rad))
-        allowed = min(settings.reached_rad, max(0.05, abs(angle_rad) / 2))
-        return f"it is {degrees(wrong):.0f} degrees from where it was to turn" if wrong > allowed else ""
-
-    return MovementPlan(() if abs(angle_rad) < LEAST_RAD else tasks(start, angle_rad), off)
-
-
-def ahead_of(start: GroundPose, distance_m: float, settings: RosSettings, tasks: TasksOf) -> MovementPlan | str:
-    """Plan a straight drive, or return why that cannot be."""
-    if not abs(distance_m) < LONGEST_M:
-        return f"{distance_m} m is not a distance to drive"
-    target = start.ahead(distance_m)
-
-    def off(now: GroundPose) -> str:
-        away_m = now.distance_m(target)
-        allowed = min(settings.reached_m, max(0.05, abs(distance_m) / 2))
-        return f"it is {away_m:.2f} m from where it was to drive" if away_m > allowed else ""
-
-    return MovementPlan(() if abs(distance_m) < LEAST_M else tasks(start, distance_m), off)
+        return MovementPlan(() if abs(distance_m) < LEAST_M else self.forward(start, distance_m), off)
 
 
 def _bearing_rad(from_x: float, from_y: float, to_x: float, to_y: float) -> float | None:

@@ -21,8 +21,8 @@ import msgspec
 from avlmaps.core.errors import AvlmapsError, NavigationError
 from avlmaps_ros.goals import ActionGoal, SentGoal, Stage
 from avlmaps_ros.session import Ear, Session, call_off
-from avlmaps_ros.settings import RosSettings
-from avlmaps_ros.transports import RosKind, session_opener
+from avlmaps_ros.settings import RosKind, RosSettings
+from avlmaps_ros.transports import session_opener
 
 _BETWEEN_TRIES_S = 0.5
 _FIRST_TRY_S = 3.0
@@ -46,10 +46,7 @@ class Beat(msgspec.Struct, omit_defaults=True):
     Attributes:
         id: our name for the active goal; "" where none is active.
         alias: the server's name for it.
-        action: name of the server.
-        is_accepted: whether its server has accepted it.
         before: the goals that its server listed before it was sent.
-        over: whether the guard ends.
     """
 
     id: str = ""
@@ -61,7 +58,6 @@ class Beat(msgspec.Struct, omit_defaults=True):
 
     @classmethod
     def of(cls, goal: SentGoal) -> "Beat":
-        """Return that of an active goal."""
         accepted = goal.stage is Stage.ACCEPTED
         return cls(goal.id, goal.alias, goal.task.action, accepted, tuple(sorted(goal.before)))
 
@@ -91,7 +87,6 @@ class GoalGuard:
 
     @property
     def stands(self) -> bool:
-        """Whether the guard runs."""
         return self._process.poll() is None
 
     def require_ready(self) -> None:
@@ -105,7 +100,6 @@ class GoalGuard:
             )
 
     def revived(self) -> bool:
-        """Start the guard again where it ended; return whether it runs."""
         if not self.stands:
             self._start()
         return self.stands
@@ -117,15 +111,10 @@ class GoalGuard:
         self._write(Beat.of(goal))
 
     def rest(self) -> None:
-        """Report that no goal is active."""
         self._write(Beat())
 
     def close(self, dismissed: bool = True) -> None:
-        """End the guard.
-
-        Args:
-            dismissed: no goal is left; else the guard cancels the last one, and ends when the robot confirms that.
-        """
+        """End the guard. One that is not dismissed cancels the last goal, and ends when the robot confirms that."""
         if dismissed:
             self._write(Beat(over=True))
         with suppress(OSError):
@@ -142,11 +131,9 @@ class GoalGuard:
 
 
 def watch(pipe: int, silence_s: float) -> Beat | None:
-    """Read beats until they end; return the goal that was left active, None where none was.
+    """Read beats from a file descriptor until they end, or an active goal has none for ``silence_s``.
 
-    Args:
-        pipe: the file descriptor of the beats.
-        silence_s: how long an active goal may go without a beat.
+    Return the goal that was left active, None where none was.
     """
     last, rest = Beat(), b""
     while True:

@@ -5,7 +5,6 @@ tf2_msgs. rosbridge writes NaN as null, which no number here takes.
 """
 
 from base64 import b64decode
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from math import cos, sin
@@ -22,11 +21,7 @@ from avlmaps.core.printable import UNSAFE, printable
 
 
 def interface(kind: str) -> Any:
-    """Return the class of a message, service or action: ``tf2_msgs/msg/TFMessage``.
-
-    Raises:
-        BackendError: its package is not installed.
-    """
+    """Return the class of ``tf2_msgs/msg/TFMessage`` and the like. ``BackendError``: its package is not installed."""
     package, part, name = kind.split("/")
     try:
         return getattr(import_module(f"{package}.{part}"), name)
@@ -46,18 +41,7 @@ _Name = Annotated[str, msgspec.Meta(max_length=256)]
 
 
 class Incoming(msgspec.Struct):
-    """One message of the bridge; which fields it has depends on ``op``.
-
-    Attributes:
-        op: what it is.
-        id: of the goal or call that it answers.
-        topic: of a published message.
-        msg: a published message, not yet read; the text of a status message.
-        values: the result of a goal or a call, not yet read; a sentence where it failed.
-        status: the end of a goal, by number; absent from old bridges, which put it into ``values``.
-        result: whether the bridge could do what was requested.
-        level: of a status message: error, warning, info or none.
-    """
+    """One message of the bridge; which fields it has depends on ``op``."""
 
     op: _Name
     id: _Name | None = None
@@ -137,26 +121,6 @@ class _GoalId(msgspec.Struct):
     id: _Name
 
 
-class GoalState(msgspec.Struct):
-    """How a goal of move_base stands (actionlib_msgs/GoalStatus)."""
-
-    goal_id: _GoalId
-    status: int
-    text: str = ""
-
-
-class GoalStates(msgspec.Struct):
-    """The states that move_base reports five times a second."""
-
-    status_list: list[GoalState]
-
-
-class GoalUpdate(msgspec.Struct):
-    """A result or a feedback of move_base."""
-
-    status: GoalState
-
-
 class _Uuid(msgspec.Struct):
     uuid: str | list[int]
 
@@ -173,22 +137,34 @@ class _GoalInfo(msgspec.Struct):
     goal_id: _Uuid
 
 
-class ActionState(msgspec.Struct):
-    """How a goal of an action server of ROS 2 stands (action_msgs/GoalStatus)."""
+class GoalState(msgspec.Struct):
+    """How a goal stands: actionlib_msgs/GoalStatus of ROS 1 has ``goal_id``, action_msgs/GoalStatus ``goal_info``."""
 
-    goal_info: _GoalInfo
     status: int
+    goal_id: _GoalId | None = None
+    goal_info: _GoalInfo | None = None
+    text: str = ""
 
     @property
     def name(self) -> str:
-        """The server's name for the goal, in hexadecimal digits."""
+        """The server's name for the goal; of ROS 2 in hexadecimal digits. ``ValueError``: it has none."""
+        if self.goal_id is not None:
+            return self.goal_id.id
+        if self.goal_info is None:
+            raise ValueError("a goal without a name")
         return self.goal_info.goal_id.hex
 
 
-class ActionStates(msgspec.Struct):
-    """The goals of an action server, published at each change."""
+class GoalStates(msgspec.Struct):
+    """The goals of an action server: move_base lists them five times a second, ROS 2 at each change."""
 
-    status_list: list[ActionState]
+    status_list: list[GoalState]
+
+
+class GoalUpdate(msgspec.Struct):
+    """A result or a feedback of move_base."""
+
+    status: GoalState
 
 
 class CancelAnswer(msgspec.Struct):
@@ -208,14 +184,7 @@ class ActionEnd(msgspec.Struct):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Transform:
-    """One transform of /tf or /tf_static.
-
-    Attributes:
-        parent: name of a frame.
-        child: name of another.
-        parent_from_child: (4, 4), metres.
-        stamp_s: by the robot's clock; 0 where there is none.
-    """
+    """One transform of /tf or /tf_static, in metres; its stamp by the robot's clock is 0 where there is none."""
 
     parent: str
     child: str
@@ -224,43 +193,25 @@ class Transform:
 
 
 def transforms_in(message: msgspec.Raw) -> tuple[list[Transform], int]:
-    """Read a message of /tf or /tf_static.
-
-    Returns:
-        The transforms, and how many were refused: NaN, no rotation.
-
-    Raises:
-        msgspec.MsgspecError: it is no such message.
-    """
-    raws = msgspec.json.decode(message, type=_Transforms).transforms
+    """Return the transforms of a message of /tf or /tf_static, and how many were refused: NaN, no rotation."""
     read, refused = [], 0
-    for raw in raws:
+    for raw in msgspec.json.decode(message, type=_Transforms).transforms:
         try:
             stamped = msgspec.json.decode(raw, type=_TransformStamped)
-            shift, turn = stamped.transform.translation, stamped.transform.rotation
-            matrix = rigid((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w))
-            read.append(
-                Transform(stamped.header.frame_id, stamped.child_frame_id, matrix, stamped.header.stamp.seconds)
-            )
+            read.append(transform_of(stamped, stamped.header.stamp.seconds))
         except ValueError:
             refused += 1
     return read, refused
 
 
-def rigid(place: Sequence[float], quaternion: Sequence[float]) -> Float[np.ndarray, "4 4"]:
-    """Return the matrix of a transform that came from outside.
-
-    Args:
-        place: x, y, z, metres.
-        quaternion: x, y, z, w.
-
-    Raises:
-        ValueError: it is no rigid transform, or lies beyond the Earth.
-    """
-    xyz, xyzw = np.array(place, np.float64), np.array(quaternion, np.float64)
+def transform_of(message: Any, stamp_s: float) -> Transform:
+    """Check a TransformStamped of rclpy, or with the same fields. ``ValueError``: it is no rigid transform on Earth."""
+    place, turn = message.transform.translation, message.transform.rotation
+    xyz = np.array([place.x, place.y, place.z], np.float64)
+    xyzw = np.array([turn.x, turn.y, turn.z, turn.w], np.float64)
     if not np.abs(xyz).max() < _FAR_M or not abs(float(np.linalg.norm(xyzw)) - 1.0) < 0.05:
         raise ValueError("no rigid transform")
-    return from_quaternion(xyz, xyzw)
+    return Transform(message.header.frame_id[:256], message.child_frame_id[:256], from_quaternion(xyz, xyzw), stamp_s)
 
 
 def stamped_pose(pose: GroundPose, frame: str, ros: int) -> dict[str, Any]:

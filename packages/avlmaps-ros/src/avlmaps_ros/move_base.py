@@ -1,8 +1,4 @@
-"""Driving with move_base (ROS 1): one actionlib server, spoken to over its five topics.
-
-roslibpy's own client of actionlib is not used: it reports an action's result without its status, so that success and
-failure look alike until the next status message.
-"""
+"""Driving with move_base (ROS 1): one actionlib server, spoken to over its five topics."""
 
 from time import monotonic
 from typing import ClassVar
@@ -40,9 +36,7 @@ class MoveBaseTasks(Tasks):
 class MoveBaseSession(BridgeSession):
     """A connection to move_base."""
 
-    tf_kind: ClassVar[str] = "tf2_msgs/TFMessage"
-    clock_kind: ClassVar[str] = "rosgraph_msgs/Clock"
-    text_kind: ClassVar[str] = "std_msgs/String"
+    ros: ClassVar[int] = 1
     lists_every_s: ClassVar[float | None] = 0.2
 
     def _topic(self, name: str) -> str:
@@ -95,7 +89,7 @@ class MoveBaseSession(BridgeSession):
 
     def _status(self, message: msgspec.Raw) -> None:
         states = msgspec.json.decode(message, type=GoalStates).status_list
-        listed = {state.goal_id.id: state for state in states}
+        listed = {state.name: state for state in states}
         self.ear.servers.listed(
             self._named("move_base"), [name for name, state in listed.items() if state.status in _UNDER_WAY]
         )
@@ -110,7 +104,7 @@ class MoveBaseSession(BridgeSession):
 
     def _update(self, message: msgspec.Raw) -> None:
         state = msgspec.json.decode(message, type=GoalUpdate).status
-        self._each(lambda goal: self._note(goal, state) if goal.id == state.goal_id.id else None)
+        self._each(lambda goal: self._note(goal, state) if goal.id == state.name else None)
 
     def _note(self, goal: SentGoal, state: GoalState) -> None:
         if state.status in _UNDER_WAY:

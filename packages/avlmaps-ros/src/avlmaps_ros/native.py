@@ -9,12 +9,10 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from itertools import count
-from math import atan2
 from time import monotonic
 from typing import Any
 from uuid import UUID, uuid4
 
-import numpy as np
 from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
 from rclpy.action import ActionClient
@@ -28,9 +26,9 @@ from unique_identifier_msgs.msg import UUID as GoalUuid  # noqa: N811 - a class
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.recordings.formats.ros_messages import stamp_of
 from avlmaps_ros.goals import End, SentGoal
-from avlmaps_ros.messages import Transform, interface, rigid, sanitize_line
+from avlmaps_ros.messages import interface, sanitize_line, transform_of
 from avlmaps_ros.nav2 import ENDED, MOVING, REFUSED, RESULT_WITHIN_S, UNDER_WAY, UNKNOWN, end_listed, end_of
-from avlmaps_ros.own_map import OwnGrid, checked_grid
+from avlmaps_ros.own_map import OwnGrid, grid_of
 from avlmaps_ros.session import Ear, heartbeat
 from avlmaps_ros.settings import RosSettings
 
@@ -62,20 +60,12 @@ class NativeSession:
 
     Everything of rclpy happens in one thread. The node has a context of its own, which leaves the signals of the
     process alone. A goal has our own id in ROS 2 as well, so that no other is ever cancelled in its place.
-
-    Attributes:
-        name: the network.
-        heard: notified whenever something arrived or changed.
-        lost: why the connection is over; None while it stands.
-        complaint: the latest fault of ours with ROS 2; "" where there is none.
-        lists_every_s: None: servers list their goals when they change.
     """
 
     def __init__(self, settings: RosSettings, ear: Ear) -> None:
         """Join the network. A robot that is not there is noticed by the poses that do not come.
 
-        Raises:
-            BackendError: a message package is not installed.
+        Raise `BackendError` where a message package is not installed.
         """
         self.name = f"ROS 2, domain {os.environ.get('ROS_DOMAIN_ID') or '0'},"
         self.heard = threading.Condition()
@@ -219,13 +209,10 @@ class NativeSession:
     def _placed(self, message: Any, static: bool) -> None:
         transforms = []
         for one in message.transforms[:2000]:
-            shift, turn = one.transform.translation, one.transform.rotation
             try:
-                matrix = rigid((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w))
+                transforms.append(transform_of(one, stamp_of(one)))
             except ValueError:
                 self._ear.tree.refused += 1
-                continue
-            transforms.append(Transform(one.header.frame_id[:256], one.child_frame_id[:256], matrix, stamp_of(one)))
         self._ear.tree.take(transforms, static)
         self._notify()
 
@@ -404,11 +391,4 @@ def read_grid(topic: str, wait_s: float) -> OwnGrid | None:
         executor.shutdown(timeout_sec=1.0)
         node.destroy_node()
         context.try_shutdown()
-    if not found:
-        return None
-    info, origin = found[-1].info, found[-1].info.origin
-    turn_rad = 2.0 * atan2(origin.orientation.z, origin.orientation.w)
-    return checked_grid(
-        np.array(found[-1].data, np.int8), (info.height, info.width), info.resolution,
-        (origin.position.x, origin.position.y, turn_rad), found[-1].header.frame_id,
-    )  # fmt: skip
+    return grid_of(found[-1]) if found else None

@@ -14,8 +14,8 @@ from avlmaps_ros.goals import ActionGoal, End, SentGoal, Stage, Tasks
 from avlmaps_ros.link import Link
 from avlmaps_ros.messages import (
     ActionEnd,
-    ActionStates,
     CancelAnswer,
+    GoalStates,
     Incoming,
     duration,
     sanitize_line,
@@ -78,12 +78,10 @@ class Errands:
         return link
 
     def done(self, name: str) -> None:
-        """Take note that an operation is answered: its connection is free."""
         with self._lock:
             self._links = [(link, "" if at == name else at) for link, at in self._links]
 
     def lost(self, name: str) -> str | None:
-        """Return why the connection of an operation is over; None where it stands, or there is none."""
         with self._lock:
             return next((link.lost for link, at in self._links if at == name), None)
 
@@ -98,7 +96,6 @@ class Errands:
             link.drop()
 
     def close(self) -> None:
-        """End every connection."""
         with self._lock:
             links, self._links = self._links, []
         for link, _ in links:
@@ -108,12 +105,10 @@ class Errands:
 NAVIGATE, SPIN, STRAIGHT = "navigate_to_pose", "spin", "drive_on_heading"
 ASKED_FOR = (NAVIGATE, "navigate_through_poses", "follow_waypoints", SPIN, STRAIGHT)
 """Nav2's actions that clients use; it uses others for itself."""
-MOVING = (*ASKED_FOR, "backup", "follow_path")
-"""Each of Nav2's actions that moves a robot."""
+MOVING = (*ASKED_FOR, "backup", "follow_path")  # each of Nav2's actions that moves a robot
 UNDER_WAY = (1, 2, 3)  # action_msgs/GoalStatus
 REFUSED, UNKNOWN, ENDED = 1, 2, 3  # return codes of action_msgs/CancelGoal
-RESULT_WITHIN_S = 1.0
-"""After a list says that a goal is over, its result says why."""
+RESULT_WITHIN_S = 1.0  # after a list says that a goal is over, its result says why
 _SUCCEEDED, _CANCELLED = 4, 5  # action_msgs/GoalStatus
 
 # nav2_msgs' error codes, by the action that sets them: ComputePathToPose 2xx, FollowPath 1xx, behaviours 7xx.
@@ -196,9 +191,7 @@ _NOBODY = [0] * 16
 class Nav2Session(BridgeSession):
     """A connection to Nav2: topics on one websocket, goals and calls on others (`Errands`)."""
 
-    tf_kind: ClassVar[str] = "tf2_msgs/msg/TFMessage"
-    clock_kind: ClassVar[str] = "rosgraph_msgs/msg/Clock"
-    text_kind: ClassVar[str] = "std_msgs/msg/String"
+    ros: ClassVar[int] = 2
     lists_every_s: ClassVar[float | None] = None
 
     def _greet(self) -> None:
@@ -290,7 +283,7 @@ class Nav2Session(BridgeSession):
     # In the network's thread.
 
     def _listed(self, server: str, message: msgspec.Raw) -> None:
-        states = {one.name: one.status for one in msgspec.json.decode(message, type=ActionStates).status_list}
+        states = {one.name: one.status for one in msgspec.json.decode(message, type=GoalStates).status_list}
         under_way = frozenset(name for name, status in states.items() if status in UNDER_WAY)
         self.ear.servers.listed(server, under_way)
 

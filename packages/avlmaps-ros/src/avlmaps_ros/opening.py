@@ -12,9 +12,11 @@ from avlmaps.core.errors import NavigationError
 from avlmaps_ros.base import RosDriver
 from avlmaps_ros.goals import Standing
 from avlmaps_ros.guard import GoalGuard, Orders
+from avlmaps_ros.move_base import MoveBaseTasks
+from avlmaps_ros.nav2 import Nav2Tasks
 from avlmaps_ros.own_map import on_own_map
-from avlmaps_ros.settings import Frames, RosSettings
-from avlmaps_ros.transports import RosKind, own_grid, session_opener, tasks_of
+from avlmaps_ros.settings import Frames, RosKind, RosSettings
+from avlmaps_ros.transports import own_grid, session_opener
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
@@ -64,7 +66,8 @@ def open_ros_driver(
     orders = Orders(kind, url, token, settings, silence_s, settings.goal_timeout_s)
     guard = GoalGuard(orders) if guarded else None  # it starts while the driver connects
     try:
-        opener, tasks = session_opener(kind, url, settings, token), tasks_of(kind, frames, settings)
+        opener = session_opener(kind, url, settings, token)
+        tasks = {"nav2": Nav2Tasks, "move_base": MoveBaseTasks}[kind](frames, settings)
         opened = RosDriver(opener, tasks, standing=standing, level_from_world=level_from_world, clock=clock)
     except BaseException:
         if guard is not None:

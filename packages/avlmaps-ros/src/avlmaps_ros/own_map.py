@@ -1,22 +1,20 @@
 """The robot's own map or costmap: planning on it, "reachable" means what the robot's planner means."""
 
 from dataclasses import dataclass, replace
-from math import atan2, cos, isfinite, sin
+from math import atan2
 from threading import Condition
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
 from jaxtyping import Int8
 
 from avlmaps.core.errors import NavigationError
-from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps_ros.messages import Quaternion, Stamped, Vector, sanitize_line
-from avlmaps_ros.settings import Frames, RosSettings
+from avlmaps_ros.settings import Frames, GroundTransform, RosSettings
 
-MOST_BYTES = 64_000_000
-"""Of a grid as a message of rosbridge, which writes it in digits."""
+MOST_BYTES = 64_000_000  # of a grid as a message of rosbridge, which writes it in digits
 _MOST_CELLS = 16_000_000
 _MAP_AT, _COSTMAP_AT = 65, 99  # map_server's threshold; the middle of a body touches something
 
@@ -27,15 +25,12 @@ class OwnGrid:
 
     Attributes:
         values: (height, width) along the grid's y and x: 0 free to 100 occupied, -1 unknown.
-        cell_m: edge of a cell.
-        corner: of the grid, in its frame.
-        frame: name of that frame.
         is_costmap: whether obstacles are already as much larger as the body is.
     """
 
     values: Int8[np.ndarray, "h w"]
     cell_m: float
-    corner: GroundPose
+    frame_from_grid: GroundTransform
     frame: str
     is_costmap: bool = False
 
@@ -60,49 +55,21 @@ class _Grid(msgspec.Struct):
 
 def grid_in(message: msgspec.Raw) -> OwnGrid:
     """Read a grid as rosbridge writes it. ``ValueError``: it is none."""
-    read = msgspec.json.decode(message, type=_Grid)
-    origin = read.info.origin
-    return checked_grid(
-        np.array(read.data, np.int8), (read.info.height, read.info.width), read.info.resolution,
-        (origin.position.x, origin.position.y, 2.0 * atan2(origin.orientation.z, origin.orientation.w)),
-        read.header.frame_id,
-    )  # fmt: skip
+    return grid_of(msgspec.json.decode(message, type=_Grid))
 
 
-def checked_grid(
-    values: Int8[np.ndarray, " n"],
-    shape: tuple[int, int],
-    cell_m: float,
-    corner: tuple[float, float, float],
-    frame: str,
-) -> OwnGrid:
-    """Return a grid that came from outside.
-
-    Args:
-        values: row after row.
-        shape: its rows and columns.
-        cell_m: edge of a cell.
-        corner: x, y, metres, and direction of the grid's x axis, radians.
-        frame: name of its frame.
-
-    Raises:
-        ValueError: it is none.
-    """
-    rows, columns = shape
-    if not (rows > 0 and columns > 0 and rows * columns <= _MOST_CELLS and len(values) == rows * columns):
-        raise ValueError(f"a grid of {columns} x {rows} cells with {len(values)} values")
-    if not (0.001 <= cell_m <= 10.0 and all(isfinite(value) and abs(value) < 1e6 for value in corner)):
-        raise ValueError(f"a grid with cells of {cell_m} m at {corner}")
-    return OwnGrid(values.reshape(shape), float(cell_m), GroundPose(*corner), frame.lstrip("/"))
+def grid_of(message: Any) -> OwnGrid:
+    """Check a grid that came from outside: of rclpy, or with the same fields. ``ValueError``: it is none."""
+    info, place, turn = message.info, message.info.origin.position, message.info.origin.orientation
+    values, shape, cell_m = np.array(message.data, np.int8), (info.height, info.width), float(info.resolution)
+    if not (min(shape) > 0 and len(values) == shape[0] * shape[1] <= _MOST_CELLS and 0.001 <= cell_m <= 10.0):
+        raise ValueError(f"a grid of {info.width} x {info.height} cells of {cell_m} m with {len(values)} values")
+    corner = GroundTransform(place.x, place.y, 2.0 * atan2(turn.z, turn.w))
+    return OwnGrid(values.reshape(shape), cell_m, corner, message.header.frame_id.lstrip("/"))
 
 
 def read_over_bridge(url: str, token: str | None, kind: str, settings: RosSettings) -> OwnGrid | None:
-    """Read a grid over a connection of its own; None where none arrives.
-
-    Raises:
-        BackendError: roslibpy is not installed.
-        NavigationError: there is no bridge.
-    """
+    """Read a grid over a connection of its own; None where none arrives. Raise as `Link` does."""
     from avlmaps_ros.link import Link
 
     found: list[OwnGrid] = []
@@ -120,10 +87,8 @@ def read_over_bridge(url: str, token: str | None, kind: str, settings: RosSettin
 def on_own_map(ours: Obstacles, grid: OwnGrid, frames: Frames) -> Obstacles:
     """Return the floor as the robot's own grid has it, in our level frame.
 
-    What blocks the view is as our map knows it, and where our map knows nothing, as the grid does.
-
-    Raises:
-        NavigationError: the grid is in another frame than the robot's goals.
+    What blocks the view is as our map knows it, and where our map knows nothing, as the grid does. Raise
+    `NavigationError` where the grid is in another frame than the robot's goals.
     """
     if grid.frame != frames.map_frame:
         raise NavigationError(
@@ -132,7 +97,7 @@ def on_own_map(ours: Obstacles, grid: OwnGrid, frames: Frames) -> Obstacles:
         )
     rows, columns = grid.values.shape
     corners = np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]]) * grid.cell_m
-    level = frames.map_from_avlmap.inverse().points(_turned(corners, grid.corner))
+    level = frames.map_from_avlmap.inverse().points(grid.frame_from_grid.points(corners))
     low = level.min(axis=0)
     nx, ny = (int(count) for count in np.ceil((level.max(axis=0) - low) / grid.cell_m - 1e-6))
     middles = low + (np.stack(np.meshgrid(np.arange(nx), np.arange(ny), indexing="ij"), -1) + 0.5) * grid.cell_m
@@ -154,15 +119,8 @@ def on_own_map(ours: Obstacles, grid: OwnGrid, frames: Frames) -> Obstacles:
     return theirs.without(ours.forbidden)
 
 
-def _turned(xy: np.ndarray, corner: GroundPose) -> np.ndarray:
-    c, s = cos(corner.heading_rad), sin(corner.heading_rad)
-    return xy @ np.array([[c, s], [-s, c]]) + (corner.x_m, corner.y_m)
-
-
 def _values_at(grid: OwnGrid, xy: np.ndarray) -> np.ndarray:
-    c, s = cos(grid.corner.heading_rad), sin(grid.corner.heading_rad)
-    within = (xy - (grid.corner.x_m, grid.corner.y_m)) @ np.array([[c, -s], [s, c]])
-    cell = np.floor(within / grid.cell_m + 1e-9).astype(np.int64)
+    cell = np.floor(grid.frame_from_grid.inverse().points(xy) / grid.cell_m + 1e-9).astype(np.int64)
     rows, columns = grid.values.shape
     inside = (cell[..., 0] >= 0) & (cell[..., 0] < columns) & (cell[..., 1] >= 0) & (cell[..., 1] < rows)
     values = np.full(inside.shape, -1, np.int16)

@@ -9,6 +9,7 @@ import threading
 from bisect import bisect_right
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from math import inf
 from time import monotonic
 from typing import Protocol
 from uuid import uuid4
@@ -16,8 +17,7 @@ from uuid import uuid4
 from avlmaps_ros.goals import SentGoal, Stage
 from avlmaps_ros.tree import LiveTree
 
-AGAIN_S = 0.5
-"""Time after which a cancel is sent again."""
+AGAIN_S = 0.5  # time after which a cancel is sent again
 
 _MOST_ECHOES, _MOST_BEATING = 2000, 100
 
@@ -34,8 +34,7 @@ class Echoes:
         self._lock = threading.Lock()
         self._name, self._count = uuid4().hex, 0
         self._sent_s: dict[int, float] = {}
-        self._back_s: list[float] = []
-        self._sent_of_back_s: list[float] = []
+        self._back: list[tuple[float, float]] = []  # when each came back, and when it was sent
 
     def next(self) -> str:
         """Return the text of the next echo, which is sent now."""
@@ -53,25 +52,14 @@ class Echoes:
             return
         with self._lock:
             sent_s = self._sent_s.pop(int(number[:12]), None)
-            if sent_s is None or (self._sent_of_back_s and sent_s < self._sent_of_back_s[-1]):
-                return
-            self._back_s.append(self._clock())
-            self._sent_of_back_s.append(sent_s)
-            del self._back_s[:-_MOST_ECHOES], self._sent_of_back_s[:-_MOST_ECHOES]
+            if sent_s is not None and (not self._back or sent_s >= self._back[-1][1]):
+                self._back = [*self._back[1 - _MOST_ECHOES :], (self._clock(), sent_s)]
 
     def sent_before(self, arrived_s: float) -> float | None:
-        """Return a time after which what arrived then left the robot; None where no echo has ever come back."""
+        """Return a time after which what arrived then left the robot; None where no echo had come back."""
         with self._lock:
-            if not self._back_s:
-                return None
-            index = bisect_right(self._back_s, arrived_s) - 1
-            return self._sent_of_back_s[index] if index >= 0 else None
-
-    @property
-    def heard(self) -> bool:
-        """Whether an echo has come back."""
-        with self._lock:
-            return bool(self._back_s)
+            index = bisect_right(self._back, (arrived_s, inf)) - 1
+            return self._back[index][1] if index >= 0 else None
 
 
 class Servers:
@@ -96,26 +84,21 @@ class Servers:
                 self._lists.pop(server, None)
 
     def serves(self, server: str) -> tuple[float, bool] | None:
-        """Return when a server was last found to be there or not, and which; None where that is not known."""
+        """Return when a server was last found to be there or not, and which."""
         with self._lock:
             return self._served.get(server)
 
     def list_of(self, server: str) -> tuple[float, frozenset[str]] | None:
-        """Return when a server's last list came, and the goals on it; None where there is none."""
+        """Return when a server's last list came, and the goals on it."""
         with self._lock:
             return self._lists.get(server)
 
     def has_shown(self, server: str) -> bool:
-        """Return whether anything ever showed that a server is there."""
         with self._lock:
             return server in self._lists or self._served.get(server, (0.0, False))[1]
 
     def under_way(self, longest_s: float | None = None) -> dict[str, frozenset[str]]:
-        """Return the goals under way, by server.
-
-        Args:
-            longest_s: leave out lists that are older; servers that publish only changes have old ones. None: none.
-        """
+        """Return the goals under way, by server, but for lists older than ``longest_s``."""
         now_s = self._clock()
         with self._lock:
             return {
@@ -141,22 +124,15 @@ class Beats:
             self._last_s = {**dict(list(self._last_s.items())[-_MOST_BEATING:]), name: self._clock()}
 
     def within(self, longest_s: float) -> frozenset[str]:
-        """Return the goals that beat within some seconds."""
         now_s = self._clock()
         return frozenset(name for name, heard_s in self._last_s.items() if now_s - heard_s <= longest_s)
 
 
 @dataclass(frozen=True, slots=True)
 class Ear:
-    """What has arrived over one session; a new session gets a new one.
+    """What has arrived over one session, dated by its clock; a new session gets a new one.
 
-    Attributes:
-        clock: seconds; everything in here is dated by it.
-        wants_poses: whether transforms and other clients are listened to; who only cancels needs neither.
-        tree: the robot's transforms.
-        echoes: messages of ours that came back, where the transport can delay what it brings.
-        servers: the goals that the robot's servers are at.
-        beats: the goals that an avlmaps watches.
+    Without ``wants_poses``, as for who only cancels, neither transforms nor other clients are listened to.
     """
 
     clock: Callable[[], float] = monotonic
@@ -176,12 +152,9 @@ class Ear:
 class Session(Protocol):
     """One connection to one robot. It stands or is over; it never comes back by itself.
 
-    No method raises for what can happen to a robot. What is sent over a connection that is over goes nowhere.
-
-    Attributes:
-        name: of the robot's address, for sentences.
-        heard: notified whenever something arrived or changed.
-        lists_every_s: how often servers list their goals; None where they publish only changes.
+    No method raises for what can happen to a robot. What is sent over a connection that is over goes nowhere. ``heard``
+    is notified whenever something arrived or changed; ``lists_every_s`` is None where servers list their goals only
+    when they change.
     """
 
     name: str
@@ -199,11 +172,7 @@ class Session(Protocol):
         ...
 
     def ask(self, server: str) -> bool:
-        """Ask whether an action server is there; the answer comes to `Servers.answered`, or never.
-
-        Returns:
-            Whether an answer may come; servers that list their goals regularly need no question.
-        """
+        """Ask whether an action server is there; return whether an answer may come, to `Servers.answered`."""
         ...
 
     def send(self, goal: SentGoal) -> None:
@@ -234,9 +203,7 @@ class Session(Protocol):
         """Publish a heartbeat: that a goal is active and watched, or over; see `heartbeat`."""
         ...
 
-    def close(self) -> None:
-        """End the connection."""
-        ...
+    def close(self) -> None: ...
 
 
 def heartbeat(goal: SentGoal) -> str:

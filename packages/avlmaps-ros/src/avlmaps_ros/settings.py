@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import atan2, cos, degrees, isfinite, pi, radians, sin
 from pathlib import Path
-from typing import Any, Self
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -14,6 +14,8 @@ from avlmaps.core.errors import NavigationError
 from avlmaps.core.files import user_path, write_bytes_atomically
 from avlmaps.core.motion import GroundPose, wrap_angle
 
+RosKind = Literal["nav2", "move_base"]
+NATIVE = "native"  # in place of an address: this machine is in the robot's ROS 2 network itself
 _MOST_BYTES = 10_000
 _FAR_M = 1e6
 
@@ -22,10 +24,7 @@ _FAR_M = 1e6
 class GroundTransform:
     """A rigid movement over the ground, named ``b_from_a``: it maps places of frame a to frame b.
 
-    Attributes:
-        x_m: where a's origin lies in b.
-        y_m: the same.
-        yaw_rad: how far a's x axis is turned from b's, counter-clockwise, in (−π, π].
+    a's origin lies at x, y in b, and a's x axis is turned from b's by the yaw, counter-clockwise, in (−π, π].
     """
 
     x_m: float = 0.0
@@ -37,23 +36,16 @@ class GroundTransform:
             raise ValueError(f"({self.x_m}, {self.y_m}) m, {self.yaw_rad} rad is not a transform between two floors")
         object.__setattr__(self, "yaw_rad", wrap_angle(self.yaw_rad))
 
-    def __matmul__(self, other: "GroundTransform") -> "GroundTransform":
-        """Return ``c_from_a`` of this ``c_from_b`` and another ``b_from_a``."""
-        x_m, y_m = self._moved(other.x_m, other.y_m)
-        return GroundTransform(x_m, y_m, self.yaw_rad + other.yaw_rad)
-
     def inverse(self) -> "GroundTransform":
         """Return ``a_from_b``."""
         c, s = cos(self.yaw_rad), sin(self.yaw_rad)
         return GroundTransform(-c * self.x_m - s * self.y_m, s * self.x_m - c * self.y_m, -self.yaw_rad)
 
     def pose(self, pose: GroundPose) -> GroundPose:
-        """Take a pose from frame a to frame b."""
         x_m, y_m = self._moved(pose.x_m, pose.y_m)
         return GroundPose(x_m, y_m, pose.heading_rad + self.yaw_rad)
 
     def points(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
-        """Take places from frame a to frame b."""
         c, s = cos(self.yaw_rad), sin(self.yaw_rad)
         return np.asarray(xy, np.float64) @ np.array([[c, s], [-s, c]]) + (self.x_m, self.y_m)
 
@@ -65,15 +57,8 @@ class GroundTransform:
     def fit(cls, in_a: Float[np.ndarray, "n 2"], in_b: Float[np.ndarray, "n 2"]) -> tuple["GroundTransform", float]:
         """Return the ``b_from_a`` that brings places known in both frames together best, by least squares.
 
-        Args:
-            in_a: the places in frame a, metres; two or more different ones.
-            in_b: the same places in frame b.
-
-        Returns:
-            The transform, and how far off a place is left, metres (root mean square).
-
-        Raises:
-            NavigationError: there are too few places, or they define no direction.
+        Return also how far off a place is left, metres (root mean square). Raise `NavigationError` where there are
+        fewer than two places, or they define no direction.
         """
         a, b = np.asarray(in_a, np.float64), np.asarray(in_b, np.float64)
         if a.shape != b.shape or a.ndim != 2 or a.shape[1:] != (2,):
@@ -95,12 +80,10 @@ class GroundTransform:
 class Frames:
     """The robot's frames, and how they lie to the map."""
 
-    map_frame: str = "map"
-    """The fixed frame in which the robot localises itself and takes goals."""
-    base_frame: str = "base_link"
-    """The frame of its body; its x axis is ahead."""
+    map_frame: str = "map"  # the fixed frame in which the robot localises itself and takes goals
+    base_frame: str = "base_link"  # the frame of its body; its x axis is ahead
+    # How our map's level frame lies in the robot's fixed frame; the identity where the recording was made in it.
     map_from_avlmap: GroundTransform = field(default_factory=GroundTransform)
-    """How our map's level frame lies in the robot's fixed frame; the identity where the recording was made in it."""
 
     def __post_init__(self) -> None:
         for name in ("map_frame", "base_frame"):
@@ -121,12 +104,8 @@ class Frames:
 
     @classmethod
     def read(cls, path: Path | str) -> "Frames":
-        """Read the frames from a JSON file, which may hold `RosSettings` as well.
-
-        Raises:
-            NavigationError: the file cannot be read or does not hold what it must.
-        """
-        file = RosRobotFile.read(path)
+        """Read the frames from a robot's file, as ``RosSettings.read`` does."""
+        file = _RobotFile.read(path)
         shift = file.map_from_avlmap
         try:
             lie = GroundTransform(shift.x_m, shift.y_m, radians(shift.yaw_deg))
@@ -137,37 +116,8 @@ class Frames:
     def write(self, path: Path | str) -> None:
         """Write them to a JSON file that ``read`` takes."""
         shift = self.map_from_avlmap
-        file = RosRobotFile(self.map_frame, self.base_frame, _Shift(shift.x_m, shift.y_m, degrees(shift.yaw_rad)))
+        file = _RobotFile(self.map_frame, self.base_frame, _Shift(shift.x_m, shift.y_m, degrees(shift.yaw_rad)))
         write_bytes_atomically(user_path(path), msgspec.json.format(msgspec.json.encode(file), indent=2) + b"\n")
-
-
-class _Shift(msgspec.Struct, forbid_unknown_fields=True):
-    x_m: float = 0.0
-    y_m: float = 0.0
-    yaw_deg: float = 0.0
-
-
-class RosRobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """The content of a robot's file; `Frames.read` and `RosSettings.read` check it further."""
-
-    map_frame: str = "map"
-    base_frame: str = "base_link"
-    map_from_avlmap: _Shift = msgspec.field(default_factory=_Shift)
-    settings: dict[str, Any] = msgspec.field(default_factory=dict)
-
-    @classmethod
-    def read(cls, path: Path | str) -> "RosRobotFile":
-        """Read a robot's file. ``NavigationError``: it cannot be read, or is no such file."""
-        try:
-            with user_path(path).open("rb") as stream:
-                content = stream.read(_MOST_BYTES)
-            return msgspec.json.decode(content, type=cls)
-        except (OSError, ValueError, RecursionError) as fault:
-            raise _unreadable(path, fault) from None
-
-
-def _unreadable(path: Path | str, fault: Exception) -> NavigationError:
-    return NavigationError(f"The robot's file {path} cannot be read ({fault}); write it as docs/robots.md shows.")
 
 
 # The least and the most that each number may be; beyond lies a slip of the unit (milliseconds, centimetres, degrees).
@@ -188,71 +138,71 @@ _RANGES: Mapping[str, tuple[float, float]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class RosSettings:
+class RosSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The settings that differ from robot to robot."""
 
-    namespace: str = ""
-    """Of the robot's actions (``/robot1`` for ``/robot1/navigate_to_pose``)."""
-    tf_namespace: str = ""
-    """Of its transforms, where they are not on /tf and /tf_static."""
+    namespace: str = ""  # of the robot's actions (``/robot1`` for ``/robot1/navigate_to_pose``)
+    tf_namespace: str = ""  # of its transforms, where they are not on /tf and /tf_static
     map_topic: str = ""
     """A map or a costmap of the robot (``/map``): on it goals are moved to where the body can stand. Empty: our map."""
-    radius_m: float = 0.25
-    """Of the body, to find where it can stand on our map; the robot plans with its own distances."""
-    goal_timeout_s: float = 300.0
-    """A goal that is not over by then is cancelled."""
-    answer_timeout_s: float = 10.0
-    """A goal that has no answer by then has nobody to take it, seconds."""
-    cancel_timeout_s: float = 3.0
-    """How long to wait until a cancelled goal is over."""
-    connect_timeout_s: float = 10.0
-    """How long to wait for the connection."""
-    pose_timeout_s: float = 10.0
-    """How long to wait for the first pose."""
-    pose_max_age_s: float = 3.0
-    """Transforms that are older give no pose; the robot is not driven without one."""
-    server_max_age_s: float = 3.0
-    """A goal of which its server has said nothing for this time is lost, and cancelled."""
+    radius_m: float = 0.25  # of the body, to find where it can stand on our map; the robot plans with its own distances
+    goal_timeout_s: float = 300.0  # a goal that is not over by then is cancelled
+    answer_timeout_s: float = 10.0  # a goal that has no answer by then has nobody to take it, seconds
+    cancel_timeout_s: float = 3.0  # how long to wait until a cancelled goal is over
+    connect_timeout_s: float = 10.0  # how long to wait for the connection
+    pose_timeout_s: float = 10.0  # how long to wait for the first pose
+    pose_max_age_s: float = 3.0  # transforms that are older give no pose; the robot is not driven without one
+    server_max_age_s: float = 3.0  # a goal of which its server has said nothing for this time is lost, and cancelled
     heartbeat_s: float = 0.5
     """While a goal is active, a heartbeat is published on ``avlmaps/heartbeat`` once in this time."""
-    stall_s: float = 3.0
-    """A goal is cancelled when the loop that watches it did not run for this time."""
+    stall_s: float = 3.0  # a goal is cancelled when the loop that watches it did not run for this time
     reached_m: float = 0.5
     """A robot that says it has arrived must stand this near; Nav2's own tolerance is 0.25 m by default."""
-    reached_rad: float = 0.35
-    """And look in the goal's direction within this angle, radians."""
-    speed_m_s: float = 0.15
-    """For Nav2's straight drives, which need a speed; the robot's own limits still hold."""
+    reached_rad: float = 0.35  # and look in the goal's direction within this angle, radians
+    speed_m_s: float = 0.15  # for Nav2's straight drives, which need a speed; the robot's own limits still hold
 
     def __post_init__(self) -> None:
         namespace, topic = ("namespace", "robot1"), ("topic", "map")
         for name, (word, such) in {"namespace": namespace, "tf_namespace": namespace, "map_topic": topic}.items():
             given = getattr(self, name)
-            bare = given.strip("/") if isinstance(given, str) else "?"
+            bare = given.strip("/")
             if bare and not all(part.isascii() and part.isidentifier() for part in bare.split("/")):
                 raise NavigationError(f"{name} is {given!r}, which is not a ROS {word}; write it as /{such}.")
-            object.__setattr__(self, name, f"/{bare}" if bare else "")
+            msgspec.structs.force_setattr(self, name, f"/{bare}" if bare else "")
         for name, (least, most) in _RANGES.items():
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+            if not least <= value <= most:
                 raise NavigationError(f"{name} is {value!r}; it is a number from {least:g} to {most:g}.")
 
     @classmethod
-    def read(cls, path: Path | str) -> Self:
-        """Read what a robot's file sets, by the names above, under ``settings``.
+    def read(cls, path: Path | str) -> "RosSettings":
+        """Read the ``settings`` of a robot's file. ``NavigationError``: they cannot be read, or are not right."""
+        return _RobotFile.read(path).settings
 
-        Raises:
-            NavigationError: the file cannot be read, or sets what there is not.
-        """
-        given: dict[str, Any] = RosRobotFile.read(path).settings
-        unknown = sorted(set(given) - set(cls.__slots__))
-        if unknown:
-            known = ", ".join(cls.__slots__)
-            raise NavigationError(
-                f"{path} sets {unknown[0]!r}, which is not a setting of a robot; the settings are {known}."
-            )
+
+class _Shift(msgspec.Struct, forbid_unknown_fields=True):
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_deg: float = 0.0
+
+
+class _RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    map_frame: str = "map"
+    base_frame: str = "base_link"
+    map_from_avlmap: _Shift = msgspec.field(default_factory=_Shift)
+    settings: RosSettings = RosSettings()
+
+    @classmethod
+    def read(cls, path: Path | str) -> "_RobotFile":
         try:
-            return cls(**given)
+            with user_path(path).open("rb") as stream:
+                content = stream.read(_MOST_BYTES)
+            return msgspec.json.decode(content, type=cls)
         except NavigationError as fault:
             raise NavigationError(f"In the settings of {path}, {fault}") from None
+        except (OSError, ValueError, RecursionError) as fault:
+            raise _unreadable(path, fault) from None
+
+
+def _unreadable(path: Path | str, fault: Exception) -> NavigationError:
+    return NavigationError(f"The robot's file {path} cannot be read ({fault}); write it as docs/robots.md shows.")

@@ -1,20 +1,14 @@
 """The transports by which robots are reached, by the name of what drives them."""
 
 from dataclasses import replace
-from typing import Literal
 
 from avlmaps.core.errors import BackendError, NavigationError
 from avlmaps.core.wording import option
-from avlmaps_ros.goals import Tasks
-from avlmaps_ros.move_base import MoveBaseSession, MoveBaseTasks
-from avlmaps_ros.nav2 import Nav2Session, Nav2Tasks
+from avlmaps_ros.move_base import MoveBaseSession
+from avlmaps_ros.nav2 import Nav2Session
 from avlmaps_ros.own_map import OwnGrid, read_over_bridge
 from avlmaps_ros.session import Opener
-from avlmaps_ros.settings import Frames, RosSettings
-
-RosKind = Literal["nav2", "move_base"]
-NATIVE = "native"
-"""In place of an address: this machine is in the robot's ROS 2 network itself."""
+from avlmaps_ros.settings import NATIVE, RosKind, RosSettings
 
 
 def session_opener(kind: RosKind, url: str, settings: RosSettings, token: str | None) -> Opener:
@@ -28,9 +22,7 @@ def session_opener(kind: RosKind, url: str, settings: RosSettings, token: str | 
 def native_opener(kind: RosKind, settings: RosSettings) -> Opener:
     """Return what opens sessions with Nav2 by rclpy.
 
-    Raises:
-        NavigationError: the robot runs ROS 1.
-        BackendError: this Python has no rclpy.
+    Raise `NavigationError` where the robot runs ROS 1, `BackendError` where this Python has no rclpy.
     """
     if kind != "nav2":
         raise NavigationError(
@@ -49,12 +41,7 @@ def native_opener(kind: RosKind, settings: RosSettings) -> Opener:
 
 
 def own_grid(kind: RosKind, url: str, settings: RosSettings, token: str | None) -> OwnGrid:
-    """Read the robot's own map or costmap.
-
-    Raises:
-        NavigationError: none arrives.
-        BackendError: what the transport needs is not installed.
-    """
+    """Read the robot's own map or costmap. ``NavigationError``: none arrives."""
     topic, wait_s = settings.map_topic, settings.pose_timeout_s
     if url == NATIVE:
         native_opener(kind, settings)
@@ -70,8 +57,3 @@ def own_grid(kind: RosKind, url: str, settings: RosSettings, token: str | None) 
             "plan on the map of avlmaps."
         )
     return replace(grid, is_costmap="costmap" in topic)
-
-
-def tasks_of(kind: RosKind, frames: Frames, settings: RosSettings) -> Tasks:
-    """Return what makes the goals of a robot."""
-    return {"nav2": Nav2Tasks, "move_base": MoveBaseTasks}[kind](frames, settings)

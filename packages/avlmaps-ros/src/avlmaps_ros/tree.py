@@ -62,23 +62,16 @@ class Sighting:
     age_s: float
 
 
-def _never(_: float) -> None:
-    """Know nothing of when what has arrived was sent."""
-
-
 class LiveTree:
     """Stores the newest transform of each frame, by this machine's clock: the robot's may be set otherwise.
 
     A transform is older than its arrival by the time that it spent in queues. Two signs show that time: the time from
     its stamp to its arrival grows beyond the least of them, and echoes come back late (`Echoes`). The greater counts.
-
-    Attributes:
-        refused: how many transforms were left out, being NaN or no rotation.
-        overtaken: how many were left out because a newer one had come before.
+    ``refused`` counts transforms that are NaN or no rotation.
     """
 
     def __init__(
-        self, clock: Callable[[], float] = monotonic, sent_before: Callable[[float], float | None] = _never
+        self, clock: Callable[[], float] = monotonic, sent_before: Callable[[float], float | None] = lambda _: None
     ) -> None:
         """Take a clock, and what says for a time of arrival after which time the robot had sent it; None if unknown."""
         self._clock, self._sent_before = clock, sent_before
@@ -86,7 +79,7 @@ class LiveTree:
         self._stamps: dict[str, _Stamps] = {}
         self._lock = threading.Lock()
         self._simulated_s: float | None = None
-        self.refused = self.overtaken = 0
+        self.refused = 0
 
     def hear(self, message: msgspec.Raw, static: bool) -> None:
         """Take in one message. ``ValueError``: it is none."""
@@ -95,7 +88,6 @@ class LiveTree:
         self.take(transforms, static)
 
     def take(self, transforms: Sequence[Transform], static: bool) -> None:
-        """Take in transforms that have just arrived."""
         now_s = self._clock()
         with self._lock:
             for transform in transforms:
@@ -105,11 +97,9 @@ class LiveTree:
                     continue
                 stamp_s = transform.stamp_s if isfinite(transform.stamp_s) else 0.0
                 late_s = self._late_s(child, stamp_s, now_s)
-                if before is not None and _is_overtaken(before, stamp_s, now_s):
-                    self.overtaken += 1
-                    continue
-                edge = _Edge(parent, transform.parent_from_child, static, stamp_s, now_s, now_s - late_s)
-                self._edges[child] = edge
+                if before is None or not _is_overtaken(before, stamp_s, now_s):
+                    edge = _Edge(parent, transform.parent_from_child, static, stamp_s, now_s, now_s - late_s)
+                    self._edges[child] = edge
 
     def tick(self, simulated_s: float) -> None:
         """Take in the time of a simulation, by which its stamps run: slower than ours, as a rule, or not at all."""
@@ -128,11 +118,8 @@ class LiveTree:
     def fixed(self) -> list[Transform]:
         """Return the static transforms; a bridge may hand them to its first client only."""
         with self._lock:
-            return [
-                Transform(edge.parent, child, edge.parent_from_child, edge.stamp_s)
-                for child, edge in self._edges.items()
-                if edge.static
-            ]
+            edges = [(child, edge) for child, edge in self._edges.items() if edge.static]
+        return [Transform(edge.parent, child, edge.parent_from_child, edge.stamp_s) for child, edge in edges]
 
     def seen(self, fixed: str, body: str) -> Sighting | None:
         """Return where the body is in the fixed frame; None where no chain of transforms leads there."""

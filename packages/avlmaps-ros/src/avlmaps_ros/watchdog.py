@@ -22,8 +22,7 @@ ACTIONS = ("navigate_to_pose", "spin", "drive_on_heading")
 PARTS = ("follow_path",)
 """Actions of Nav2 that do parts of the goals above: its controller drives on when its navigator is dead."""
 LOOK_EVERY_S = 0.1
-AGAIN_S = 1.0
-"""A cancel is sent again after this time, until the goal is over."""
+AGAIN_S = 1.0  # a cancel is sent again after this time, until the goal is over
 BEFORE_S, AFTER_S = 1.0, 5.0
 """A goal of another name is ours where it was first seen between its first heartbeat and its last one, or so near."""
 MOST = 200

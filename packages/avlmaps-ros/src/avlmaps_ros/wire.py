@@ -1,91 +1,56 @@
-"""roslibpy's own connection, made safe: sizes capped, messages read strictly, certificates checked, no silent retries.
+"""A websocket to rosbridge: sizes capped, certificates checked, and no second try.
 
-Importing this module imports twisted; only `link` does, and only when a robot is needed.
-
-roslibpy tries again for ever when a connection is lost, and then sends what was meant for then; a goal that comes
-minutes late is a danger. Here a connection that is lost stays lost, and the driver makes a new one for the next goal.
+Importing this module imports twisted; only `link` does, and only when a robot is needed. A connection that is lost
+stays lost: what was meant for then must not be sent minutes later. The driver makes a new one for its next goal.
 """
 
 import threading
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from math import ceil
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import msgspec
-import roslibpy
-from autobahn.twisted.websocket import connectWS
-from roslibpy.comm.comm_autobahn import AutobahnRosBridgeClientFactory, AutobahnRosBridgeProtocol
+from autobahn.twisted.websocket import WebSocketClientFactory, WebSocketClientProtocol, connectWS
 from twisted.internet import reactor as _reactor
 from twisted.internet.error import ReactorNotRestartable
 from twisted.internet.ssl import optionsForClientTLS
 
-from avlmaps_ros.messages import Incoming, sanitize_line
+from avlmaps_ros.messages import sanitize_line
+
+if TYPE_CHECKING:
+    from avlmaps_ros.link import Link
 
 reactor: Any = _reactor  # its methods are put on it at run time
 _PING_EVERY_S, _PING_WAIT_S = 5.0, 10.0
 _starting = threading.Lock()
 
 
-@dataclass(frozen=True, slots=True)
-class Listener:
-    """The receiver of a connection's events; all are called in the network's thread.
+class _Protocol(WebSocketClientProtocol):
+    factory: "Websocket"
 
-    Attributes:
-        incoming: a message came.
-        fault: what came is not a message.
-        opened: messages can go.
-        over: the connection is lost, or nobody answered; called with the reason.
-    """
+    def onOpen(self) -> None:  # noqa: N802 - autobahn's names
+        self.factory.current = self
+        self.factory.link.opened()
 
-    incoming: Callable[[Incoming], None]
-    fault: Callable[[str], None]
-    opened: Callable[[], None]
-    over: Callable[[str], None]
-
-
-class _Protocol(AutobahnRosBridgeProtocol):
-    """Reads what comes as data, and hands it on; what is not a message is counted and left out."""
-
-    factory: "_Factory"
-
-    def onMessage(self, payload: bytes, isBinary: bool) -> None:  # noqa: N802, N803 - autobahn's names
-        """Read one message."""
-        try:
-            if isBinary:
-                raise ValueError("binary")
-            message = msgspec.json.decode(payload, type=Incoming)
-            self.factory.listener.incoming(message)
-        except (ValueError, TypeError, RecursionError) as fault:
-            self.factory.listener.fault(sanitize_line(str(fault)))
+    def onMessage(self, payload: bytes, isBinary: bool) -> None:  # noqa: N802, N803
+        self.factory.link.received(payload, isBinary)
 
     def onClose(self, wasClean: bool, code: int | None, reason: str | None) -> None:  # noqa: N802, N803
-        """Store why the connection ended."""
-        self.factory.close_reason = sanitize_line(str(reason or ""))
-
-    def send_message(self, payload: bytes) -> None:
-        """Send one message, if the connection still stands by then."""
-        reactor.callFromThread(self._post, payload)
-
-    def _post(self, payload: bytes) -> None:
-        if self.state == self.STATE_OPEN:
-            self.sendMessage(payload)
+        self.factory.close_reason = str(reason or "")
 
 
-class _Factory(AutobahnRosBridgeClientFactory):
-    """Makes one connection and reports when it is there, and when it is over."""
+class Websocket(WebSocketClientFactory):
+    """Connects a link, and calls it in the reactor's thread; its own methods are for any thread."""
 
     protocol = _Protocol
-    maxRetries = 0  # noqa: N815 - twisted's name
     noisy = False
+    isSecure: bool  # noqa: N815 - autobahn's name
 
-    def __init__(
-        self, url: str, headers: Mapping[str, str], listener: Listener, timeout_s: float, most_bytes: int
-    ) -> None:
-        super().__init__(url, headers=dict(headers))
-        self.listener = listener
-        self.timeout_s = timeout_s
+    def __init__(self, link: "Link", headers: Mapping[str, str], timeout_s: float, most_bytes: int) -> None:
+        super().__init__(link.url, headers=dict(headers))
+        self.link, self._timeout_s = link, timeout_s
+        self.current: _Protocol | None = None
         self.close_reason = ""
+        self._connector: Any = None
         self.setProtocolOptions(
             maxFramePayloadSize=most_bytes,
             maxMessagePayloadSize=most_bytes,
@@ -94,70 +59,38 @@ class _Factory(AutobahnRosBridgeClientFactory):
             autoPingInterval=_PING_EVERY_S,
             autoPingTimeout=_PING_WAIT_S,
         )
+        start_reactor()
+        reactor.callFromThread(self._connect)
 
-    def connect(self) -> None:
-        """Begin to connect, in the reactor's thread."""
-        reactor.callFromThread(self._begin)
-
-    def _begin(self) -> None:
+    def _connect(self) -> None:
         # Without options autobahn would take any certificate for the robot's.
         options = optionsForClientTLS(str(self.host)) if self.isSecure else None
-        self.connector = connectWS(self, options, timeout=ceil(self.timeout_s))
+        self._connector = connectWS(self, options, timeout=ceil(self._timeout_s))
 
-    def ready(self, proto: AutobahnRosBridgeProtocol) -> None:
-        """Take note that messages can go."""
-        super().ready(proto)
-        self.listener.opened()
+    def send(self, payload: bytes) -> None:
+        """Send one message, if the connection still stands by then."""
+        reactor.callFromThread(self._send, payload)
 
-    def clientConnectionLost(self, connector: Any, reason: Any) -> None:  # noqa: N802 - twisted's name
-        """Take note that it is over."""
-        self._proto = None
-        self.listener.over(self.close_reason or sanitize_line(reason.getErrorMessage()))
-
-    def clientConnectionFailed(self, connector: Any, reason: Any) -> None:  # noqa: N802 - twisted's name
-        """Take note that nobody answered."""
-        self.listener.over(sanitize_line(reason.getErrorMessage()))
+    def _send(self, payload: bytes) -> None:
+        if self.current is not None and self.current.state == self.current.STATE_OPEN:
+            self.current.sendMessage(payload)
 
     def drop(self) -> None:
-        """End the connection in any state; from any thread."""
+        """End the connection in any state."""
         reactor.callFromThread(self._drop)
 
     def _drop(self) -> None:
-        proto = self._proto
-        if proto is not None and proto.state == proto.STATE_OPEN:
-            proto.sendClose()
-        elif self.connector is not None:
-            self.connector.disconnect()
+        if self.current is not None and self.current.state == self.current.STATE_OPEN:
+            self.current.sendClose()
+        elif self._connector is not None:
+            self._connector.disconnect()
 
+    def clientConnectionLost(self, connector: Any, reason: Any) -> None:  # noqa: N802 - twisted's names
+        """End the link."""
+        self.current = None
+        self.link.ended(sanitize_line(self.close_reason or reason.getErrorMessage()))
 
-class Bridge(roslibpy.Ros):
-    """roslibpy's connection over the factory above; its topics work on it as on any other."""
-
-    def __init__(
-        self, url: str, headers: Mapping[str, str], listener: Listener, timeout_s: float, most_bytes: int
-    ) -> None:
-        self._mine = _Factory(url, headers, listener, timeout_s, most_bytes)
-        super().__init__(url)
-
-    def connect(self) -> None:
-        """Connect through our own factory, in place of the one that roslibpy has just made."""
-        self.factory = self._mine
-        super().connect()
-
-
-def repeat(every_s: float, turn: Callable[[], bool]) -> None:
-    """Call a function in the reactor's thread until it returns False."""
-
-    def again() -> None:
-        if turn():
-            reactor.callLater(every_s, again)
-
-    reactor.callFromThread(again)
-
-
-def later(wait_s: float, work: Callable[[], None]) -> None:
-    """Call a function in the reactor's thread after some seconds."""
-    reactor.callFromThread(reactor.callLater, wait_s, work)
+    clientConnectionFailed = clientConnectionLost  # noqa: N815 - nobody answered
 
 
 def start_reactor() -> None:

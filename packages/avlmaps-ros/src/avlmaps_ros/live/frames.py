@@ -1,7 +1,6 @@
-"""Frames out of the messages of a running robot: colour and depth of one moment, their cameras, and where it was.
+"""Frames of a running robot: colour and depth of one moment, their cameras, and where it was.
 
-It knows no ROS: it takes messages, of rclpy or of the same fields, with the time of this machine at which
-they came, and says which frames are whole. What cannot become a frame is left out, counted, and said once.
+Messages are those of rclpy or have the same fields. What cannot become a frame is left out, counted, and said once.
 """
 
 from collections import deque
@@ -28,20 +27,14 @@ from avlmaps.recordings.formats.ros_transforms import TransformTree, body_of
 
 Kind = Literal["rgb", "depth", "rgb_info", "depth_info", "tf", "tf_static", "pose"]
 
-PARTNER_WITHIN_S = 1.0
-"""A depth picture waits this long for the colour picture of its moment."""
-POSE_WITHIN_S = 0.5
-"""A pair of pictures waits this long for the pose of its moment, while no older pose comes."""
-LATER_POSE_WITHIN_S = 0.1
-"""... and this long for a pose after it, between which and the one before it lies."""
-SETTLED_S = 2.0
-"""A calibration or a mount that has not come by then is taken to be missing."""
+PARTNER_WITHIN_S = 1.0  # a depth picture waits this long for the colour picture of its moment
+POSE_WITHIN_S = 0.5  # a pair of pictures waits this long for the pose of its moment, while no older pose comes
+LATER_POSE_WITHIN_S = 0.1  # ... and this long for a pose after it, between which and the one before it lies
+SETTLED_S = 2.0  # a calibration or a mount that has not come by then is taken to be missing
 _HELD = 60  # pictures and pairs that wait, at most
 _FORGET_EVERY = 500  # transforms
-KEPT_S = 30.0
-"""Transforms are kept this long: pictures may come late, since they are sent again where a part was lost."""
-PAUSE_S, LEAST_GAPS = 3.0, 10
-"""A longer time without a picture is a pause; from fewer gaps no period is known."""
+KEPT_S = 30.0  # transforms are kept this long: pictures may come late, since they are sent again where a part was lost
+PAUSE_S, LEAST_GAPS = 3.0, 10  # a longer time without a picture is a pause; from fewer gaps no period is known
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,13 +99,7 @@ class RosFrames:
         return lost, len(self._gaps_s) + 1 + lost
 
     def take(self, kind: Kind, message: Any, now_s: float) -> None:
-        """Take a message.
-
-        Args:
-            kind: what it is for.
-            message: of sensor_msgs, tf2_msgs, nav_msgs or geometry_msgs.
-            now_s: when it came, by a clock of this machine that never goes back.
-        """
+        """Take a message; ``now_s`` is when it came, by a clock that never goes back."""
         match kind:
             case "rgb" | "depth":
                 self._take_picture(kind, message, now_s)
@@ -127,11 +114,7 @@ class RosFrames:
                 self._take_pose(message)
 
     def ready(self, now_s: float) -> list[RosFrame]:
-        """Return the frames that are whole now, in the order of time.
-
-        Args:
-            now_s: by the clock of ``take``.
-        """
+        """Return the frames that are whole now, in the order of time, by the clock of ``take``."""
         self._pair(now_s)
         found: list[RosFrame] = []
         while self._pairs:
@@ -232,7 +215,6 @@ class RosFrames:
             self._tree.forget(stamp_s - KEPT_S)
 
     def _pair(self, now_s: float) -> None:
-        """Put depth pictures and the colour pictures of their moments together."""
         colours, depths = self._pictures["rgb"], self._pictures["depth"]
         while depths:
             depth = depths[0]
@@ -252,7 +234,6 @@ class RosFrames:
             depths.popleft()
 
     def _rig_of(self, pair: _Pair, now_s: float) -> Rig | None:
-        """Return the cameras, as soon as they are known."""
         if self._rig is not None or "rgb_info" not in self._infos:
             return self._rig
         settled = self._first_s is not None and now_s - self._first_s > SETTLED_S
@@ -294,7 +275,6 @@ class RosFrames:
         return pose[0] if known[0] else None
 
     def _read(self, pair: _Pair, rig: Rig, pose: Float64[np.ndarray, "4 4"]) -> RosFrame | None:
-        """Read the pictures of a frame, None where they cannot be."""
         rgb_topic, depth_topic = self._topics["rgb"], self._topics["depth"]
         try:
             rgb = colour_of(pair.colour.message, rgb_topic, rig.rgb)

@@ -47,13 +47,9 @@ Arrived = tuple[str, Any, float]  # what it is for, the message, when it came (m
 
 
 class _Parcel(msgspec.Struct, array_like=True):
-    """One message on its way from the receiving process; or, without a type, a fact of that process.
+    """One message on its way from the receiving process; or, without a type, a fact of it: chosen, described, fault.
 
-    Attributes:
-        kind: what it is for; ``chosen``, ``described`` or ``fault``.
-        type: of the message.
-        came_s: when it came (monotonic, which is one clock on one machine).
-        content: as it was received.
+    It came at ``came_s`` (monotonic, which is one clock on one machine).
     """
 
     kind: str
@@ -71,13 +67,9 @@ class Ros2Inbox:
     """
 
     def __init__(self, topics: RosTopics) -> None:
-        """Join the network of ``ROS_DOMAIN_ID``.
+        """Join the network of ``ROS_DOMAIN_ID``; topics without a name are found by their types.
 
-        Args:
-            topics: by name; the others are found by their types.
-
-        Raises:
-            BackendError: a message package is not installed.
+        Raise `BackendError` where a message package is not installed.
         """
         for kind in (_RAW, _COMPRESSED, _INFO, _TF):
             interface(kind)
@@ -122,7 +114,6 @@ class Ros2Inbox:
                 self.fault = parcel.content.decode()
 
     def described(self) -> str:
-        """Return what is there, as part of a sentence."""
         return self._described
 
 
@@ -159,7 +150,6 @@ class _Receiver:
         self._executor.add_node(self._node)
 
     def hand_on(self) -> None:
-        """Send what came, until nobody takes it."""
         while not self._closed:
             with self._door:
                 self._door.wait_for(lambda: bool(self._waiting))
@@ -171,7 +161,6 @@ class _Receiver:
                 self._closed = True
 
     def work(self) -> None:
-        """Look for topics and take messages, until nobody takes them."""
         looked_s = float("-inf")
         try:
             while not self._closed:
@@ -208,7 +197,6 @@ class _Receiver:
         )
 
     def _look(self) -> None:
-        """Subscribe to what is wanted and has been discovered."""
         every = self._node.get_topic_names_and_types()
         # A topic to which others listen alone does not say yet whether what it will give is latched.
         self._known = {name: kinds[0] for name, kinds in every if kinds and self._node.count_publishers(name)}

@@ -16,17 +16,14 @@ from avlmaps.recordings.formats.ros_messages import stamp_of
 from avlmaps.recordings.formats.ros_sound import BEYOND_A_TURN_RAD, Pcm, angle_of, sampled_pieces
 from avlmaps.recordings.microphones import Microphones
 
-HELD = 100
-"""Floats that wait until one is no angle in radians; if all are, they are taken as radians."""
+HELD = 100  # floats that wait until one is no angle in radians; if all are, they are taken as radians
 
 
 class RosDirections:
     """Reads the azimuths on one topic, in radians, as a bag's are read, and says when each was.
 
     Whole numbers are degrees. Floats are radians unless one is beyond a turn, so that the first ones are held back.
-
-    Attributes:
-        unread: messages that came before the first picture, whose clock is that of the map.
+    ``unread`` counts messages before the first picture, whose clock is that of the map.
     """
 
     def __init__(self, topic: str, tell: Callable[[str], None]) -> None:
@@ -38,10 +35,7 @@ class RosDirections:
     def take(self, message: Any, ahead_s: float | None, now_s: float) -> list[tuple[float, float]]:
         """Return the directions that are known now: when, and the azimuth in radians.
 
-        Args:
-            message: of std_msgs numbers, or a PoseStamped.
-            ahead_s: by how much the pictures' stamps are ahead of this machine's clock; None before the first.
-            now_s: by this machine's clock.
+        The pictures' stamps are ahead of this machine's clock by ``ahead_s``; None before the first.
         """
         angle, is_whole = angle_of(message)
         if hasattr(message, "pose"):
@@ -69,20 +63,16 @@ class RosDirections:
         return stamp_s, wrap_angle(radians(angle) if self._in_degrees else angle)
 
 
-DRIFT_S = 0.1
-"""Sound without stamps is given a place again where it is off by more than this, seconds."""
+DRIFT_S = 0.1  # sound without stamps is given a place again where it is off by more than this, seconds
 INFO_WITHIN_S = 2.0
 """An AudioInfo that has not come within this time of its sound is said to be missing; it may come later still."""
 
 
 class RosSound:
-    """Reads the messages of one topic, and says when each sounds.
+    """Reads the messages of one topic, and says when each sounds; ``unheard`` counts those that could not be used.
 
     AudioStamped has stamps and says how it is coded. AudioData is bytes of 16-bit samples, whose rate ``pcm`` or an
     AudioInfo says, which may come later than the sound; without a stamp it ends when it came.
-
-    Attributes:
-        unheard: messages that could not be used.
     """
 
     def __init__(
@@ -127,13 +117,7 @@ class RosSound:
         return Pcm.check_rate(int(info.sample_rate), int(info.channels), f"The AudioInfo of {self._topic}")
 
     def take(self, message: Any, ahead_s: float | None, now_s: float) -> tuple[Sound | ChannelSound, float] | None:
-        """Return a message's sound, and when it begins; None where it cannot be used, which is counted.
-
-        Args:
-            message: AudioStamped, AudioDataStamped or AudioData.
-            ahead_s: by how much the pictures' stamps are ahead of this machine's clock; None before the first.
-            now_s: by this machine's clock.
-        """
+        """Return a message's sound, and when it begins; None where it cannot be used. See `RosDirections.take`."""
         pcm, samples = self._samples(message, now_s)
         is_stamped = getattr(message, "header", None) is not None
         if pcm is None or not (is_stamped or ahead_s is not None):

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from time import monotonic
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from avlmaps.core.errors import AudioError, BackendError, RecordingError
 from avlmaps.core.progress import say
@@ -16,26 +16,11 @@ from avlmaps.recordings.formats.ros_sound import Pcm
 from avlmaps_ros.live.frames import RosFrame, RosFrames
 from avlmaps_ros.live.sound import RosDirections, RosSound
 
+if TYPE_CHECKING:
+    from avlmaps_ros.live.inbox import Ros2Inbox
+
 _LOOK_S = 0.05
 _SAID = ("rgb", "depth", "pose", "audio", "directions")  # at the beginning, what is read
-
-
-class Inbox(Protocol):
-    """What stores messages until they are taken: `ros2.Ros2Inbox`."""
-
-    chosen: dict[str, str]
-    fault: str
-
-    def __enter__(self) -> "Inbox": ...
-    def __exit__(self, *_: object) -> None: ...
-
-    def take(self, wait_s: float) -> list[tuple[str, Any, float]]:
-        """Return what arrived since the last call, or the first of it: what it is for, the message, when it came."""
-        ...
-
-    def described(self) -> str:
-        """Return what is there, as part of a sentence."""
-        ...
 
 
 def ros_topics(named: Mapping[str, str]) -> RosTopics:
@@ -47,7 +32,7 @@ def ros_topics(named: Mapping[str, str]) -> RosTopics:
     return RosTopics(**named)
 
 
-def open_ros2(topics: RosTopics) -> Inbox:
+def open_ros2(topics: RosTopics) -> "Ros2Inbox":
     """Join ROS 2. ``BackendError``: this Python has no rclpy, or a message package is missing."""
     try:
         from avlmaps_ros.live.inbox import Ros2Inbox
@@ -66,21 +51,12 @@ def follow_ros2(
     give_up_s: float = 60.0,
     tell: Callable[[str], None] = say,
     over: Callable[[], bool] = lambda: False,
-    join: Callable[[RosTopics], Inbox] = open_ros2,
+    join: Callable[[RosTopics], "Ros2Inbox"] = open_ros2,
 ) -> None:
-    """Give a live map the frames and the sound of a running robot, until it is over or nothing comes any more.
+    """Give a live map the frames and the sound of a running robot, until ``over``, or no frame came for ``give_up_s``.
 
-    Args:
-        live: the map.
-        topics: by name; the others are found by their types.
-        give_up_s: end when no frame came for this long.
-        tell: called with each doubt and what else is worth knowing.
-        over: whether to end; queried all along.
-        join: opens what stores messages.
-
-    Raises:
-        BackendError: this Python has no rclpy.
-        RecordingError: no frame came at all.
+    Topics without a name are found by their types. ``tell`` is called with each doubt and what else is worth knowing.
+    Raise `BackendError` where this Python has no rclpy, `RecordingError` where no frame came at all.
     """
     with join(topics) as inbox:
         source = _Source(live, topics, inbox, tell)
@@ -105,9 +81,7 @@ def follow_ros2(
 
 
 class _Source:
-    """What arrives, given to a live map."""
-
-    def __init__(self, live: LiveMap, topics: RosTopics, inbox: Inbox, tell: Callable[[str], None]) -> None:
+    def __init__(self, live: LiveMap, topics: RosTopics, inbox: "Ros2Inbox", tell: Callable[[str], None]) -> None:
         self.frames_in = 0
         self._live, self._topics, self._inbox, self._tell = live, topics, inbox, tell
         self._frames: RosFrames | None = None
@@ -141,7 +115,6 @@ class _Source:
         return came
 
     def _add(self, frames: list[RosFrame]) -> int:
-        """Give frames to the map; return how many it takes."""
         added = 0
         for frame in frames:
             try:
@@ -153,7 +126,6 @@ class _Source:
         return added
 
     def missing(self) -> str:
-        """Return what there is too little of, as part of a sentence."""
         if self._frames is None:
             named = " and ".join(topic for topic in (self._topics.rgb, self._topics.depth) if topic)
             return f"nobody publishes {named}" if named else "nobody publishes pictures of colour and of depth"
@@ -162,7 +134,6 @@ class _Source:
         return self._frames.missing()
 
     def finish(self) -> None:
-        """Say what was left out."""
         frames = self._frames
         if frames is None:
             return
