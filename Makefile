@@ -54,7 +54,7 @@ demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land 
 	@echo "For the command avlmaps in this shell: source $(VENV)/bin/activate"
 
 test: $(READY)  ## Run what every change must pass (offline, two cores, no GPU).
-	$(RUN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=30 -m "not nightly"
+	$(RUN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --durations=30 -m "not nightly"
 	$(RUN)/python tests/helpers/budget.py seconds
 
 nightly: $(READY)  ## Run every test: laws on four times the cases, fuzz, kills, lists, suites, browser (an hour).

@@ -1,34 +1,60 @@
-"""The README's Python runs as it stands, and its commands are words that the command line knows."""
+"""The Python of the README and of the tutorial runs as it stands, and the README's commands are known verbs."""
 
 import json
 import re
 import shlex
 from pathlib import Path
+from unittest.mock import create_autospec
 
 import numpy as np
 import pytest
 
+import avlmaps_sim
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
 from helpers.raycast import render
 from helpers.room import Room
+from helpers.walked_room import RATE_HZ, beeps
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with a walk through a small room as REC."""
     camera, room = Pinhole(80.0, 80.0, 60.0, 45.0, 120, 90), Room()
     rig = Rig(camera, camera)
     with RecordingWriter(tmp_path / "REC", rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
         for index, pose in enumerate(room.walk()[100:180:16]):
             view = render(room.scene, camera, pose)
             writer.add(Frame(index, f"{index:06d}", index / 4.0, view.rgb, view.depth_m, pose, rig))
+        writer.set_audio(Sound(beeps(), RATE_HZ))
     monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_readmes_python_runs(folder: Path) -> None:
     (block,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     exec(compile(block, "README.md", "exec"), {})
-    assert (tmp_path / "heat.png").stat().st_size > 1000
+    assert (folder / "heat.png").stat().st_size > 1000
+
+
+def test_the_tutorial_runs_from_top_to_bottom(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As a newcomer pastes it; its walk through a home is not made, the one through a small room is there."""
+    record = create_autospec(avlmaps_sim.record_scene)
+    monkeypatch.setattr(avlmaps_sim, "record_scene", record)
+    page = (ROOT / "docs/tutorials/first-map.md").read_text(encoding="utf-8")
+    exec(compile("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), "first-map.md", "exec"), {})
+    assert record.call_args.args[1] == "REC"
+    said = capsys.readouterr().out
+    assert not re.search(r"\.\d{5,}[,)]", said), f"positions are plain: {said}"
+    assert (folder / "heat.png").stat().st_size > 1000
+    assert (folder / "home.ply").stat().st_size > 1000
 
 
 def test_the_readmes_commands_are_verbs() -> None:

@@ -108,6 +108,7 @@ def test_a_track_that_is_there_already_is_kept(tmp_path: Path, clips: Path) -> N
     np.testing.assert_allclose(track.read(begin, end).samples, there.read(begin, end).samples, atol=1e-4)
 
 
+@pytest.mark.nightly
 def test_sounds_on_a_long_way_are_two_metres_apart_in_a_straight_line(tmp_path: Path, clips: Path) -> None:
     angle = np.linspace(0.0, 6.0 * np.pi, 240)  # three rounds on a circle of 3 m
     walk = FakeWalk(np.arange(240) / 2.0, 3.0 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1))

@@ -26,6 +26,7 @@ def test_intervals_are_the_textbooks() -> None:
     np.testing.assert_allclose(poisson(10), (4.795, 18.390), atol=0.001)
 
 
+@pytest.mark.nightly
 @pytest.mark.shared
 def test_real_sounds_are_found_where_they_are(shared_data: Path) -> None:
     chosen = clips_to_test(shared_data / "data" / "sounds")["folds 4 and 5"]

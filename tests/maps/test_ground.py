@@ -291,6 +291,7 @@ def nyu_frames(folder: Path, every: int) -> list[tuple[str, Frame, np.ndarray, f
     return made
 
 
+@pytest.mark.nightly
 @pytest.mark.shared
 def test_single_kinect_frames_of_homes_have_their_floor(shared_data: Path) -> None:
     frames = nyu_frames(shared_data / "data" / "nyuv2", every=18)

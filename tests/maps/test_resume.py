@@ -91,14 +91,16 @@ def begin(path: Path, known: Undisturbed, *, had_old: bool) -> None:
         shutil.copytree(known.old, path)
 
 
-@pytest.mark.few(1)
-@pytest.mark.parametrize("had_old", [True, False])
+@pytest.mark.parametrize(
+    ("had_old", "least"),
+    [(True, 1), pytest.param(True, 3, marks=pytest.mark.nightly), pytest.param(False, 3, marks=pytest.mark.nightly)],
+)
 def test_a_build_killed_at_random_instants_ends_with_the_same_map(
-    builder: Builder, undisturbed: Undisturbed, had_old: bool
+    builder: Builder, undisturbed: Undisturbed, had_old: bool, least: int
 ) -> None:
     rng, kills, rounds = np.random.default_rng(20), 0, 0
-    while kills < 3:
-        path = builder.folder / f"random-{had_old}-{rounds}.avlmap"
+    while kills < least:
+        path = builder.folder / f"random-{had_old}-{least}-{rounds}.avlmap"
         begin(path, undisturbed, had_old=had_old)
         while builder.build(path, NEW, delay_s=rng.uniform(0.0, undisturbed.seconds))[0] != 0:
             kills += 1

@@ -123,12 +123,12 @@ def test_the_guides_encoder_answers_as_an_object_and_as_a_package(
     (tmp_path / "hues_of_the_guide.py").write_text(code.partition("encoders =")[0], encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     register(Backend(Kind.PIXELS, "hues", "hues_of_the_guide:Hues"))
-    walk = write_walk(tmp_path / "rec")
-    for number, pixels in enumerate((importlib.import_module("hues_of_the_guide").Hues(), "hues")):
-        encoders = Encoders.named("colours", pixels=pixels)
-        built = avlmaps.build_map(walk, tmp_path / f"{number}.avlmap", encoders=encoders)
-        assert built.ask("something red").text
+    encoders = Encoders.named("colours", pixels="hues")
     assert encoders.pixels is encoders.pixels
+    built = avlmaps.build_map(write_walk(tmp_path / "rec"), tmp_path / "map", encoders=encoders)
+    assert built.ask("something red").text
+    hues = Encoders.named("colours", pixels=importlib.import_module("hues_of_the_guide").Hues())
+    assert avlmaps.open_map(tmp_path / "map", encoders=hues).ask("something red").text
 
 
 def test_a_package_that_lacks_what_nobody_can_make_is_named_by_the_build_and_by_the_check(

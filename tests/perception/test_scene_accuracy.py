@@ -99,6 +99,7 @@ KITCHEN = {
 }  # fmt: skip
 
 
+@pytest.mark.nightly
 @pytest.mark.shared
 @pytest.mark.parametrize(("weights", "least"), [(DEFAULT_WEIGHTS, 0.6)])
 def test_the_real_kitchen_of_another_camera_is_recognised(shared_data: Path, weights: str, least: float) -> None:

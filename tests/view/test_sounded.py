@@ -58,6 +58,7 @@ def served_sounds(sounded: Path) -> Iterator[Served]:
     yield from serving(sounded)
 
 
+@pytest.mark.nightly
 @pytest.mark.browser
 def test_a_click_on_a_source_shows_rays_and_plays_its_clip(browser, served_sounds: Served) -> None:  # noqa: F811
     page = opened(browser, served_sounds.url)

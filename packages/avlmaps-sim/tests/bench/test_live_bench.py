@@ -28,6 +28,7 @@ def test_a_drive_ends_as_its_build_and_says_what_it_took(tmp_path: Path) -> None
         run_live([], used, "colours", LiveBench(), 0, tmp_path)
 
 
+@pytest.mark.nightly
 def test_kills_that_are_stored_are_not_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     walk, used, killed = write_walk(tmp_path / "rec"), avlmaps.Encoders.named("colours"), []
 

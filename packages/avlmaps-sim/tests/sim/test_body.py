@@ -163,6 +163,7 @@ def test_what_it_is_near_to_is_what_the_scene_has_there(seed):
     assert inside or clear_m == pytest.approx(nearest, abs=0.06)
 
 
+@pytest.mark.nightly
 def test_thousands_of_actions_stay_in_the_home():
     robot = body(GroundPose(2.2, 2.2))
     rng = np.random.default_rng(0)
