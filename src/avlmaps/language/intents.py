@@ -6,7 +6,7 @@ clockwise (positive is to the right); distances are in metres. Their words, thei
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache
@@ -300,24 +300,21 @@ def targets_of(intent: Intent) -> tuple[Target, ...]:
     return tuple(found)
 
 
-def steps_of(intents: Sequence[Intent]) -> list[Intent]:
-    """Return intents with the bodies of those that have some in their places."""
-    found: list[Intent] = []
-    for intent in intents:
-        inner = blocks_of(intent)
-        found += steps_of(inner) if inner else [intent]
-    return found
-
-
 def blocks_of(intent: Intent) -> tuple[Intent, ...]:
     """Return the intents inside an intent: of a repeated one its body, of a conditional one both branches."""
-    match intent:
-        case Repeat():
-            return intent.body
-        case If():
-            return (*intent.body, *intent.otherwise)
-        case _:
-            return ()
+    return (*getattr(intent, "body", ()), *getattr(intent, "otherwise", ()))
+
+
+def every(intents: Sequence[Intent]) -> Iterator[Intent]:
+    """Yield intents, and behind each those inside it."""
+    for intent in intents:
+        yield intent
+        yield from every(blocks_of(intent))
+
+
+def steps_of(intents: Sequence[Intent]) -> list[Intent]:
+    """Return intents with the bodies of those that have some in their places."""
+    return [one for one in every(intents) if not blocks_of(one)]
 
 
 class Filled(Formatter):

@@ -359,20 +359,10 @@ def _used(intents: Sequence[Intent], tokens: Sequence[Token]) -> frozenset[int]:
     """Return the tokens that some intents are made of: words of names, and where the amounts begin."""
     named = {word for one in intents for to in targets_of(one) for part in (to, *to.near) for word in part.name.split()}
     used = {at for at, token in enumerate(tokens) if token.text in named}
-    numbers = {abs(value) for value in _numbers(intents)}
+    values = (value for one in act.every(intents) for value in act.values_of(one).values())
+    numbers = {abs(value) for value in values if isinstance(value, float | int)}
     for at in range(len(tokens)):
-        values = {amount(tokens, at, of) for of in ("metres", "degrees", "seconds", "count")}
-        if at not in used and amount_end(tokens, at) > at and values & numbers:
+        said = {amount(tokens, at, of) for of in ("metres", "degrees", "seconds", "count")}
+        if at not in used and amount_end(tokens, at) > at and said & numbers:
             used.add(at)
     return frozenset(used)
-
-
-def _numbers(intents: Sequence[Intent]) -> list[float]:
-    found: list[float] = []
-    for one in intents:
-        match one:
-            case act.Repeat(times=times, body=body):
-                found += [float(times), *_numbers(body)]
-            case _:
-                found += [value for name in one.__slots__ if isinstance(value := getattr(one, name), float)]
-    return found

@@ -23,7 +23,7 @@ _ARGUMENTS = {
 
 def write_program(intents: Sequence[Intent]) -> str:
     """Return the program for some intents; none of them is a refusal or a question."""
-    heads = dict.fromkeys(act.row_of(intent).head for intent in _flat(intents))
+    heads = dict.fromkeys(act.row_of(intent).head for intent in act.every(intents))
     writer = _Writer(intents)
     writer.block(intents)
     return "\n".join([*filter(None, heads), *writer.lines]) + "\n"
@@ -36,7 +36,7 @@ class _Writer(act.Filled):
         self.taken = Counter[str]()
         self.indent = ""
         self.needed = Counter[Target]()
-        for intent in _flat(intents):
+        for intent in act.every(intents):
             said = act.paths_in(act.row_of(intent).program)
             values = act.values_of(intent).items()
             self.needed.update(_targets([intent]))
@@ -57,7 +57,7 @@ class _Writer(act.Filled):
         for intent in intents:
             program, values = act.row_of(intent).program, act.values_of(intent)
             if program.startswith("for"):
-                visited = {one.of for one in _flat(blocks_of(intent)) if isinstance(one, act.VisitEach)}
+                visited = {one.of for one in act.every(blocks_of(intent)) if isinstance(one, act.VisitEach)}
                 for target in _targets(blocks_of(intent)):
                     if target not in visited:
                         self.value(target)
@@ -140,12 +140,6 @@ class _Writer(act.Filled):
 
 def _targets(intents: Sequence[Intent]) -> Iterator[Target]:
     return (target for intent in intents for target in targets_of(intent) if target.kind is not TargetKind.HERE)
-
-
-def _flat(intents: Sequence[Intent]) -> Iterator[Intent]:
-    for intent in intents:
-        yield intent
-        yield from _flat(blocks_of(intent))
 
 
 def _quoted(text: str) -> str:
