@@ -16,16 +16,13 @@ def test_an_error_in_the_middle_of_a_loop_stands_on_its_own_last_line(walk: Path
     status, out, err = run("build", copy, "--out", tmp_path / "map")
     assert (status, out) == (1, "")
     last = err.rstrip("\n").replace("\r", "\n").split("\n")[-1]
-    assert last.startswith("avlmaps: ")
-    assert "frames cannot be read" in last
+    assert last.startswith("avlmaps: ") and "frames cannot be read" in last
 
 
 def test_a_name_that_the_system_refuses_is_told_without_its_number_for_it(built: Path, run) -> None:
     status, out, err = run("query", built, "--image", "x" * 300 + ".png")
-    assert (status, out) == (1, "")
-    assert err.count("\n") == 1
-    assert "Errno" not in err
-    assert "File name too long; check the path" in err
+    assert (status, out) == (1, "") and err.count("\n") == 1
+    assert "Errno" not in err and "File name too long; check the path" in err
 
 
 def test_a_broken_package_does_not_hide_the_other_backends(answer, run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -44,5 +41,4 @@ def test_a_broken_package_does_not_hide_the_other_backends(answer, run, monkeypa
 def test_a_track_of_one_sample_a_second_is_no_sound(built: Path, run, tmp_path: Path) -> None:
     soundfile.write(tmp_path / "slow.wav", np.zeros(20), 1)
     status, _, err = run("query", built, "--sound-clip", tmp_path / "slow.wav")
-    assert status == 1
-    assert "has 1 samples a second, too few for sounds" in err
+    assert status == 1 and "has 1 samples a second, too few for sounds" in err

@@ -1,13 +1,11 @@
 """`avlmaps things` and `avlmaps export`, end to end on a small map."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 
-def test_things_lists_what_the_map_holds(built: Path, answer: Callable[..., dict[str, Any]], tmp_path: Path) -> None:
+def test_things_lists_what_the_map_holds(built: Path, answer, tmp_path: Path) -> None:
     listed = answer("things", built, "--least", "0.2", "--csv", tmp_path / "t.csv")
     assert listed["frame"] == "recording"
     assert listed["things"], "the room has colours of some size"
@@ -16,17 +14,10 @@ def test_things_lists_what_the_map_holds(built: Path, answer: Callable[..., dict
     assert (tmp_path / "t.csv").read_text().count("\n") == 1 + len(listed["things"]) + 1
 
 
-def test_things_prints_a_table(built: Path, run: Callable[..., tuple[int, str, str]]) -> None:
-    status, out, _ = run("things", built, "--least", "0.2")
-    assert status == 0
-    assert out.startswith("thing ")
-    assert "position of the robot" in out
-
-
-def test_things_are_selected_and_paged(
-    built: Path, answer: Callable[..., dict[str, Any]], run: Callable[..., tuple[int, str, str]], tmp_path: Path
-) -> None:
+def test_things_are_selected_and_paged(built: Path, answer, run, tmp_path: Path) -> None:
     every = answer("things", built, "--least", "0.2")["things"]
+    out = run("things", built, "--least", "0.2")[1]
+    assert out.startswith("thing ") and "position of the robot" in out
     words = ("things", built, "--least", "0.2", "--top", "1")
     first = answer(*words, "--csv", tmp_path / "t.csv")
     assert first["total"] == len(every) == first["pages"] and first["things"] == every[:1]
@@ -42,9 +33,7 @@ def test_things_are_selected_and_paged(
         assert code == status and says in err, err
 
 
-def test_rooms_lists_and_draws_rooms(
-    built: Path, answer: Callable[..., dict[str, Any]], run: Callable[..., tuple[int, str, str]], tmp_path: Path
-) -> None:
+def test_rooms_lists_and_draws_rooms(built: Path, answer, run, tmp_path: Path) -> None:
     listed = answer("rooms", built, "--plot", tmp_path / "r.png")
     assert listed["rooms"] == answer("things", built)["rooms"] and Path(listed["plot"]).stat().st_size > 0
     assert answer("rooms", built, "--least", "1")["rooms"] == [
@@ -54,9 +43,7 @@ def test_rooms_lists_and_draws_rooms(
 
 
 @pytest.mark.parametrize("name", ["a.ply", "a.glb", "a.csv", "a.pgm", "a.openlex3d"])
-def test_export_writes_each_format(
-    built: Path, answer: Callable[..., dict[str, Any]], tmp_path: Path, name: str
-) -> None:
+def test_export_writes_each_format(built: Path, answer, tmp_path: Path, name: str) -> None:
     written = answer("export", built, "--out", tmp_path / name)
     assert all(Path(file).stat().st_size > 0 for file in written["files"])
     assert written["frame"] == ("level" if name in ("a.pgm", "a.glb") else "recording")
@@ -73,17 +60,13 @@ def test_export_writes_each_format(
         (("--out", "a.openlex3d", "--heat", "red"), "has no colours"),
     ],
 )
-def test_export_refuses_what_does_not_fit(
-    built: Path, run: Callable[..., tuple[int, str, str]], words: tuple[str, ...], says: str
-) -> None:
+def test_export_refuses_what_does_not_fit(built: Path, run, words: tuple[str, ...], says: str) -> None:
     status, _, err = run("export", built, *words)
-    assert status == 2
-    assert says in err
+    assert status == 2 and says in err
 
 
-def test_export_replaces_nothing_unasked(built: Path, run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+def test_export_replaces_nothing_unasked(built: Path, run, tmp_path: Path) -> None:
     assert run("export", built, "--out", tmp_path / "a.csv")[0] == 0
     status, _, err = run("export", built, "--out", tmp_path / "a.csv")
-    assert status == 2
-    assert "--overwrite" in err
+    assert status == 2 and "--overwrite" in err
     assert run("export", built, "--out", tmp_path / "a.csv", "--overwrite")[0] == 0

@@ -74,8 +74,7 @@ def test_a_wrong_file_is_refused_in_a_sentence(run, walk: Path, copied: Path, tm
     text, said = FILES[case]
     (tmp_path / "poses.txt").write_text(text)
     code, _, err = run("build", walk, "--out", copied, "--corrected-poses", tmp_path / "poses.txt", *BUILT)
-    assert code == 1
-    assert said in err
+    assert code == 1 and said in err
     assert "Traceback" not in err
 
 
@@ -116,8 +115,7 @@ def test_a_drive_that_comes_back_is_put_right_by_its_own_pictures(answer, tmp_pa
 def test_poses_of_a_file_and_closed_loops_are_two_things(run, walk: Path, copied: Path, tmp_path: Path) -> None:
     file = moved_file(walk, tmp_path / "poses.txt", 0.2)
     code, _, err = run("build", walk, "--out", copied, "--close-loops", "--corrected-poses", file, *BUILT)
-    assert code == 2
-    assert "choose one" in err
+    assert code == 2 and "choose one" in err
 
 
 def test_what_a_person_corrected_moves_with_the_map(walk: Path, copied: Path, tmp_path: Path, answer) -> None:

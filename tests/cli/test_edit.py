@@ -48,11 +48,9 @@ def test_edits_are_there_in_another_build_of_the_map(home: Path, walk: Path, run
     assert run("edit", home, "--pin", "my pad", "--at", "0.5,0.5,0.1")[0] == 0
     log = (home / EDITS).read_bytes()
     words = ("build", walk, "--out", home, "--voxel-size-m", "0.2", "--profile", "colours", "--overwrite")
-    assert run(*words)[0] == 0
-    assert (home / EDITS).read_bytes() == log
+    assert run(*words)[0] == 0 and (home / EDITS).read_bytes() == log
     (row,) = json.loads(run("edit", home, "--list", "--json")[1])["edits"]
-    assert row["state"] == "applied"
-    assert json.loads(run("query", home, "my pad", "--json")[1])["found"]
+    assert row["state"] == "applied" and json.loads(run("query", home, "my pad", "--json")[1])["found"]
     nowhere = EditedSpot(name="sofa", middle=(90.0, 0.0, 0.0), size=(1.0, 1.0, 1.0))
     append_edit(home, Edit.new("rename", [nowhere], name="couch", world=read_edits(home)[0].world))
     told = json.loads(run("info", home, "--json")[1])

@@ -65,8 +65,7 @@ def test_each_signal_cancels_the_goal_and_says_that_the_robot_stands(
         robot.moves_on = True
         process.send_signal(number)
         out, err = process.communicate(timeout=START_S)
-        assert ended(robot)
-        assert not robot.moves_on
+        assert ended(robot) and not robot.moves_on
     assert process.returncode == 128 + number, err
     last = err.splitlines()[-1]
     assert last.startswith(f"avlmaps: stopped by {number.name}: the active goal was cancelled; the robot stands at (")
@@ -102,8 +101,7 @@ def test_an_operator_who_takes_over_keeps_the_robot_when_the_program_ends(go: St
         assert process.returncode == 1, err
         assert "A goal of another client continues" in out
         sleep(1.0)  # what was still to be cancelled would be by now
-        assert robot.goals["rviz"]["status"] == 1
-        assert robot.moves_on
+        assert robot.goals["rviz"]["status"] == 1 and robot.moves_on
 
 
 def test_a_goal_that_is_not_given_up_ends_the_command_with_status_3(go: Started) -> None:
@@ -114,8 +112,7 @@ def test_a_goal_that_is_not_given_up_ends_the_command_with_status_3(go: Started)
         robot.moves_on = True
         out, err = process.communicate(timeout=START_S)
     assert process.returncode == 3, err
-    assert json.loads(out)["robot_stopped"] is False
-    assert "may still be driving" in err.splitlines()[-1]
+    assert json.loads(out)["robot_stopped"] is False and "may still be driving" in err.splitlines()[-1]
 
 
 @pytest.mark.parametrize(("ros", "kind"), [(2, "nav2"), (1, "move_base")])
@@ -128,8 +125,7 @@ def test_a_process_that_dies_or_stands_still_leaves_no_goal(
         assert robot.soon(lambda: len(robot.published("/avlmaps/heartbeat")) > 1, START_S)
         robot.moves_on = True
         process.send_signal(number)
-        assert robot.soon(lambda: ended(robot), START_S)
-        assert not robot.moves_on
+        assert robot.soon(lambda: ended(robot), START_S) and not robot.moves_on
 
 
 @pytest.mark.parametrize("number", SIGNALS, ids=lambda number: number.name)
@@ -184,8 +180,7 @@ def test_a_signal_after_the_program_does_not_say_that_no_goal_was_sent(
     nothing: Any = None
     with pytest.raises(Interrupted) as stopped:
         drive(Go(map=Path("room.avlmap"), sentence="turn left"), nothing, robot, nothing, nothing)
-    assert stopped.value.halt is unseen
-    assert stopped.value.status == 3
+    assert stopped.value.halt is unseen and stopped.value.status == 3
 
 
 @pytest.mark.parametrize("name", ["/robot1", "/robot2"])
@@ -198,8 +193,7 @@ def test_of_two_robots_the_one_of_the_file_drives(go: Started, name: str) -> Non
         turn, straight = robot.ops("send_action_goal")
         services = {call["service"].split("/")[1] for call in robot.ops("call_service")}
     assert (turn["action"], straight["action"]) == (f"{name}/spin", f"{name}/drive_on_heading")
-    assert straight["args"]["speed"] == 0.42
-    assert services <= {name.strip("/")}
+    assert straight["args"]["speed"] == 0.42 and services <= {name.strip("/")}
 
 
 @pytest.mark.parametrize("later_s", [0.0, 0.1])
@@ -212,8 +206,7 @@ def test_a_signal_while_it_plans_leaves_no_goal(go: Started, later_s: float) -> 
         _, err = process.communicate(timeout=START_S)
         assert ended(robot)
     assert process.returncode == 128 + signal.SIGTERM, err
-    assert "stopped by SIGTERM: " in err.splitlines()[-1]
-    assert "Traceback" not in err
+    assert "stopped by SIGTERM: " in err.splitlines()[-1] and "Traceback" not in err
 
 
 @pytest.mark.parametrize("later_s", [0.0, 0.05])
@@ -225,8 +218,7 @@ def test_a_signal_between_two_goals_leaves_no_goal(go: Started, later_s: float) 
         sleep(later_s)
         process.terminate()
         _, err = process.communicate(timeout=START_S)
-        assert ended(robot)
-        assert not robot.moves_on
+        assert ended(robot) and not robot.moves_on
     assert process.returncode == 128 + signal.SIGTERM, err
     assert "robot stands at" in err.splitlines()[-1]
 
@@ -254,6 +246,5 @@ def test_nonsense_in_the_robot_file_is_one_sentence_before_anything_connects(
     file.write_text(json.dumps({"settings": settings}))
     words = ("--robot", "nav2", "--ros", "ws://127.0.0.1:1", "--ros-frames", file)
     status, out, err = run("go", built, "turn left", *words)
-    assert (status, out) == (1, "")
-    assert says in err.splitlines()[-1]
+    assert (status, out) == (1, "") and says in err.splitlines()[-1]
     assert str(file) in err.splitlines()[-1]

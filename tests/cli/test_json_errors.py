@@ -14,61 +14,78 @@ from avlmaps.cli.verbs import installed, read_verb
 from avlmaps.core.progress import NOTICE
 
 ERRORS = (
-    (("demo", "--out", "FILE/below"), 1, "system"),
-    (("record", "--scene", "house:seven", "--out", "OUT"), 1, "scene"),
-    (("record", "--scene", "house:7", "--out", "OUT", "--size", "x"), 2, "usage"),
-    (("add-sounds", "REC", "--clips", "nowhere", "--out", "OUT"), 1, "audio"),
-    (("calibrate", "REC", "--out", "OUT"), 1, "recording"),
-    (("build", "nowhere", "--out", "OUT"), 1, "recording"),
-    (("build", "REC", "--out", "OUT", "--profile", "magic"), 1, "backend"),
-    (("import-map", "nowhere", "--out", "OUT"), 1, "map"),
-    (("info", "nowhere"), 1, "recording"),
-    (("query", "nowhere.avlmap", "the chair"), 1, "map"),
-    (("query", "MAP", "near near"), 1, "query"),
-    (("query", "MAP"), 2, "usage"),
-    (("query", "MAP", "--object", "red", "--plot", "x.doc"), 1, "query"),
-    (("locate", "MAP", "nothing.png"), 1, "query"),
-    (("live", "nowhere", "--out", "OUT"), 1, "recording"),
-    (("live", "--out", "OUT"), 2, "usage"),
-    (("live", "REC", "--out", "OUT", "--source", "ros2"), 2, "usage"),
-    (("live", "REC", "--out", "OUT", "--topics", "rgb=/rgb"), 1, "recording"),
-    (("merge", "nowhere.avlmap", "MAP", "--out", "OUT"), 1, "map"),
-    (("changes", "nowhere.avlmap"), 1, "map"),
-    (("edit", "nowhere.avlmap"), 1, "map"),
-    (("edit", "MAP", "--rename", "unicorn", "--to", "horse"), 1, "query"),
-    (("edit", "MAP", "--pin", "dock"), 2, "usage"),
-    (("edit", "MAP", "--forbid", "x", "--box", "1,2,3"), 1, "query"),
-    (("edit", "MAP", "--undo", "last"), 1, "query"),
-    (("sources", "nowhere.avlmap"), 1, "map"),
-    (("sources", "MAP"), 1, "query"),
-    (("go", "nowhere.avlmap", "go to the chair", "--scene", "house:7"), 1, "map"),
-    (("go", "MAP", "gabble gabble the", "--scene", "house:7"), 1, "unclear"),
-    (("things", "nowhere.avlmap"), 1, "map"),
-    (("rooms", "nowhere.avlmap"), 1, "map"),
-    (("shell", "nowhere.avlmap"), 1, "map"),
-    (("serve", "nowhere.avlmap"), 1, "map"),
-    (("view", "nowhere.avlmap"), 1, "map"),
-    (("view", "MAP", "--host", "no.such.host.invalid", "--no-browser"), 1, "serve"),
-    (("view", "MAP", "--questions", "the chair"), 2, "usage"),
-    (("view", "MAP", "--out", "OUT.txt"), 2, "usage"),
-    (("view", "MAP", "--out", "OUT.html", "--questions", "near near"), 1, "query"),
-    (("export", "nowhere.avlmap", "--out", "OUT.ply"), 1, "map"),
-    (("teach-sound", "x"), 2, "usage"),
-    (("teach-sound", "x", "nothing.wav"), 1, "audio"),
-    (("profiles", "--nonsense"), 2, "usage"),
-    (("bench", "sounds"), 1, "bench"),
+    (("demo", "--out", "FILE/below"), 1, "system", ""),
+    (("record", "--scene", "house:seven", "--out", "OUT"), 1, "scene", ""),
+    (("record", "--scene", "house:7", "--out", "OUT", "--size", "x"), 2, "usage", ""),
+    (("add-sounds", "REC", "--clips", "nowhere", "--out", "OUT"), 1, "audio", "nowhere"),
+    (("calibrate", "REC", "--out", "OUT"), 1, "recording", ""),
+    (("build", "nowhere", "--out", "OUT"), 1, "recording", "There is nothing at nowhere"),
+    (("build", "REC", "--out", "OUT", "--profile", "magic"), 1, "backend", "no profile called 'magic'"),
+    (("import-map", "nowhere", "--out", "OUT"), 1, "map", ""),
+    (("info", "nowhere"), 1, "recording", "nowhere"),
+    (("query", "nowhere.avlmap", "the chair"), 1, "map", "nowhere.avlmap"),
+    (("query", "MAP", "near near"), 1, "query", "A map cannot answer this"),
+    (("query", "MAP"), 2, "usage", "takes a sentence, or parts"),
+    (("query", "MAP", "--object", "red", "--plot", "x.doc"), 1, "query", ""),
+    (("locate", "MAP", "nothing.png"), 1, "query", "nothing.png"),
+    (("live", "nowhere", "--out", "OUT"), 1, "recording", ""),
+    (("live", "--out", "OUT"), 2, "usage", ""),
+    (("live", "REC", "--out", "OUT", "--source", "ros2"), 2, "usage", ""),
+    (("live", "REC", "--out", "OUT", "--topics", "rgb=/rgb"), 1, "recording", ""),
+    (("merge", "nowhere.avlmap", "MAP", "--out", "OUT"), 1, "map", ""),
+    (("changes", "nowhere.avlmap"), 1, "map", ""),
+    (("edit", "nowhere.avlmap"), 1, "map", ""),
+    (("edit", "MAP", "--rename", "unicorn", "--to", "horse"), 1, "query", ""),
+    (("edit", "MAP", "--pin", "dock"), 2, "usage", ""),
+    (("edit", "MAP", "--forbid", "x", "--box", "1,2,3"), 1, "query", ""),
+    (("edit", "MAP", "--undo", "last"), 1, "query", ""),
+    (("sources", "nowhere.avlmap"), 1, "map", ""),
+    (("sources", "MAP"), 1, "query", ""),
+    (("go", "nowhere.avlmap", "go to the chair", "--scene", "house:7"), 1, "map", ""),
+    (("go", "MAP", "gabble gabble the", "--scene", "house:7"), 1, "unclear", ""),
+    (("things", "nowhere.avlmap"), 1, "map", ""),
+    (("rooms", "nowhere.avlmap"), 1, "map", ""),
+    (("shell", "nowhere.avlmap"), 1, "map", ""),
+    (("serve", "nowhere.avlmap"), 1, "map", ""),
+    (("view", "nowhere.avlmap"), 1, "map", ""),
+    (("view", "MAP", "--host", "no.such.host.invalid", "--no-browser"), 1, "serve", ""),
+    (("view", "MAP", "--questions", "the chair"), 2, "usage", ""),
+    (("view", "MAP", "--out", "OUT.txt"), 2, "usage", ""),
+    (("view", "MAP", "--out", "OUT.html", "--questions", "near near"), 1, "query", ""),
+    (("export", "nowhere.avlmap", "--out", "OUT.ply"), 1, "map", ""),
+    (("teach-sound", "x"), 2, "usage", "takes clips to learn from, or --forget"),
+    (("teach-sound", "x", "nothing.wav"), 1, "audio", ""),
+    (("profiles", "--nonsense"), 2, "usage", ""),
+    (("bench", "sounds"), 1, "bench", "name it with --sounds"),
+    (("query", "MAP", "the chair", "--object", "red"), 2, "usage", "and not both"),
+    (("query", "MAP", "--object", "red", "--top", "0"), 2, "usage", "--top takes a number from 1 on, not 0"),
+    (("query", "MAP", "--object", "red", "--intrinsics", "1,2,3,4"), 2, "usage", "Intrinsics belong to a photo"),
+    (("query", "MAP", "the chair", "--near", "here"), 2, "usage", "A place is x,y"),
+    (("query", "MAP", "--object", " "), 1, "query", "The object in the query is empty"),
+    (("query", "MAP", "--object", "chair"), 1, "query", "understands nothing of 'chair'"),
+    (("query", "MAP", "--area", "kitchen"), 1, "backend", "has no views backend"),
+    (("query", "MAP", "--sound-clip", "nothing.wav"), 1, "query", "nothing.wav"),
+    (("query", "MAP", "--image", "nothing.png"), 1, "query", "nothing.png"),
+    (("locate", "MAP", "MAP/map.json"), 1, "query", "map.json"),
+    (("info", "REC", "--plot", "x.png"), 2, "usage", "--plot draws a map"),
+    (("build", "REC", "--out", "OUT", "--voxel-size-m", "0"), 2, "usage", "takes a number from 0.001 to 10"),
+    (("build", "REC", "--out", "OUT", "--rules", "paper", "--sensor", "kinect"), 2, "usage", "every depth as it is"),
+    (("build", "REC", "--out", "OUT", "--format", "tum"), 1, "recording", "rgb.txt"),
+    (("build", "REC", "--out", "OUT", "--audio", "nothing.wav"), 1, "audio", "nothing.wav"),
+    (("bench", "indexing", "--out", "OUT", "--model", "eyes=clip"), 1, "bench", "the modules are pixels"),
+    (("bench", "indexing", "--out", "OUT", "--scenes", "house:1", "--sounds", "nowhere"), 1, "bench", "nowhere"),
 )
 
 
 @pytest.mark.parametrize(
-    ("words", "status", "kind"),
+    ("words", "status", "kind", "says"),
     ERRORS,
     ids=lambda value: " ".join(map(str, value))[:40] if isinstance(value, tuple) else "",
 )
-def test_an_error_is_one_json_object(words, status, kind, built: Path, walk: Path, run, tmp_path: Path) -> None:
+def test_an_error_is_one_json_object(words, status, kind, says, built: Path, walk: Path, run, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     places = {"MAP": built, "REC": walk, "OUT": tmp_path / "out", "FILE/below": tmp_path / "file" / "below"}
-    places |= {"OUT.html": tmp_path / "page.html"}
+    places |= {"OUT.html": tmp_path / "page.html", "MAP/map.json": built / "map.json"}
     code, out, err = run(*[places.get(word, word) for word in words], "--json")
     assert code == status
     said = json.loads(out)
@@ -76,7 +93,7 @@ def test_an_error_is_one_json_object(words, status, kind, built: Path, walk: Pat
     assert said.keys() - {"ok", "choices"} == {"error"} and said["error"].keys() == {"kind", "message"}
     assert said["error"]["kind"] == kind
     message = said["error"]["message"]
-    assert message and "\n" not in message and not message.startswith("avlmaps:")
+    assert message and says in message and "\n" not in message and not message.startswith("avlmaps:")
     if status == 1:
         assert err.rstrip("\n").split("\n")[-1] == f"avlmaps: {message}", "people read the same sentence"
 

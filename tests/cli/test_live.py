@@ -49,8 +49,7 @@ def test_a_drive_updates_the_map_of_the_days_before(answer, dated: Path, built: 
 def test_what_into_needs_is_said(run, walk: Path, tmp_path: Path, words: tuple[str, ...], monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     code, _, err = run("live", walk, "--out", "today.avlmap", *words)
-    assert code == 2
-    assert "--into" in err
+    assert code == 2 and "--into" in err
 
 
 @pytest.mark.parametrize(

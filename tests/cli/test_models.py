@@ -77,10 +77,8 @@ WRONG = (
 @pytest.mark.parametrize(("words", "status", "sentence"), WRONG)
 def test_a_wrong_choice_is_one_sentence(words, status: int, sentence: str, walk: Path, run, tmp_path: Path) -> None:
     told = run("build", walk, "--out", tmp_path / "m.avlmap", *words)
-    assert told[0] == status
-    assert sentence in told[2]
-    assert told[2].count("\n") == 1
-    assert not (tmp_path / "m.avlmap" / "map.json").exists()
+    assert told[0] == status and sentence in told[2]
+    assert told[2].count("\n") == 1 and not (tmp_path / "m.avlmap" / "map.json").exists()
 
 
 @pytest.mark.nightly
@@ -88,28 +86,20 @@ def test_chosen_backends_build_the_map_and_info_tells_them(walk: Path, answer, t
     out, store = tmp_path / "m.avlmap", tmp_path / "store"
     words = ("--voxel-size-m", 0.1, "--frame-step", 4, "--model", "pixels=colours", "--feature-cache", store)
     told = answer("build", walk, "--out", out, *words)
-    assert told["models"]["pixels"] == "avlmaps/colour-words-1"
-    assert told["profile"] == "embedded"
+    assert told["models"]["pixels"] == "avlmaps/colour-words-1" and told["profile"] == "embedded"
     assert answer("info", out)["models"] == told["models"]
     assert {folder.name.partition("-")[0] for folder in store.iterdir()} >= {"pixels", "views", "local", "place"}
 
 
 def test_a_missing_package_is_told_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Backend, "missing", property(lambda self: self.needs))
-    assert state_of(Kind.PIXELS, "tipsv2") == (
-        "package missing",
-        install_command("foundation", distribution="avlmaps-models"),
-    )
-    assert state_of(Kind.SOUNDS, "audioclip") == (
-        "package missing",
-        install_command("paper", distribution="avlmaps-models"),
-    )
+    for kind, name, extra in ((Kind.PIXELS, "tipsv2", "foundation"), (Kind.SOUNDS, "audioclip", "paper")):
+        assert state_of(kind, name) == ("package missing", install_command(extra, distribution="avlmaps-models"))
 
 
 def test_weights_in_the_hubs_cache_are_seen_without_its_library(tmp_path: Path, every_package: None) -> None:
     state, how = state_of(Kind.PIXELS, "clip-patches")
-    assert state == "weights missing"
-    assert how.startswith("hf download openai/clip-vit-base-patch16")
+    assert state == "weights missing" and how.startswith("hf download openai/clip-vit-base-patch16")
     snapshot = tmp_path / "hf" / "hub" / "models--openai--clip-vit-base-patch16" / "snapshots" / "abc"
     snapshot.mkdir(parents=True)
     (snapshot / "config.json").write_text("{}")
@@ -121,21 +111,18 @@ def test_weights_in_the_hubs_cache_are_seen_without_its_library(tmp_path: Path, 
 def test_profiles_prints_state_command_size_and_licence(empty: Path, every_package: None, answer, run) -> None:
     told = answer("profiles", "--models", empty)
     by_name = {entry["name"]: entry for entry in told["profiles"]}
-    assert list(by_name)[:2] == ["embedded", "colours"]
-    assert by_name.keys() >= {"foundation", "paper"}
+    assert list(by_name)[:2] == ["embedded", "colours"] and by_name.keys() >= {"foundation", "paper"}
     pixels = by_name["foundation"]["backends"][0]
     assert (pixels["name"], pixels["state"], pixels["licence"]) == ("tipsv2", "weights missing", "Apache-2.0")
     assert "hf download google/tipsv2-b14" in pixels["note"]
     licences = {entry["name"]: entry["licence"] for entry in by_name["paper"]["backends"]}
-    assert "non-commercial" in licences["superpoint"]
-    assert "non-commercial" in run("profiles")[1]
+    assert "non-commercial" in licences["superpoint"] and "non-commercial" in run("profiles")[1]
 
 
 def test_the_light_profile_is_fetched_by_a_verb(empty: Path, answer, run, tmp_path: Path) -> None:
     published = write_light(tmp_path / "published")
     told = answer("profiles", "--fetch", "light", "--from", published, "--models", empty)
-    assert told["fetched"] == "avlmaps/light-1"
-    assert Path(told["folder"]) == empty / "avlmaps" / "light-1"
+    assert told["fetched"] == "avlmaps/light-1" and Path(told["folder"]) == empty / "avlmaps" / "light-1"
     assert told["bytes"] == told["received_bytes"] > 0
     assert answer("profiles", "--fetch", "light", "--from", published, "--models", empty)["received_bytes"] == 0
     light = next(e for e in answer("profiles", "--models", empty)["profiles"] if e["name"] == "light")

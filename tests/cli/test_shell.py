@@ -69,14 +69,8 @@ def test_each_verb_answers_as_on_the_command_line(piped, answer, built: Path, tm
 
 
 def test_an_error_is_one_sentence_and_the_next_line_is_answered(piped, built: Path) -> None:
-    lines = [
-        "the blorfle",
-        'query --object "red',
-        "locate missing.jpg",
-        "sounds --loud",
-        "things --least two",
-        "the red thing",
-    ]
+    lines = ["the blorfle", 'query --object "red', "locate missing.jpg", "sounds --loud", "things --least two"]
+    lines.append("the red thing")
     status, out, err = piped("\n".join(lines), built, "--json")
     assert status == 1
     said = objects(out)
@@ -90,8 +84,7 @@ def test_an_error_is_one_sentence_and_the_next_line_is_answered(piped, built: Pa
 
 def test_a_line_that_begins_like_a_verb_may_be_a_question(piped, built: Path) -> None:
     status, out, _ = piped("locate the red cabinet\nwhere is the red thing\n", built, "--json")
-    assert status == 0
-    assert all(one["parts"][0]["modality"] == "object" for one in objects(out))
+    assert status == 0 and all(one["parts"][0]["modality"] == "object" for one in objects(out))
 
 
 def test_plot_draws_the_map_and_then_the_last_answer(piped, built: Path, tmp_path: Path) -> None:
@@ -111,14 +104,12 @@ def test_a_plan_is_driven_only_when_it_is_confirmed(piped, built: Path, monkeypa
     status, out, err = piped(lines, built, "--json", "--scene", "room", "--start", "4.4,3.2,90")
     assert status == 1
     said = objects(out)
-    assert len(said) == 6
-    assert said[0]["steps"] == said[1]["steps"] == []
+    assert len(said) == 6 and said[0]["steps"] == said[1]["steps"] == []
     assert said[2]["found"] is True, "a line that is not an answer to the question is the next line"
     left, right = said[3]["steps"][0]["result"], said[4]["steps"][0]["result"]
     assert left["heading_rad"] == pytest.approx(3.14, abs=0.1)
     assert right["heading_rad"] == pytest.approx(1.57, abs=0.1), "the robot stays where it stopped"
-    assert "error" in said[5]
-    assert err.count("Drive this plan?") == 4
+    assert "error" in said[5] and err.count("Drive this plan?") == 4
     assert "I will turn left 90 degrees." in err
 
 
@@ -221,8 +212,7 @@ def test_ctrl_c_stops_an_answer_and_not_the_shell(built: Path, tmp_path: Path, t
     shell.type("the red thing\r")
     shell.until(r"\nfound")
     shell.type("quit\r")
-    assert shell.ended() == 0
-    assert not (tmp_path / "avlmaps").exists()
+    assert shell.ended() == 0 and not (tmp_path / "avlmaps").exists()
 
 
 @pytest.mark.nightly
@@ -234,12 +224,7 @@ def test_without_prompt_toolkit_a_terminal_gets_one_sentence_and_a_pipe_works(
     terminals.append(shell)
     shell.until(re.escape(install_command("shell")))
     assert shell.ended() == 1
-    done = subprocess.run(
-        [sys.executable, "-c", without, "shell", str(built)],
-        input="the red cabinet\n",
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = [sys.executable, "-c", without, "shell", str(built)]
+    done = subprocess.run(command, input="the red cabinet\n", capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "found" in done.stdout

@@ -28,3 +28,13 @@ def test_every_public_name_can_be_had() -> None:
         assert getattr(avlmaps, name) is not None
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         avlmaps.nothing  # noqa: B018
+
+
+def test_ctrl_c_while_the_command_line_is_loading_ends_in_a_sentence() -> None:
+    interrupt = (
+        "import builtins\nreal = builtins.__import__\n"
+        "def load(name, *rest):\n    if name == 'tyro': raise KeyboardInterrupt\n    return real(name, *rest)\n"
+        "builtins.__import__ = load\nfrom avlmaps.cli import main\nmain(['--help'])"
+    )
+    done = subprocess.run([sys.executable, "-c", interrupt], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "avlmaps: stopped\n")

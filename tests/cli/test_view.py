@@ -6,9 +6,7 @@ import signal
 import subprocess
 import sys
 import urllib.request
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -27,7 +25,7 @@ def test_it_serves_until_it_is_stopped(built: Path, number: signal.Signals) -> N
     assert viewer.returncode == 0 and out == "" and "The viewer is stopped." in err
 
 
-def test_a_page_is_written_and_told(answer: Callable[..., dict[str, Any]], run, built: Path, tmp_path: Path) -> None:
+def test_a_page_is_written_and_told(answer, run, built: Path, tmp_path: Path) -> None:
     out = tmp_path / "room.html"
     told = answer("view", built, "--out", out, "--questions", "the red thing")
     assert told["page"] == str(out) and told["bytes"] == out.stat().st_size

@@ -79,8 +79,7 @@ def test_no_step_is_taken_that_is_not_safe(heading, width):
         return all(within(start.x_m + p * (end.x_m - start.x_m), start.y_m + p * (end.y_m - start.y_m)) for p in part)
 
     poses, last = followed(ActionController(points, safe), GroundPose(0.0, 0.0, heading))
-    assert all(within(pose.x_m, pose.y_m) for pose in poses)
-    assert last is Action.STOP
+    assert all(within(pose.x_m, pose.y_m) for pose in poses) and last is Action.STOP
 
 
 def test_without_a_safe_step_it_says_so():
@@ -91,6 +90,5 @@ def test_a_route_never_goes_back():
     route = RouteProgress(np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 0.1), (0.0, 0.1)]))
     assert route.length_m == pytest.approx(2.1)
     far = [route.advance(GroundPose(x, 0.05)) for x in (0.2, 0.6, 0.9, 0.6, 0.2)]
-    assert far == sorted(far)
-    assert route.at(99.0) == route.end == (0.0, 0.1)
+    assert far == sorted(far) and route.at(99.0) == route.end == (0.0, 0.1)
     assert bearing(GroundPose(0, 0), 0.0, 1.0) == pytest.approx(pi / 2)

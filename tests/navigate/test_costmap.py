@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError, QueryError
 from avlmaps.maps.obstacles import BodyShape, CellState, Obstacles
-from avlmaps.navigate.costmap import BASE, DRONE, SHAPES, costmap_of, obstacles_for
+from avlmaps.navigate.costmap import BASE, DRONE, costmap_of, obstacles_for
 
 CELL_M = 0.05
 
@@ -51,8 +51,7 @@ def test_room_is_never_overstated_and_no_body_stands_where_it_does_not_fit(seed,
 def test_a_metre_costs_less_the_more_room_there_is(seed):
     costmap = costmap_of(of_states(random_states(seed, unknown=0.0)), 0.1)
     order = np.argsort(costmap.room_m, axis=None)
-    assert np.all(np.diff(costmap.cost.ravel()[order]) <= 1e-5)
-    assert costmap.cost.min() >= 1.0
+    assert np.all(np.diff(costmap.cost.ravel()[order]) <= 1e-5) and costmap.cost.min() >= 1.0
     assert np.all(costmap.cost[costmap.room_m >= 0.5 + 1e-6] == 1.0)
 
 
@@ -101,13 +100,12 @@ def test_places_and_cells_agree_and_nothing_is_passable_off_the_grid():
 
 
 def test_shapes_that_are_none_are_refused():
-    with pytest.raises(NavigationError, match=r"A body of radius 0.0 m"):
-        BodyShape(radius_m=0.0)
-    with pytest.raises(NavigationError, match=r"A body cannot fly 2.0 m over the floor"):
-        BodyShape(flies_m=2.0)
-    with pytest.raises(NavigationError, match="drive through everything"):
-        BodyShape(only=())
-    assert SHAPES == {"base": BASE, "drone": DRONE}
+    for given_values, said in (
+        ({"radius_m": 0.0}, "A body of radius 0.0 m"), ({"flies_m": 2.0}, "A body cannot fly 2.0 m over the floor"),
+        ({"only": ()}, "drive through everything"),
+    ):  # fmt: skip
+        with pytest.raises(NavigationError, match=said):
+            BodyShape(**given_values)
 
 
 class _WordMap:

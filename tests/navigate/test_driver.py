@@ -50,12 +50,10 @@ def test_by_a_true_map_it_touches_nothing_and_arrival_means_being_there(goals, o
     for goal in goals:
         stop = driver.planner.stop_for(np.array([driver.pose.x_m, driver.pose.y_m]), np.array(goal))
         arrival = driver.go_to(place(*goal))
-        assert arrival.contacts == 0
-        assert arrival.pose == driver.pose
+        assert arrival.contacts == 0 and arrival.pose == driver.pose
         assert stop is not None
         away_m = hypot(arrival.pose.x_m - stop.xy[0], arrival.pose.y_m - stop.xy[1])
-        assert arrival.reached == stop.seen
-        assert away_m <= TOLERANCE_M
+        assert arrival.reached == stop.seen and away_m <= TOLERANCE_M
         assert bool(arrival.note) == (stop.beside_m > 0.0)
         assert np.all(np.linalg.norm(np.diff(arrival.path, axis=0), axis=1) <= 0.1 + 1e-9)
 
@@ -64,8 +62,7 @@ def test_it_faces_what_it_is_told_to_once_there():
     driver = driver_in(BUILDING)
     arrival = driver.go_to(place(3.0, 3.2), face=place(3.4, 2.3))
     off = wrap_angle(bearing(arrival.pose, 3.4, 2.3) - arrival.pose.heading_rad)
-    assert arrival.reached
-    assert abs(off) <= TURN_RAD / 2 + 0.01
+    assert arrival.reached and abs(off) <= TURN_RAD / 2 + 0.01
 
 
 def test_the_actions_are_those_that_were_taken():
@@ -74,10 +71,8 @@ def test_the_actions_are_those_that_were_taken():
     again = SimulatedBody(BUILDING, START)
     for action in arrival.actions:
         again.act(action)
-    assert again.pose == arrival.pose
-    assert arrival.actions[-1] is Action.STOP
-    assert Action.STOP not in arrival.actions[:-1]
-    assert len(arrival.path) == len(arrival.actions) + 1
+    assert again.pose == arrival.pose and arrival.actions[-1] is Action.STOP
+    assert Action.STOP not in arrival.actions[:-1] and len(arrival.path) == len(arrival.actions) + 1
 
 
 @pytest.mark.parametrize("on_contact", ["stop", "slide"])
@@ -85,21 +80,18 @@ def test_a_wall_that_the_map_does_not_know_is_found_and_driven_round(on_contact)
     other = Building(hall(6.0, 4.0, [*BOXES, (2.5, 1.5, 0.0, 2.6, 4.0, 2.0)]))
     driver = driver_in(other, start=GroundPose(0.5, 3.0), on_contact=on_contact)
     arrival = driver.go_to(place(4.0, 3.3))
-    assert arrival.reached
-    assert arrival.contacts > 0
+    assert arrival.reached and arrival.contacts > 0
     assert driver.contacts.cells.any()
     assert not (MAP.states == CellState.OCCUPIED)[driver.contacts.cells].any()
     back = driver.go_to(place(0.5, 3.0))
-    assert back.reached
-    assert back.contacts <= 1
+    assert back.reached and back.contacts <= 1
 
 
 def test_a_closed_room_is_not_reached_and_it_says_so():
     closed = seen(hall(6.0, 4.0, [*BOXES, (3.0, 0.0, 0.0, 3.1, 4.0, 2.4)]))
     driver = driver_in(BUILDING, obstacles=closed)
     far = driver.go_to(place(5.5, 3.5))
-    assert not far.reached
-    assert far.note == "no path leads there that is wide enough for the robot"
+    assert not far.reached and far.note == "no path leads there that is wide enough for the robot"
     assert far.pose == START
     near = driver.go_to(place(3.5, 3.5))
     assert not near.reached
@@ -108,8 +100,7 @@ def test_a_closed_room_is_not_reached_and_it_says_so():
 
 def test_a_place_off_the_map_is_not_reached():
     arrival = driver_in(BUILDING).go_to(place(60.0, 1.0))
-    assert not arrival.reached
-    assert arrival.note == "the place (60.00, 1.00) m is off the map"
+    assert not arrival.reached and arrival.note == "the place (60.00, 1.00) m is off the map"
     assert arrival.actions == ()
 
 
@@ -138,11 +129,9 @@ def test_a_turn_is_to_the_left_and_as_far_as_told(angle):
 def test_forward_goes_as_far_as_told_or_as_nothing_is_in_the_way():
     driver = driver_in(BUILDING)
     ahead = driver.forward(1.0)
-    assert ahead.reached
-    assert ahead.pose.x_m == pytest.approx(1.5, abs=0.06)
+    assert ahead.reached and ahead.pose.x_m == pytest.approx(1.5, abs=0.06)
     blocked = driver_in(BUILDING, start=GroundPose(0.5, 1.2)).forward(2.0)
-    assert not blocked.reached
-    assert blocked.contacts == 0
+    assert not blocked.reached and blocked.contacts == 0
     assert blocked.note.startswith("an obstacle is ahead after 0.")
     back = driver_in(BUILDING, start=GroundPose(1.0, 0.5)).forward(-0.5)
     assert back.pose.x_m == pytest.approx(0.5, abs=0.06)
@@ -161,8 +150,7 @@ def test_a_tilted_world_is_driven_in_its_level_frame():
     level_from_world = turned[:3, :3].T
     driver = driver_in(BUILDING, obstacles=replace(MAP, level_from_world=level_from_world))
     arrival = driver.go_to(level_from_world.T @ np.array([3.0, 3.2, 0.7]), face=level_from_world.T @ place(0.0, 3.2))
-    assert arrival.reached
-    assert hypot(arrival.pose.x_m - 3.0, arrival.pose.y_m - 3.2) < 0.15
+    assert arrival.reached and hypot(arrival.pose.x_m - 3.0, arrival.pose.y_m - 3.2) < 0.15
     assert abs(wrap_angle(arrival.pose.heading_rad - pi)) < 0.1
 
 
@@ -172,8 +160,7 @@ def test_a_body_that_never_moves_is_given_up():
             return super()._moved(0.0, turn_rad)
 
     arrival = MapDriver(MAP, Stuck(BUILDING, START)).go_to(place(3.0, 3.2))
-    assert not arrival.reached
-    assert arrival.contacts == 0
+    assert not arrival.reached and arrival.contacts == 0
     assert len(arrival.actions) < 5_100
 
 
@@ -192,11 +179,9 @@ def test_in_a_home_it_gets_everywhere_and_touches_nothing():
     for goal in reachable[rng.integers(0, len(reachable), 12)]:
         planned_m += driver.planner.way(np.array([driver.pose.x_m, driver.pose.y_m]), goal).length_m
         arrival = driver.go_to(np.array([*goal, 0.0]))
-        assert arrival.reached
-        assert not arrival.note
+        assert arrival.reached and not arrival.note
         driven_m += sum(float(np.hypot(*(b - a))) for a, b in pairwise(arrival.path))
-    assert body.contacts == 0
-    assert driven_m < 1.05 * planned_m
+    assert body.contacts == 0 and driven_m < 1.05 * planned_m
 
 
 def _somewhere(obstacles, building, rng):
@@ -241,8 +226,7 @@ def test_forward_stops_where_the_known_floor_ends(told_m, heading_rad, gone_m):
     states[30:34, 18:22] = CellState.UNKNOWN  # a small hole is not an end
     body = Free(GroundPose(1.0, 1.0, heading_rad))
     arrival = MapDriver(of_plan(states), body).forward(told_m)
-    assert not arrival.reached
-    assert arrival.note.startswith("the floor ahead is not known after ")
+    assert not arrival.reached and arrival.note.startswith("the floor ahead is not known after ")
     gone = hypot(arrival.pose.x_m - 1.0, arrival.pose.y_m - 1.0)
     assert gone_m - 0.15 <= gone <= gone_m + 0.01
 
@@ -251,11 +235,9 @@ def test_from_unknown_ground_forward_leads_a_short_way_out_and_no_farther():
     states = np.full((200, 40), CellState.FREE)
     states[:80] = CellState.UNKNOWN
     out = MapDriver(of_plan(states), Free(GroundPose(3.5, 1.0))).forward(1.5)
-    assert out.reached
-    assert out.pose.x_m == pytest.approx(5.0, abs=0.1)
+    assert out.reached and out.pose.x_m == pytest.approx(5.0, abs=0.1)
     lost = MapDriver(of_plan(states), Free(GroundPose(1.0, 1.0))).forward(1.5)
-    assert not lost.reached
-    assert lost.pose == GroundPose(1.0, 1.0)
+    assert not lost.reached and lost.pose == GroundPose(1.0, 1.0)
 
 
 @pytest.mark.parametrize("wrong", [{"turns": 0.0}, {"turns": -1.0}, {"turns": 0.1}, {"turns": 0.0, "contact": True}])
@@ -264,14 +246,12 @@ def test_a_turn_that_does_not_come_about_is_not_reached(wrong):
     arrival = MapDriver(FLOOR, body).turn(1.0)
     assert not arrival.reached
     assert arrival.note.startswith(("the turn ended ", "the body does not turn when commanded"))
-    assert len(arrival.actions) <= 60
-    assert bool(arrival.contacts) == body.contact
+    assert len(arrival.actions) <= 60 and bool(arrival.contacts) == body.contact
 
 
 def test_a_contact_in_a_turn_tells_of_nothing_ahead():
     driver = MapDriver(FLOOR, Free(GroundPose(2.0, 2.0), contact=True))
-    assert driver.turn(1.0).contacts == 11
-    assert not driver.contacts.cells.any()
+    assert driver.turn(1.0).contacts == 11 and not driver.contacts.cells.any()
 
 
 @pytest.mark.parametrize("wrong", [{"ahead": -1.0}, {"turns": -1.0}])
@@ -286,18 +266,15 @@ def test_a_body_that_moves_otherwise_than_told_is_stopped_soon(wrong):
 def test_what_is_too_small_for_an_action_is_told():
     driver = driver_in(BUILDING)
     for arrival in (driver.forward(0.04), driver.turn(np.radians(2.0))):
-        assert arrival.actions == ()
-        assert "at a time, so that it did not" in arrival.note
+        assert arrival.actions == () and "at a time, so that it did not" in arrival.note
     assert not driver.turn(0.001).note
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e300])
 def test_numbers_that_are_none_are_answered(number):
     driver = driver_in(BUILDING)
-    assert not driver.turn(number).reached
-    assert not driver.forward(number).reached
-    assert not driver.go_to(place(number, 1.0)).reached
-    assert driver.pose == START
+    assert not driver.turn(number).reached and not driver.forward(number).reached
+    assert not driver.go_to(place(number, 1.0)).reached and driver.pose == START
     assert driver.go_to(place(1.0, 0.5), face=place(number, 0.0)).pose.x_m == pytest.approx(1.0, abs=0.15)
 
 
@@ -305,10 +282,8 @@ def test_before_a_wall_that_nobody_knew_it_is_not_where_it_was_told():
     other = Building(hall(6.0, 4.0, [(3.5, 0.0, 0.0, 3.6, 4.0, 2.0)]))
     driver = driver_in(other, start=GroundPose(1.0, 1.0), obstacles=seen(hall(6.0, 4.0)))
     arrival = driver.go_to(place(4.6, 1.0))
-    assert arrival.contacts > 0
-    assert arrival.pose.x_m < 3.5
-    assert not arrival.reached
-    assert arrival.note
+    assert arrival.contacts > 0 and arrival.pose.x_m < 3.5
+    assert not arrival.reached and arrival.note
 
 
 def test_just_beside_a_place_with_no_way_in_it_says_why():

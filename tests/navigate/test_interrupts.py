@@ -31,8 +31,7 @@ def test_a_signal_that_another_thread_takes_wakes_the_main_thread(asleep: thread
     with pytest.raises(Interrupted) as stop, raised_signals():
         threading.Timer(0.05, take).start()
         asleep.wait()
-    assert stop.value.number == signal.SIGTERM
-    assert not asleep.is_set()
+    assert stop.value.number == signal.SIGTERM and not asleep.is_set()
 
 
 def test_a_signal_whose_exception_the_interpreter_drops_comes_again(asleep: threading.Event) -> None:

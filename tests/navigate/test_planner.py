@@ -64,8 +64,7 @@ def test_a_way_is_found_where_there_is_one_and_never_leads_through_an_obstacle(s
     if way is not None:
         np.testing.assert_allclose(way.points[[0, -1]], [start, goal])
         assert way.cost == pytest.approx(costs_along(costmap, way.points), rel=0.02, abs=1e-3)
-        assert way.cost >= way.length_m - 1e-6
-        assert way.length_m >= np.linalg.norm(goal - start) - 1e-9
+        assert way.cost >= way.length_m - 1e-6 and way.length_m >= np.linalg.norm(goal - start) - 1e-9
 
 
 @given(seed=st.integers(0, 100_000))
@@ -121,8 +120,7 @@ def test_a_body_that_stands_too_near_to_something_gets_out_on_its_own_side():
     assert not planner.costmap.is_passable(near_wall)
     way = planner.way(near_wall, np.array([0.5, 1.0]))
     np.testing.assert_allclose(way.points[0], near_wall)
-    assert way.points[:, 0].max() <= 1.95
-    assert planner.way(near_wall, np.array([3.5, 1.0])) is None
+    assert way.points[:, 0].max() <= 1.95 and planner.way(near_wall, np.array([3.5, 1.0])) is None
 
 
 PLAN = """
@@ -144,14 +142,8 @@ PLAN = """
 def rooms(tall=None, thing="#"):
     """Return two rooms of cells of 0.25 m with a thing in the left one, one cell from the wall."""
     obstacles = grid_of(PLAN.replace("o", thing), 0.25)
-    return Obstacles(
-        np.eye(3),
-        np.zeros(2),
-        0.25,
-        0.0,
-        obstacles.states,
-        obstacles.states == CellState.OCCUPIED if tall is None else tall,
-    )
+    tall = obstacles.states == CellState.OCCUPIED if tall is None else tall
+    return Obstacles(np.eye(3), np.zeros(2), 0.25, 0.0, obstacles.states, tall)
 
 
 def test_a_place_that_can_be_stood_on_is_the_stop_itself():
@@ -173,8 +165,7 @@ def test_a_thing_is_approached_from_where_it_is_seen_and_not_through_a_wall():
     back_of_sofa = np.array([1.45, 2.0])
     for start in ([2.6, 2.0], [0.3, 2.0]):
         stop = planner.stop_for(np.array(start), back_of_sofa)
-        assert stop.seen
-        assert stop.xy[0] < 1.5
+        assert stop.seen and stop.xy[0] < 1.5
         assert planner.way(np.array(start), stop.xy) is not None
 
 
@@ -184,8 +175,7 @@ def test_of_a_picture_on_a_wall_the_stop_is_on_its_side():
     states[22:30, 20:40] = CellState.UNKNOWN  # it hangs over something that was not seen through
     planner = Planner(costmap_of(of_states(states), 0.1))
     stop = planner.stop_for(np.array([2.5, 1.0]), np.array([1.51, 1.5]))
-    assert stop.seen
-    assert stop.xy[0] < 1.5
+    assert stop.seen and stop.xy[0] < 1.5
 
 
 @given(seed=st.integers(0, 100_000))
@@ -199,8 +189,7 @@ def test_a_stop_can_be_stood_on_and_reached_and_is_no_farther_than_said(seed):
     stop = planner.stop_for(start, place)
     if stop is None:
         return
-    assert costmap.is_passable(stop.xy)
-    assert planner.way(start, stop.xy) is not None
+    assert costmap.is_passable(stop.xy) and planner.way(start, stop.xy) is not None
     assert np.linalg.norm(stop.xy - place) == pytest.approx(stop.beside_m, abs=1e-9)
     assert stop.beside_m <= BESIDE_M
 
@@ -222,8 +211,7 @@ def test_a_closed_room_has_no_way_in():
     inside, outside = np.array([1.0, 1.0]), np.array([5.0, 2.0])
     assert planner.way(inside, outside) is None
     stop = planner.stop_for(inside, np.array([3.4, 1.0]))
-    assert stop is not None
-    assert not stop.seen
+    assert stop is not None and not stop.seen
 
 
 @pytest.mark.filterwarnings("error")
@@ -232,8 +220,7 @@ def test_on_a_floor_without_cells_there_is_nowhere_to_go(shape):
     obstacles = of_states(np.zeros(shape))
     planner = Planner(costmap_of(obstacles, 0.2))
     here, there = np.array([0.1, 0.1]), np.array([1.0, 1.0])
-    assert planner.way(here, there) is None
-    assert planner.stop_for(here, there) is None
+    assert planner.way(here, there) is None and planner.stop_for(here, there) is None
     assert obstacles.state_at(np.zeros((2, 3))).tolist() == [CellState.UNKNOWN] * 2
 
 
@@ -243,8 +230,7 @@ def test_what_is_no_place_is_answered_without_a_warning(number):
     planner = Planner(costmap_of(of_states(np.full((30, 30), CellState.FREE)), 0.1))
     here, nowhere = np.array([0.5, 0.5]), np.array([number, 0.5])
     for ends in ((here, nowhere), (nowhere, here), (nowhere, nowhere)):
-        assert planner.way(*ends) is None
-        assert planner.stop_for(*ends) is None
+        assert planner.way(*ends) is None and planner.stop_for(*ends) is None
 
 
 @given(

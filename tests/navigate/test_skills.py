@@ -57,8 +57,7 @@ def test_backward_it_does_not_drive_on_where_it_could_not_turn_round() -> None:
     driver = driver_of(robot)
     driver.turns = False
     robot.move_forward(-1.5)
-    assert driver.told == [f"turn {pi:.6f}"]
-    assert not robot.moves[-1].reached
+    assert driver.told == [f"turn {pi:.6f}"] and not robot.moves[-1].reached
     assert robot.moves[-1].goal == pytest.approx((-1.5, 0.0, 0.0))
     assert robot.moves[-1].distance_m == pytest.approx(1.5)
 

@@ -96,8 +96,7 @@ def test_the_place_where_the_robot_stands_can_be_kept_and_come_back_to() -> None
     home = robot.current_pos()
     robot.move_to("table")
     robot.move_to(home)
-    assert robot.moves[-1].stop == pytest.approx((3.0, 2.0, 0.025))
-    assert robot.get_contour(home) == [home]
+    assert robot.moves[-1].stop == pytest.approx((3.0, 2.0, 0.025)) and robot.get_contour(home) == [home]
 
 
 def test_between_two_of_a_kind_takes_two_and_never_one_twice() -> None:
@@ -129,42 +128,31 @@ def test_what_is_not_there_is_told_in_one_sentence_with_what_to_do() -> None:
     robot = furnished_robot(sounds=sounds_of([track(5.0, 3.1)], [0.2]))
     with pytest.raises(GoalNotFoundError, match=r"'dog' is not found in the map: sound 'dog': none of the 1 detected"):
         robot.move_to(robot.get_major_map(sound="dog"))
-    with pytest.raises(
-        GoalNotFoundError,
-        match=r"probability 0\.[0-4]\d?; say it in other words, or .* best guess \(guess=True\)\.$",
-    ):
+    said = r"probability 0\.[0-4]\d?; say it in other words, or .* best guess \(guess=True\)\.$"
+    with pytest.raises(GoalNotFoundError, match=said):
         robot.move_to(robot.get_major_map(obj="chair") * robot.get_map(sound="dog"))
     assert robot.moves == []
 
 
-SKILLS = {
-    "move_to": lambda robot, what: robot.move_to(what),
-    "move_to_object": lambda robot, what: robot.move_to_object(what),
-    "move_in_between": lambda robot, what: robot.move_in_between(what, "table"),
-    "move_to_left": lambda robot, what: robot.move_to_left(what),
-    "move_behind": lambda robot, what: robot.move_behind(what),
-    "move_north": lambda robot, what: robot.move_north(what),
-    "face": lambda robot, what: robot.face(what),
-    "with_object_on_left": lambda robot, what: robot.with_object_on_left(what),
-    "get_pos": lambda robot, what: robot.get_pos(what),
-    "get_nearest_pos": lambda robot, what: robot.get_nearest_pos(what),
-    "get_max_pos_3d": lambda robot, what: robot.get_max_pos_3d(what),
-    "get_contour": lambda robot, what: robot.get_contour(what),
-}
+HEEDFUL = (
+    "move_to", "move_to_object", "move_in_between", "move_to_left", "move_behind", "move_north", "face",
+    "with_object_on_left", "get_pos", "get_nearest_pos", "get_max_pos_3d", "get_contour",
+)  # fmt: skip
 
 
 @pytest.mark.few(12)
-@pytest.mark.parametrize("skill", SKILLS)
+@pytest.mark.parametrize("skill", HEEDFUL)
 @pytest.mark.parametrize("score", [0.05, 0.15, 0.95])
 def test_no_skill_takes_what_the_answer_calls_not_found(skill: str, score: float) -> None:
     robot = furnished_robot(sounds=sounds_of([track(5.0, 3.1)], [score]))
     answer = robot.avlmap.ask(Question.of([Part(Modality.OBJECT, "chair"), Part(Modality.SOUND, "dog")]))
     heat = robot.get_major_map(obj="chair") * robot.get_map(sound="dog")
+    given = (heat, "table") if skill == "move_in_between" else (heat,)
     if answer.found:
-        SKILLS[skill](robot, heat)
+        getattr(robot, skill)(*given)
     else:
         with pytest.raises(GoalNotFoundError, match=rf"probability {answer.probability:.2f}; .* best guess"):
-            SKILLS[skill](robot, heat)
+            getattr(robot, skill)(*given)
         assert robot.moves == []
     assert answer.found == (score > 0.9)
 
@@ -317,8 +305,7 @@ def test_between_a_thing_and_one_inside_its_u_is_never_inside_the_thing() -> Non
     u = Outline(np.array([[0, 0], [5, 0], [5, 4], [4, 4], [4, 1], [1, 1], [1, 4], [0, 4]], float))
     thing = Outline(np.array([[1.5, 2.0], [3.5, 2.0], [3.5, 3.0], [1.5, 3.0]]))
     middle = middle_between(u, thing)
-    assert not u.contains(middle)
-    assert not thing.contains(middle)
+    assert not u.contains(middle) and not thing.contains(middle)
 
 
 def test_the_floor_is_sought_among_the_voxels_that_count() -> None:

@@ -1,6 +1,8 @@
 """The OpenAPI document against the server: what fits it is answered as it says, and what does not fit is refused."""
 
+import json
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -8,6 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from starlette.testclient import TestClient
+
+from avlmaps.core.version import __version__
 
 # Of a query with neither a sentence nor a part, or with both: OpenAPI cannot state that of an address.
 MAY_LACK_WORDS = ("ask", "askByPost", "askInView", "drawAnswer", "drawAnswerByPost")
@@ -132,3 +136,16 @@ def test_parts_of_a_query_that_are_at_odds_are_refused_with_one_sentence(client:
         assert answered.status_code == status, (query, answered.text[:200])
         message = answered.json()["error"]["message"]
         assert said in message and "/" not in message, query
+
+
+def test_server_json_is_of_this_release() -> None:
+    entry = json.loads((Path(__file__).parents[2] / "server.json").read_text(encoding="utf-8"))
+    (package,) = entry["packages"]
+    assert entry["version"] == package["version"] == __version__
+    assert re.fullmatch(r"[a-zA-Z0-9.-]+/[a-zA-Z0-9._-]+", entry["name"])
+    assert len(entry["description"]) <= 100 and package["identifier"] == "avlmaps"
+    assert package["transport"] == {"type": "stdio"}
+    assert f"avlmaps=={__version__}" == package["runtimeArguments"][0]["value"]
+    assert [one.get("value") or one.get("name") or one["valueHint"] for one in package["packageArguments"]] == [
+        "serve", "map", "--stdio",
+    ]  # fmt: skip

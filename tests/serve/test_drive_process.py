@@ -66,8 +66,7 @@ def test_a_stop_over_http_cancels_the_goal_of_a_real_robot(serve: Started, tmp_p
         assert robot.soon(lambda: bool(robot.goals), 60.0)
         stopped = client.post("/drive/stop", content=b"nonsense")
         assert stopped.status_code == 200 and stopped.json()["stopped"] is True, stopped.text
-        assert ended(robot)
-        assert client.get("/drive/status").json()["state"] == "idle"
+        assert ended(robot) and client.get("/drive/status").json()["state"] == "idle"
     events = [json.loads(line)["event"] for line in (tmp_path / "log").read_text().splitlines()]
     assert events[:2] == ["planned", "confirmed"] and {"stop", "ended"} <= set(events)
 
@@ -82,8 +81,7 @@ def test_every_end_of_the_server_leaves_no_goal(serve: Started, number: signal.S
         assert robot.soon(lambda: len(robot.published("/avlmaps/heartbeat")) > 1, 60.0)
         robot.moves_on = True
         process.send_signal(number)
-        assert robot.soon(lambda: ended(robot), 60.0)
-        assert not robot.moves_on
+        assert robot.soon(lambda: ended(robot), 60.0) and not robot.moves_on
         if number is not signal.SIGKILL:
             assert process.wait(60) == 0
 
@@ -101,8 +99,7 @@ def test_a_robot_that_is_at_its_goal_still_is_not_said_to_stand(serve: Started, 
         stopped = client.post("/drive/stop")
         assert stopped.status_code == 503 and stopped.json()["stopped"] is False, stopped.text
         process.send_signal(signal.SIGTERM)
-        assert process.wait(60) == 3
-        assert "may still be driving" in process.communicate()[1]
+        assert process.wait(60) == 3 and "may still be driving" in process.communicate()[1]
 
 
 @pytest.mark.nightly

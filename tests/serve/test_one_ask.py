@@ -107,20 +107,6 @@ def test_every_front_gives_the_answer_of_the_package(
     assert told == fitting(compact(expected)), "the same, rounded and cut for an agent"
 
 
-def test_lists_answer_by_what_the_map_lists(opened: AVLMap) -> None:
-    last, first = opened.ask("the last sound"), opened.ask("what did you hear first?")
-    onsets = {sound.position: sound.onset_s for sound in opened.sounds()}
-    assert onsets[last.goals[0].position] == max(onsets.values())
-    assert onsets[first.goals[0].position] == min(onsets.values())
-    rooms = opened.ask("which rooms are there?", 100)
-    assert rooms.count == len(rooms.goals) == len(opened.rooms())
-    large, small = opened.ask("the biggest room", 100).goals, opened.ask("the smallest room", 100).goals
-    assert [goal.name for goal in large] == [goal.name for goal in small][::-1] or len(large) != len(small)
-    things = {(thing.name, thing.position) for thing in opened.things()}
-    for question in ("what is next to the table?", f"what is in the {opened.rooms()[0].name}?"):
-        assert {(goal.name, goal.position) for goal in opened.ask(question, 100).goals} <= things
-
-
 NOTHING: list[tuple[Callable[[AVLMap], object], str]] = [
     (lambda m: m.ask(), "takes a sentence, or parts"),
     (lambda m: m.ask(" "), "takes a sentence, or parts"),

@@ -55,13 +55,11 @@ def start(room: Path) -> Iterator[Start]:
 
 def test_a_process_answers_programs_and_agents_and_finishes_what_runs(start: Start) -> None:
     process, ready = start("--port", "0")
-    assert ready["maps"] == ["room"]
-    assert ready["token"] is False
+    assert ready["maps"] == ["room"] and ready["token"] is False
     url = ready["url"]
     assert url.startswith("http://127.0.0.1:")
     answer = httpx.get(f"{url}/maps/room/ask", params={"sentence": "the red thing"}).json()
-    assert answer["goals"]
-    assert "server" not in httpx.get(f"{url}/maps").headers
+    assert answer["goals"] and "server" not in httpx.get(f"{url}/maps").headers
 
     async def agent(mode: str) -> Any:
         async with Client(f"{url}/mcp", mode=mode) as client:
@@ -84,10 +82,8 @@ def test_a_process_answers_programs_and_agents_and_finishes_what_runs(start: Sta
         lines = list(events)
     assert any(line.startswith("event: answer") for line in lines), "what was running was finished"
     asking.join(60)
-    assert [one.status_code for one in got] == [200]
-    assert process.wait(30) == 0
-    assert process.stderr is not None
-    assert "Traceback" not in process.stderr.read()
+    assert [one.status_code for one in got] == [200] and process.wait(30) == 0
+    assert process.stderr is not None and "Traceback" not in process.stderr.read()
 
 
 def own_certificate(folder: Path) -> tuple[Path, Path]:
@@ -147,8 +143,7 @@ def test_a_client_whose_input_ends_has_its_last_answer_and_may_name_a_photo(room
     words = [sys.executable, "-m", "avlmaps", "serve", str(room), "--stdio"]
     done = subprocess.run(words, input=lines.encode(), capture_output=True, check=True, timeout=120)
     answers = {one["id"]: one["result"] for one in map(json.loads, done.stdout.splitlines())}
-    assert answers.keys() == {1, 2}
-    assert json.loads(answers[2]["content"][0]["text"])["inliers"] > 0
+    assert answers.keys() == {1, 2} and json.loads(answers[2]["content"][0]["text"])["inliers"] > 0
 
 
 def told(result: Any) -> Any:
@@ -186,5 +181,4 @@ def test_faults_of_starting_are_one_sentence(
         for words, status, says in cases:
             code, said = failed(capsys, *words)
             assert code == status, said
-            assert says in said
-            assert "Traceback" not in said
+            assert says in said and "Traceback" not in said

@@ -45,12 +45,10 @@ def test_the_new_map_answers_after_it_was_opened(place: Path, coarse: Path) -> N
     shutil.copytree(coarse, place)
     shelf.refresh(wait_s=30.0)
     new = shelf.get("home")
-    assert new is not old
-    assert new.version != old.version
+    assert new is not old and new.version != old.version
     assert len(new.avlmap.space) < len(old.avlmap.space)
     assert old.avlmap.ask("the red thing").goals, "who holds the old map goes on with it"
-    assert new.avlmap.ask("the red thing").goals
-    assert "was replaced" in notes[0]
+    assert new.avlmap.ask("the red thing").goals and "was replaced" in notes[0]
 
 
 @pytest.mark.nightly
@@ -71,8 +69,7 @@ def test_an_edit_that_is_made_while_the_new_map_is_opened_counts_at_once(
     shelf.refresh(wait_s=30.0)
     monkeypatch.undo()
     new = shelf.get("home").avlmap
-    assert new.data.info.voxel_size_m == 0.3
-    assert new.ask("the zorb pad").found
+    assert new.data.info.voxel_size_m == 0.3 and new.ask("the zorb pad").found
 
 
 def test_a_map_that_cannot_be_opened_leaves_the_old_one(place: Path, serving: Callable[..., TestClient]) -> None:
@@ -96,8 +93,7 @@ def test_a_map_that_vanishes_goes_on_answering(place: Path) -> None:
     assert not shelf.is_stale("home")
     shutil.rmtree(place)
     shelf.refresh(wait_s=1.0)
-    assert shelf.get("home") is held
-    assert held.avlmap.ask("the red thing").goals
+    assert shelf.get("home") is held and held.avlmap.ask("the red thing").goals
     assert shelf.is_stale("home")
 
 

@@ -17,6 +17,7 @@ from starlette.testclient import TestClient
 
 from avlmaps.cli.info import describe_path
 from avlmaps.core.printable import shortened
+from avlmaps.core.version import __version__
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.drawn import HEADER
 from avlmaps.serve.operations import OPERATIONS
@@ -92,19 +93,14 @@ def test_the_page_lists_every_operation_and_loads_nothing_from_elsewhere(client:
     assert page.headers["content-security-policy"].startswith("default-src 'none'")
 
 
-def test_maps_are_listed(client: TestClient, document: dict[str, Any], opened: AVLMap) -> None:
+def test_maps_are_listed_and_described_as_info_does(
+    client: TestClient, document: dict[str, Any], opened: AVLMap, room: Path
+) -> None:
     answer = client.get("/maps").json()
     conforms(document, "/maps", answer)
     (entry,) = answer["maps"]
-    assert entry["name"] == "room"
-    assert entry["voxels"] == len(opened.space)
-    assert entry["stale"] is False
-
-
-def test_a_map_is_described_as_info_does(client: TestClient, room: Path) -> None:
-    answer = client.get("/maps/room").json()
-    expected = describe_path(room, "auto", verify=False, plot=None)
-    assert answer == plain({**expected, "path": "room"})
+    assert (entry["name"], entry["voxels"], entry["stale"]) == ("room", len(opened.space), False)
+    assert client.get("/maps/room").json() == plain({**describe_path(room), "path": "room"})
 
 
 def test_contents_are_those_of_things(client: TestClient, document: dict[str, Any], opened: AVLMap) -> None:
@@ -115,8 +111,7 @@ def test_contents_are_those_of_things(client: TestClient, document: dict[str, An
         alone = client.get(f"/maps/room/{part}", params={"least": 0.2} if part == "things" else {}).json()
         conforms(document, f"/maps/{{map}}/{part}", alone)
         assert alone == {"map": "room", "frame": "recording", part: answer[part]}
-    assert answer["things"]
-    assert len(answer["sounds"]) == 1
+    assert answer["things"] and len(answer["sounds"]) == 1
 
 
 QUERIES = (
@@ -152,8 +147,7 @@ def test_a_photo_and_a_clip_are_taken_from_the_form(client: TestClient, photo: b
     assert answer.status_code == 200, answer.text
     parts = answer.json()["parts"]
     assert [part["modality"] for part in parts] == ["object", "image", "sound"]
-    assert [part["query"] for part in parts[1:]] == ["photo", "clip"]
-    assert parts[1]["found"]
+    assert [part["query"] for part in parts[1:]] == ["photo", "clip"] and parts[1]["found"]
     assert "/etc" not in answer.text
 
 
@@ -179,10 +173,8 @@ def test_a_place_is_described(client: TestClient, document: dict[str, Any], open
     x, y, z = thing.position
     answer = client.get("/maps/room/place", params={"x": x, "y": y, "z": z}).json()
     conforms(document, "/maps/{map}/place", answer)
-    assert answer["known"]
-    assert answer["distance_m"] == pytest.approx(0.0, abs=1e-6)
-    assert thing.name in [one["name"] for one in answer["names"]]
-    assert answer["last_seen_s"] is not None
+    assert answer["known"] and answer["distance_m"] == pytest.approx(0.0, abs=1e-6)
+    assert thing.name in [one["name"] for one in answer["names"]] and answer["last_seen_s"] is not None
     above = client.get("/maps/room/place", params={"x": x, "y": y}).json()
     assert above["known"]
     far = client.get("/maps/room/place", params={"x": 900, "y": 900, "z": 0}).json()
@@ -203,8 +195,7 @@ def test_a_path_leads_over_the_floor_from_one_place_to_the_other(
     assert answer["length_m"] == pytest.approx(length, abs=1e-6)
     off = client.get("/maps/room/path", params={"from": ends[0], "to": "500,500"}).json()
     conforms(document, "/maps/{map}/path", off)
-    assert (off["found"], off["points"]) == (False, [])
-    assert "outside" in off["note"]
+    assert (off["found"], off["points"]) == (False, []) and "outside" in off["note"]
 
 
 @pytest.mark.parametrize("size", ["small", "full"])
@@ -229,6 +220,7 @@ def test_tiles_hold_every_voxel(client: TestClient, document: dict[str, Any], op
         total += count
     assert total == len(opened.space)
     tag = tile.headers["etag"]
+    assert __version__ in tag, "another release may answer another way"
     assert client.get(f"/maps/room/tiles/0/{i}/{j}/{k}", headers={"if-none-match": tag}).status_code == 304
     hot = client.get(f"/maps/room/tiles/0/{i}/{j}/{k}", params={"heat": "the red thing"})
     assert HEADER.unpack_from(hot.content)[3] == 7
@@ -244,16 +236,13 @@ def test_progress_comes_as_events_and_the_answer_last(client: TestClient) -> Non
     assert json.loads(events[-1]["data"]) == client.get("/maps/room/things", params=params).json()
     steps = [json.loads(event["data"]) for event in events[:-1]]
     done = [step["done"] for step in steps if step["stage"] == "things"]
-    assert done == sorted(done)
-    assert len(done) > 2
+    assert done == sorted(done) and len(done) > 2
 
 
 ERRORS: tuple[tuple[str, Callable[[TestClient], Any], int, str, str], ...] = (
     ("no map", lambda c: c.get("/maps/nope/ask?sentence=chair"), 404, "map-name", "room"),
     ("no address", lambda c: c.get("/nothing"), 404, "usage", "/ lists"),
     ("a method", lambda c: c.delete("/maps/room/ask"), 405, "usage", "method"),
-    ("no query", lambda c: c.get("/maps/room/ask"), 400, "usage", "sentence"),
-    ("both", lambda c: c.get("/maps/room/ask?sentence=a+chair&object=chair"), 400, "usage", "not both"),
     ("twice", lambda c: c.get("/maps/room/ask?sentence=a&sentence=b"), 400, "usage", "twice"),
     ("a wrong name", lambda c: c.get("/maps/room/ask?sentenc=a"), 400, "usage", "sentenc"),
     ("a wrong type", lambda c: c.get("/maps/room/ask?sentence=a+chair&top=many"), 400, "usage", "top"),
@@ -299,10 +288,8 @@ def test_each_error_is_json_with_one_sentence(
 ) -> None:
     response = call(client)
     error = error_of(response, status)
-    assert error["kind"] == kind
-    assert says in error["message"]
-    assert str(room.parent) not in response.text
-    assert "Traceback" not in response.text
+    assert error["kind"] == kind and says in error["message"]
+    assert str(room.parent) not in response.text and "Traceback" not in response.text
 
 
 def test_a_picture_that_unfolds_to_gigabytes_is_refused_by_its_header(client: TestClient) -> None:
@@ -326,8 +313,7 @@ def test_a_full_queue_and_a_slow_query_are_answered_so(service: Service, serving
     assert error_of(serving(slow).get("/maps/room/contents?least=0.31"), 504)["kind"] == "timeout"
     full = replace(service, quick=Lane("t", 1, -1, 1.0))
     refused = serving(full).get("/maps/room/ask?sentence=the+red+thing")
-    assert error_of(refused, 503)["kind"] == "busy"
-    assert refused.headers["retry-after"] == "1"
+    assert error_of(refused, 503)["kind"] == "busy" and refused.headers["retry-after"] == "1"
 
 
 def test_a_fault_of_ours_shows_nothing_of_itself(
@@ -338,8 +324,7 @@ def test_a_fault_of_ours_shows_nothing_of_itself(
 
     monkeypatch.setattr("avlmaps.query.avlmap.AVLMap.ask", broken)
     response = serving(service).get("/maps/room/ask?sentence=the+red+thing")
-    assert error_of(response, 500)["kind"] == "internal"
-    assert "secret" not in response.text
+    assert error_of(response, 500)["kind"] == "internal" and "secret" not in response.text
 
 
 @pytest.mark.parametrize("method", ["GET", "DELETE", "PUT"])

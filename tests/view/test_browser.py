@@ -65,6 +65,12 @@ def until(page, condition: str, patience_s: float = 60.0) -> None:
         page.wait_for_timeout(20)
 
 
+def asked(page, sentence: str = "the red thing", until: str = "#answer .verdict.found") -> None:
+    page.fill("#sentence", sentence)
+    page.keyboard.press("Enter")
+    page.wait_for_selector(until, state="attached")
+
+
 def goal_at(page) -> tuple[float, float]:
     """Return the middle of the best goal's number on the screen."""
     box = page.locator(".mark.goal", has_text="1").first.bounding_box()
@@ -104,9 +110,7 @@ def test_a_question_is_typed_and_its_goal_is_seen(page, room: AVLMap) -> None:
 
 @pytest.mark.nightly
 def test_a_click_names_the_voxel_and_two_clicks_measure(page) -> None:
-    page.fill("#sentence", "the red thing")
-    page.keyboard.press("Enter")
-    page.wait_for_selector("#answer .verdict.found")
+    asked(page)
     picture(page)
     x, y = goal_at(page)
     page.mouse.click(x, y)
@@ -173,8 +177,7 @@ def test_controls_have_names_and_the_page_fits_a_phone(browser, served: Served) 
         """() => [...document.querySelectorAll("button, input, select, canvas")].filter((e) => e.offsetParent &&
         !e.closest("#overlay") && !e.ariaLabel && !e.labels?.length && !e.textContent.trim()).map((e) => e.outerHTML)"""
     )
-    assert unnamed == []
-    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert unnamed == [] and page.evaluate("document.documentElement.scrollWidth") <= 390
     assert page.locator("#canvas").bounding_box()["height"] > 300
     assert page.faults == []
     page.close()
@@ -186,18 +189,14 @@ def test_a_thing_is_renamed_where_it_is_clicked(browser, room: AVLMap, tmp_path:
     with contextmanager(serving)(place) as own:
         page = opened(browser, own.url)
         page.wait_for_selector("#things li", state="attached")  # the server knows the things by now
-        page.fill("#sentence", "the red thing")
-        page.keyboard.press("Enter")
-        page.wait_for_selector(".mark.goal", state="attached")
+        asked(page, until=".mark.goal")
         picture(page)
         page.mouse.click(*goal_at(page))
         page.fill("#rename input", "zorb")
         page.click("#rename button")
         page.wait_for_selector("#renamed")
         assert "is called zorb from now on (named by a person on " in page.inner_text("#renamed")
-        page.fill("#sentence", "the zorb")
-        page.keyboard.press("Enter")
-        page.wait_for_selector("#answer .verdict.found")
+        asked(page, "the zorb")
         assert page.faults == []
         page.close()
     assert [edit.name for edit in read_edits(place)] == ["zorb"]
@@ -216,8 +215,7 @@ def test_the_file_opens_without_a_server(browser, room: AVLMap, tmp_path: Path) 
     page.mouse.click(*goal_at(page))
     page.wait_for_selector("#voxel table tr")
     assert "red" in page.inner_text("#voxel")
-    assert not [url for url in requested if not url.startswith(("data:", "blob:"))]
-    assert page.faults == []
+    assert not [url for url in requested if not url.startswith(("data:", "blob:"))] and page.faults == []
     page.close()
 
 
@@ -265,9 +263,7 @@ def test_the_whole_map_is_in_the_picture_from_its_side_and_as_a_plan(
 
 @pytest.mark.nightly
 def test_a_reload_brings_back_the_view_and_the_question(page) -> None:
-    page.fill("#sentence", "the red thing")
-    page.keyboard.press("Enter")
-    page.wait_for_selector("#answer .verdict.found")
+    asked(page)
     page.click("#above")
     page.select_option("#colour", "thing")
     page.locator("#high").evaluate("e => { e.value = 1.0; e.dispatchEvent(new Event('input')); }")
@@ -283,9 +279,7 @@ def test_a_reload_brings_back_the_view_and_the_question(page) -> None:
 
 @pytest.mark.nightly
 def test_a_picture_is_saved(page, tmp_path: Path) -> None:
-    page.fill("#sentence", "the red thing")
-    page.keyboard.press("Enter")
-    page.wait_for_selector("#answer .verdict.found")
+    asked(page)
     page.wait_for_selector("#canvas[data-state=whole]")
     with page.expect_download() as download:
         page.click("#save")
@@ -324,9 +318,7 @@ def test_two_maps_are_seen_side_by_side_and_one_over_the_other(browser, room: AV
         assert (first != second).any(axis=2).mean() < 0.02, "the same map under the same view"
         page.select_option("#arrangement", "divided")
         assert (picture(page) != shown).any(axis=2).mean() > 0.1
-        page.fill("#sentence", "the red thing")
-        page.keyboard.press("Enter")
-        page.wait_for_selector("#goals ol >> nth=1")
+        asked(page, until="#goals ol >> nth=1")
         assert page.locator("#goals h3").all_inner_texts() == ["Goals in room.avlmap"] * 2
         assert "two places" in page.inner_text("#goals .warning")
         assert page.faults == []

@@ -14,15 +14,10 @@ def voxels(draw) -> np.ndarray:
 
 
 @given(voxels())
-def test_every_voxel_is_drawn_once_and_the_last_level_draws_all(index: np.ndarray) -> None:
+def test_every_voxel_is_drawn_once_and_a_level_shows_every_block_and_little_more(index: np.ndarray) -> None:
     order, levels = detail_order(index)
     assert sorted(order) == list(range(len(index)))
     assert (levels[-1].count, levels[-1].edge) == (len(index), 1)
-
-
-@given(voxels())
-def test_a_level_shows_every_block_and_little_more(index: np.ndarray) -> None:
-    order, levels = detail_order(index)
     for number, level in enumerate(levels[:-1]):
         drawn = np.unique(index[order[: level.count]] // level.edge, axis=0)
         blocks = np.unique(index // level.edge, axis=0)
@@ -34,5 +29,4 @@ def test_a_level_shows_every_block_and_little_more(index: np.ndarray) -> None:
 def test_far_voxels_need_no_table_of_all_blocks() -> None:
     index = np.concatenate([np.argwhere(np.ones((4, 4, 4))), [[10**6, -(10**6), 10**6]]])
     order, levels = detail_order(index)
-    assert sorted(order) == list(range(len(index)))
-    assert levels[0].count == 2
+    assert sorted(order) == list(range(len(index))) and levels[0].count == 2

@@ -47,8 +47,7 @@ def test_the_description_places_the_cameras_in_the_map(layout: Layout) -> None:
     for frame in told["keyframes"]:
         assert (np.array(frame["position"])[:2] > low[:2]).all() and (np.array(frame["position"])[:2] < high[:2]).all()
         np.testing.assert_allclose(np.cross(frame["right"], frame["down"]), frame["ahead"], atol=1e-3)
-    assert told["floor_m"] == pytest.approx(0.0, abs=0.15)
-    assert told["floor_m"] < told["ceiling_m"]
+    assert told["floor_m"] == pytest.approx(0.0, abs=0.15) and told["floor_m"] < told["ceiling_m"]
 
 
 def test_the_description_of_a_map_of_several_storeys_cuts_each_out(layout: Layout, room: AVLMap) -> None:

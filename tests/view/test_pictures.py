@@ -61,8 +61,7 @@ def test_the_guide_is_clicked_through(browser, room: AVLMap, tmp_path: Path) -> 
             shoot(page, folder / "view-sources.png")
         page.locator("details:has(#things) summary").click()
         page.locator("#things button").first.click()
-        assert page.evaluate("avlmapsView.viewer.camera.distance") <= 3.0
-        assert page.faults == []
+        assert page.evaluate("avlmapsView.viewer.camera.distance") <= 3.0 and page.faults == []
         page.close()
         phone = opened(browser, server.url, 390, 780)
         ask(phone, f"the {wanted}")

@@ -10,6 +10,7 @@ from test_browser import browser, opened  # noqa: F401 - a fixture
 
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.types import SourceEvidence
+from avlmaps.navigate.footprint import Outline
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.view.labels import SHARES, drawn_sources
 from helpers.viewing import Served, serving
@@ -31,13 +32,6 @@ def sounded(room: AVLMap, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def _holds(corners: np.ndarray, x: float, y: float) -> bool:
-    a, b = corners, np.roll(corners, -1, axis=0)
-    crosses = (a[:, 1] > y) != (b[:, 1] > y)
-    at = a[:, 0] + (y - a[:, 1]) / np.where(crosses, b[:, 1] - a[:, 1], 1.0) * (b[:, 0] - a[:, 0])
-    return bool(np.count_nonzero(crosses & (at > x)) % 2)
-
-
 def test_the_regions_hold_the_source_and_the_likelier_is_smaller(sounded: Path) -> None:
     avlmap = AVLMap.open(sounded)
     drawn = drawn_sources(avlmap)
@@ -48,7 +42,7 @@ def test_the_regions_hold_the_source_and_the_likelier_is_smaller(sounded: Path) 
         spans = []
         for region in one["regions"]:
             outlines = [np.array(corners) for corners in region["outlines"]]
-            assert any(_holds(corners[:, :2], x, y) for corners in outlines)
+            assert any(Outline(corners[:, :2]).contains(np.array([x, y])) for corners in outlines)
             spans.append(np.ptp(np.concatenate(outlines)[:, :2], axis=0).max())
         assert spans[0] <= spans[1]
 
@@ -73,6 +67,5 @@ def test_a_click_on_a_source_shows_rays_and_plays_its_clip(browser, served_sound
     assert "50 %" in page.inner_text("#legend") and page.locator("#sources audio").count() == drawn
     page.uncheck("#show-sources")
     assert page.locator(".mark.source").count() == 0 and page.inner_text("#legend") == ""
-    assert page.evaluate(f"{lines}.has('rays')") is False
-    assert page.faults == []
+    assert page.evaluate(f"{lines}.has('rays')") is False and page.faults == []
     page.close()
