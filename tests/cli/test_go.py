@@ -151,19 +151,10 @@ def test_a_start_in_a_thing_or_outside_is_refused(run, built: Path, in_room: Non
     assert out == ""
 
 
-@pytest.mark.parametrize("at", ["source", "robot"])
-def test_a_place_of_sounds_is_said_to_be_idle_where_no_sound_is_named(answer, at: str) -> None:
-    given = ("--dry-run", "--at", at)
-    assert answer("go", "nowhere.avlmap", "go to the chair", *given)["notes"] == [
-        "--at has no effect: no sound is named."
-    ]
-    assert answer("go", "nowhere.avlmap", "go to the barking", *given)["notes"] == []
-    assert answer("go", "nowhere.avlmap", "go to the chair", "--dry-run")["notes"] == []
-
-
 @pytest.mark.parametrize(
     ("option", "value", "why"),
     [
+        ("--at", "robot", "no sound is named"),
         ("--image", "x.png", "the sentence speaks of no photo"),
         ("--sound-clip", "x.wav", "the sentence speaks of no recording"),
         ("--ros", "ws://robot:9090", "the robot is simulated"),
@@ -175,6 +166,7 @@ def test_a_place_of_sounds_is_said_to_be_idle_where_no_sound_is_named(answer, at
 def test_an_option_without_effect_is_said(answer, option: str, value: str, why: str) -> None:
     said = answer("go", "nowhere.avlmap", "go to the chair", "--dry-run", option, value)
     assert said["notes"] == [f"{option} has no effect: {why}."]
+    assert answer("go", "nowhere.avlmap", "go to the barking", "--dry-run", "--at", "source")["notes"] == []
 
 
 def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(
