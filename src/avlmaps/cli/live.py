@@ -100,13 +100,10 @@ def _live(verb: Live) -> dict[str, Any]:
                 say("note: Stopped by Ctrl-C; the map is finished.")
             end_drive(live)
     status, made = live.status(), live.map
-    return {
-        **describe_map(made),
-        "path": str(verb.out),
-        "live": {**status.to_dict(), "summary": str(status)},
-        **({} if first is None else {"into": _joined(first, made, verb.day or "")}),
-        "elapsed_s": round(perf_counter() - begin_s, 3),
-    }
+    told = {**describe_map(made), "path": str(verb.out), "live": {**status.to_dict(), "summary": str(status)}}
+    if first is not None:
+        told["into"] = _joined(first, made, verb.day or "")
+    return {**told, "elapsed_s": round(perf_counter() - begin_s, 3)}
 
 
 @dataclass(frozen=True)

@@ -342,8 +342,7 @@ class MapDriver:
         return True
 
     def _known_m(self, distance_m: float) -> float:
-        pose = self.pose
-        return self.planner.costmap.known_ahead_m(self._xy, pose.heading_rad, distance_m, ESCAPE_M)
+        return self.planner.costmap.known_ahead_m(self._xy, self.pose.heading_rad, distance_m, ESCAPE_M)
 
     def _turned(self, angle_rad: float, trip: _Trip) -> float:
         """Turn, and return by how much it is still off."""
@@ -372,8 +371,7 @@ class MapDriver:
         before = self.pose
         moved = self._of_body("move", lambda: self.body.act(action))
         trip.actions.append(action)
-        planned = before.after(action)
-        return self._noted(trip, before, planned, moved)
+        return self._noted(trip, before, before.after(action), moved)
 
     def _noted(self, trip: _Trip, before: GroundPose, planned: GroundPose, moved: Moved) -> bool:
         trip.movements += 1
