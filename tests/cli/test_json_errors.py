@@ -72,8 +72,8 @@ ERRORS = (
     (("build", "REC", "--out", "OUT", "--rules", "paper", "--sensor", "kinect"), 2, "usage", "every depth as it is"),
     (("build", "REC", "--out", "OUT", "--format", "tum"), 1, "recording", "rgb.txt"),
     (("build", "REC", "--out", "OUT", "--audio", "nothing.wav"), 1, "audio", "nothing.wav"),
-    (("bench", "indexing", "--out", "OUT", "--model", "eyes=clip"), 1, "bench", "the modules are pixels"),
-    (("bench", "indexing", "--out", "OUT", "--scenes", "house:1", "--sounds", "nowhere"), 1, "bench", "nowhere"),
+    (("bench", "indexing", "--out", "OUT", "--model", "eyes=clip"), 1, "backend", "the modules are pixels"),
+    (("bench", "indexing", "--out", "OUT", "--scenes", "house:1", "--sounds", "nowhere"), 1, "audio", "nowhere"),
 )
 
 
