@@ -57,25 +57,16 @@ class SentGoal:
 
     A server that does not know a goal ends it only where it had accepted it. A goal that was only sent may be on its
     way, or wait to be accepted: it is over by its own result, or when it was called off for the whole answer time.
-
-    Attributes:
-        answer_s: longest time from sending a goal until its server accepts it.
-        before: the goals that its server listed before it was sent, by the server's names.
-        id: our name for it, unlike any other client's.
-        alias: the server's name for it, where that is another and is known.
-        called_off_s: when it was first cancelled.
-        heard_s: when the server last showed that it is at it, by the driver's clock.
-        shown: how often it did.
     """
 
     task: ActionGoal
-    answer_s: float = 10.0
-    before: frozenset[str] = frozenset()
-    id: str = field(default_factory=lambda: f"avlmaps-{uuid4().hex}")
-    alias: str = ""
-    called_off_s: float | None = None
-    heard_s: float | None = None
-    shown: int = 0
+    answer_s: float = 10.0  # longest time from sending a goal until its server accepts it
+    before: frozenset[str] = frozenset()  # the goals that its server listed before it was sent, by the server's names
+    id: str = field(default_factory=lambda: f"avlmaps-{uuid4().hex}")  # our name for it, unlike any other client's
+    alias: str = ""  # the server's name for it, where that is another and is known
+    called_off_s: float | None = None  # when it was first cancelled
+    heard_s: float | None = None  # when the server last showed that it is at it, by the driver's clock
+    shown: int = 0  # how often it did
     end: End | None = None
     note: str = ""
 

@@ -41,19 +41,13 @@ class Orders(msgspec.Struct):
 
 
 class Beat(msgspec.Struct, omit_defaults=True):
-    """One line of the driver: that a goal is active, that none is, or that the guard's work is over.
+    """One line of the driver: that a goal is active, that none is, or that the guard's work is over."""
 
-    Attributes:
-        id: our name for the active goal; "" where none is active.
-        alias: the server's name for it.
-        before: the goals that its server listed before it was sent.
-    """
-
-    id: str = ""
-    alias: str = ""
+    id: str = ""  # our name for the active goal; "" where none is active
+    alias: str = ""  # the server's name for it
     action: str = ""
     is_accepted: bool = False
-    before: tuple[str, ...] = ()
+    before: tuple[str, ...] = ()  # the goals that its server listed before it was sent
     over: bool = False
 
     @classmethod

@@ -177,8 +177,7 @@ class Link:
 def address(url: str) -> str:
     """Return the websocket address that a user means: ``robot``, ``robot:9090`` and ``ws://robot`` are one.
 
-    Raises:
-        NavigationError: it is not an address of a websocket.
+    ``NavigationError``: it is not an address of a websocket.
     """
     whole = url if "://" in url else f"ws://{url}"
     try:

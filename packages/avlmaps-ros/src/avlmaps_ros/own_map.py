@@ -21,18 +21,13 @@ _MAP_AT, _COSTMAP_AT = 65, 99  # map_server's threshold; the middle of a body to
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnGrid:
-    """A nav_msgs/OccupancyGrid.
+    """A nav_msgs/OccupancyGrid."""
 
-    Attributes:
-        values: (height, width) along the grid's y and x: 0 free to 100 occupied, -1 unknown.
-        is_costmap: whether obstacles are already as much larger as the body is.
-    """
-
-    values: Int8[np.ndarray, "h w"]
+    values: Int8[np.ndarray, "h w"]  # (height, width) along the grid's y and x: 0 free to 100 occupied, -1 unknown
     cell_m: float
     frame_from_grid: GroundTransform
     frame: str
-    is_costmap: bool = False
+    is_costmap: bool = False  # whether obstacles are already as much larger as the body is
 
 
 class _Pose(msgspec.Struct):

@@ -48,18 +48,12 @@ class Sighting:
 
     Each moving transform was made between ``taken_s`` and ``heard_s``, by this machine's clock. To order events,
     compare these: a process may stand still between two looks at a clock.
-
-    Attributes:
-        pose: of the body on the ground, in the fixed frame.
-        taken_s: a time after which every one of the moving transforms was made.
-        heard_s: when the newest of them was heard.
-        age_s: since ``taken_s``, at the moment of looking.
     """
 
-    pose: GroundPose
-    taken_s: float
-    heard_s: float
-    age_s: float
+    pose: GroundPose  # of the body on the ground, in the fixed frame
+    taken_s: float  # a time after which every one of the moving transforms was made
+    heard_s: float  # when the newest of them was heard
+    age_s: float  # since ``taken_s``, at the moment of looking
 
 
 class LiveTree:

@@ -96,8 +96,7 @@ class Websocket(WebSocketClientFactory):
 def start_reactor() -> None:
     """Run twisted's reactor in a thread of its own, once in a process.
 
-    Raises:
-        RuntimeError: it ran before and was stopped; twisted cannot start it again.
+    ``RuntimeError``: it ran before and was stopped; twisted cannot start it again.
     """
     with _starting:
         if reactor.running:

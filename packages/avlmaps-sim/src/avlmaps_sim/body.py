@@ -63,21 +63,13 @@ def nearest_point(place: Point, segments: Float[np.ndarray, "s 4"]) -> tuple[flo
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What a disc of some radius may touch during one movement.
+    """What a disc of some radius may touch during one movement."""
 
-    Attributes:
-        segments: (s, 4) outlines in reach, as x y x y.
-        ground: cells with floor.
-        origin: corner of the first cell.
-        cell_m: edge of a cell.
-        radius_m: of the disc.
-    """
-
-    segments: Float[np.ndarray, "s 4"]
-    ground: Bool[np.ndarray, "nx ny"]
-    origin: Float[np.ndarray, "2"]
-    cell_m: float
-    radius_m: float
+    segments: Float[np.ndarray, "s 4"]  # (s, 4) outlines in reach, as x y x y
+    ground: Bool[np.ndarray, "nx ny"]  # cells with floor
+    origin: Float[np.ndarray, "2"]  # corner of the first cell
+    cell_m: float  # edge of a cell
+    radius_m: float  # of the disc
 
     def fits(self, place: Point) -> bool:
         """Return whether the disc touches nothing and has floor below its middle."""
@@ -106,7 +98,6 @@ class Surroundings:
         return 0 <= i < self.ground.shape[0] and 0 <= j < self.ground.shape[1] and bool(self.ground[i, j])
 
     def _pushed(self, place: Point) -> Point | None:
-        """Return a free place that the disc is pushed to, out of what it touches; None where there is none."""
         for _ in range(_PUSHES):
             if self.fits(place):
                 return place
@@ -138,17 +129,11 @@ _BLOCK_M = 1.0  # outlines are looked up by blocks of this size
 
 @dataclass(frozen=True, slots=True)
 class MotionNoise:
-    """How inexactly a body follows its commands; its odometry is true nevertheless. Standard deviations.
+    """How inexactly a body follows its commands; its odometry is true nevertheless. Standard deviations."""
 
-    Attributes:
-        forward: of the distance, as a part of it.
-        turn: of the turn, as a part of it.
-        drift_rad_per_m: of the turn that creeps in while it drives, for one metre.
-    """
-
-    forward: float = 0.0
-    turn: float = 0.0
-    drift_rad_per_m: float = 0.0
+    forward: float = 0.0  # of the distance, as a part of it
+    turn: float = 0.0  # of the turn, as a part of it
+    drift_rad_per_m: float = 0.0  # of the turn that creeps in while it drives, for one metre
 
 
 class Building:

@@ -48,8 +48,7 @@ class FloorCoverage:
 def require_floor(scene: Scene, walk: WalkSettings) -> FreeSpace:
     """Return where the robot can stand.
 
-    Raises:
-        RecordingError: the building's size is none in metres, or it has no floor to speak of.
+    ``RecordingError``: the building's size is none in metres, or it has no floor to speak of.
     """
     side, height = float(scene.mesh.size[:2].max()), float(scene.mesh.size[2])
     if side > MOST_SIDE_M or height > MOST_HEIGHT_M or height < LEAST_HEIGHT_M or side < LEAST_SIDE_M:

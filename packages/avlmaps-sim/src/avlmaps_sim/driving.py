@@ -50,26 +50,16 @@ class WalkSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tour:
-    """A path over the floor with stops, and what is seen along it.
+    """A path over the floor with stops, and what is seen along it."""
 
-    Attributes:
-        path: (n, 2) points a few centimetres apart.
-        stop: (k,) the points at which it stops.
-        purpose: for each stop the targets that it is for.
-        target: (t, 2) middle of each target.
-        in_sight: (n, t) which targets have a free line to each point of the path.
-    """
-
-    path: Float[np.ndarray, "n 2"]
-    stop: Int[np.ndarray, " k"]
-    purpose: tuple[Int[np.ndarray, " _"], ...]
-    target: Float[np.ndarray, "t 2"]
-    in_sight: Bool[np.ndarray, "n t"]
+    path: Float[np.ndarray, "n 2"]  # (n, 2) points a few centimetres apart
+    stop: Int[np.ndarray, " k"]  # (k,) the points at which it stops
+    purpose: tuple[Int[np.ndarray, " _"], ...]  # for each stop the targets that it is for
+    target: Float[np.ndarray, "t 2"]  # (t, 2) middle of each target
+    in_sight: Bool[np.ndarray, "n t"]  # (n, t) which targets have a free line to each point of the path
 
 
 class _Robot:
-    """The robot between two ticks: where along its way it is, where it looks, how fast it turns, what it has seen."""
-
     def __init__(self, tour: Tour, settings: WalkSettings, heading_rad: float | None) -> None:
         self.tour, self.settings = tour, settings
         self.along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(tour.path, axis=0), axis=1)))
@@ -92,7 +82,6 @@ class _Robot:
         return float(np.arctan2(y, x))
 
     def note(self) -> None:
-        """Take down one tick."""
         place = self.at(self.along_m)
         self.places.append(place)
         self.headings.append(self.heading_rad)
@@ -113,7 +102,6 @@ class _Robot:
         return abs(goal_rad - self.heading_rad)
 
     def drive_to(self, metres: float, period_s: float, phase: float) -> None:
-        """Drive on to a place along the path, looking ahead and now and then to the sides."""
         rate_hz = self.settings.rate_hz
         while self.along_m < metres - 1e-6:
             way = self.way_rad()
@@ -125,7 +113,6 @@ class _Robot:
             self.note()
 
     def look_at(self, targets: Int[np.ndarray, " m"]) -> None:
-        """Turn to those of a stop's targets that were not in the picture before."""
         enough = max(round(_LOOK_S * self.settings.rate_hz), 1)
         missing = targets[self.shown[targets] < enough]
         x, y = (self.tour.target[missing] - self.at(self.along_m)).T

@@ -29,21 +29,13 @@ _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeSpace:
-    """The places of one floor where a round robot can stand, as a grid; cell (i, j) covers x from origin + i cells.
+    """The places of one floor where a round robot can stand, as a grid; cell (i, j) covers x from origin + i cells."""
 
-    Attributes:
-        free: (nx, ny) where its middle may be.
-        clearance_m: (nx, ny) distance to the nearest obstacle, never overstated.
-        origin: (2,) xy of the grid's lowest corner.
-        cell_m: side of a cell.
-        floor_m: height of the floor.
-    """
-
-    free: Bool[np.ndarray, "nx ny"]
-    clearance_m: Float[np.ndarray, "nx ny"]
-    origin: Float[np.ndarray, "2"]
-    cell_m: float
-    floor_m: float
+    free: Bool[np.ndarray, "nx ny"]  # (nx, ny) where its middle may be
+    clearance_m: Float[np.ndarray, "nx ny"]  # (nx, ny) distance to the nearest obstacle, never overstated
+    origin: Float[np.ndarray, "2"]  # (2,) xy of the grid's lowest corner
+    cell_m: float  # side of a cell
+    floor_m: float  # height of the floor
     _number: np.ndarray = field(init=False, repr=False)
     _graph: sparse.csr_matrix = field(init=False, repr=False)
 
@@ -80,8 +72,7 @@ class FreeSpace:
     def nearest(self, xy: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
         """Return the free place nearest to a place as the crow flies: the place itself where it is free.
 
-        Raises:
-            ValueError: nothing is free.
+        ``ValueError``: nothing is free.
         """
         xy = np.asarray(xy, float)
         if bool(self.is_free(xy)):

@@ -61,7 +61,6 @@ def mark_slab(corners, low_m, high_m, origin, cell_m, grid):  # pragma: no cover
 
 @njit(cache=True)
 def _mark_column(polygon, count, i, origin, cell_m, grid, ny):  # pragma: no cover - compiled
-    """Mark the cells of column i that a convex polygon touches."""
     left = origin[0] + i * cell_m
     right = left + cell_m
     y_low, y_high = np.inf, -np.inf

@@ -60,8 +60,6 @@ class LightMap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Samples:
-    """Where light is computed, and for which triangle each place stands."""
-
     place: Float[np.ndarray, "s 3"]
     normal: Float[np.ndarray, "s 3"]
     triangle: Int[np.ndarray, " s"]
@@ -98,7 +96,6 @@ class _Solid:
 
 
 def _solid(scene: Scene, lights: tuple[Light, ...]) -> _Solid:
-    """Mark the cells that hold a surface; panes of glass and the lamps themselves cast no shadow."""
     mesh = scene.mesh
     clear = np.array([m.opacity < 0.6 for m in mesh.materials], bool)
     place = np.array([lamp.position for lamp in lights]).reshape(-1, 3)
@@ -138,7 +135,6 @@ def _room(solid: UInt8[np.ndarray, "x y z"]) -> UInt8[np.ndarray, "x y z"]:
 
 
 def _merged(lights: tuple[Light, ...]) -> tuple[Light, ...]:
-    """Return lamps of which those close together are one, for a chandelier has many bulbs."""
     place = np.array([lamp.position for lamp in lights]).reshape(-1, 3)
     power = np.array([lamp.colour for lamp in lights]).reshape(-1, 3)
     left = np.ones(len(lights), bool)
@@ -177,8 +173,6 @@ def _corner_samples(mesh: Mesh, chosen: Bool[np.ndarray, " t"], smooth: np.ndarr
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Patches:
-    """Flat triangles that share texels."""
-
     group: Int[np.ndarray, " n"]
     turned: Bool[np.ndarray, " n"]
     axes: Int[np.ndarray, "g 2"]
@@ -189,7 +183,6 @@ class _Patches:
 
 
 def _patches(mesh: Mesh, chosen: Int[np.ndarray, " n"], instance: Int[np.ndarray, " n"]) -> _Patches:
-    """Put the flat triangles of an object that lie in one plane on one patch."""
     normal = mesh.normals()[chosen].astype(np.float64)
     axis = np.abs(normal).argmax(axis=1)
     turned = np.take_along_axis(normal, axis[:, None], 1)[:, 0] < 0
@@ -252,7 +245,6 @@ def _directions(count: int, half: bool = False) -> Float[np.ndarray, "r 3"]:
 
 def _lit(samples: _Samples, lights: tuple[Light, ...], solid: _Solid, albedo: np.ndarray, glow: np.ndarray
          ) -> tuple[Float32[np.ndarray, "s 2 3"], Bool[np.ndarray, "s 2"]]:  # fmt: skip
-    """Return the light on both sides of each sample, and which sides look into free space."""
     n = len(samples.place)
     light, start, free = np.zeros((n, 2, 3), np.float32), np.zeros((n, 2, 3), np.float32), np.zeros((n, 2), bool)
     lamp = np.array([lamp.position for lamp in lights]).reshape(-1, 3)

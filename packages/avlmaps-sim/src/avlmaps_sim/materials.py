@@ -20,27 +20,16 @@ Maker = Callable[[np.random.Generator], Texture]
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """How a kind looks.
+    """How a kind looks."""
 
-    Attributes:
-        colours: tints to draw from, sRGB.
-        gloss: middle of the gloss.
-        grey: maker of textures to be tinted, or None.
-        pictured: maker of textures in colours of their own, or None.
-        share: how often the pictured ones are taken where both are there and no colour is requested.
-        pool: textures of each sort that are stored.
-        drift: how far each channel of a drawn tint may stray.
-        opacity: 1 for solid.
-    """
-
-    colours: tuple[Triple, ...]
-    gloss: float
-    grey: Maker | None = None
-    pictured: Maker | None = None
-    share: float = 0.5
-    pool: int = 48
-    drift: float = 0.05
-    opacity: float = 1.0
+    colours: tuple[Triple, ...]  # tints to draw from, sRGB
+    gloss: float  # middle of the gloss
+    grey: Maker | None = None  # maker of textures to be tinted, or None
+    pictured: Maker | None = None  # maker of textures in colours of their own, or None
+    share: float = 0.5  # how often the pictured ones are taken where both are there and no colour is requested
+    pool: int = 48  # textures of each sort that are stored
+    drift: float = 0.05  # how far each channel of a drawn tint may stray
+    opacity: float = 1.0  # 1 for solid
 
 
 _WOOD = (

@@ -58,8 +58,7 @@ def rearranged(scene: Scene, day: int, which: Families = "all", since: int = 0) 
     The same scene and day give the same building; the changes of day 2 begin with those of day 1. ``since`` is the day
     of the scene, 0 as it was made.
 
-    Raises:
-        ValueError: the day is before the first.
+    ``ValueError``: the day is before the first.
     """
     if day < since:
         raise ValueError(f"day {day} lies before day {since}, on which the scene was made")
@@ -105,7 +104,6 @@ def _next_day(scene: Scene, day: int, rng: np.random.Generator, which: Families)
 
 
 def _standing_alone(scene: Scene) -> list[int]:
-    """Return the things that stand on a floor and bear no other."""
     low = np.array([thing.low for thing in scene.objects])
     high = np.array([thing.high for thing in scene.objects])
     middle = (low + high) / 2
@@ -127,8 +125,6 @@ def _standing_alone(scene: Scene) -> list[int]:
 
 
 class _Ways:
-    """Where a robot can go, which no change may cut off."""
-
     def __init__(self, scene: Scene) -> None:
         self._reached = [self._reach(scene, floor) for floor in self._floors(scene)]
 
@@ -144,7 +140,6 @@ class _Ways:
         return areas, space.area_m2
 
     def are_kept(self, scene: Scene) -> bool:
-        """Return whether a robot still reaches every area, and most of the floor."""
         now = [self._reach(scene, floor) for floor in self._floors(scene)]
         return all(a >= b and m >= _KEPT_SHARE * n for (a, m), (b, n) in zip(now, self._reached, strict=True))
 
@@ -169,7 +164,6 @@ def _places(scene: Scene, reach_m: float, floor_m: float, rng: np.random.Generat
 
 
 def _moved(scene: Scene, number: int, rng: np.random.Generator, ways: _Ways) -> Scene | None:
-    """Return the scene with a thing elsewhere, turned; None where there is no place."""
     thing = scene.objects[number]
     others = _without(scene, {number})
     floor_m = scene.areas[scene.area_at(thing.centre)].floor_m
@@ -196,7 +190,6 @@ def _bent(
     turn_rad: float,
     xy: tuple[float, float] | None = None,
 ) -> Scene:
-    """Return the scene with some triangles of a thing turned about an upright line, and moved to a place."""
     mesh, thing = scene.mesh, scene.objects[number]
     rows = np.unique(mesh.triangle[own])
     shared = np.isin(rows, mesh.triangle[~own])
@@ -239,7 +232,6 @@ def _without(scene: Scene, gone: set[int]) -> Scene:
 def _with_brought(
     scene: Scene, category: str, name: str, rng: np.random.Generator, which: Families, ways: _Ways
 ) -> Scene | None:
-    """Return the scene with a new thing on a floor; None where there is no place."""
     piece = make(category, rng, which)
     if piece.family.startswith(("wall", "counter", "table top")) or float(piece.mesh.size.max()) < _SMALLEST_M:
         return None
@@ -258,7 +250,6 @@ def _with_brought(
 
 
 def _swung(scene: Scene, number: int, rng: np.random.Generator, ways: _Ways) -> Scene | None:
-    """Return the scene with an open door's leaf at another angle; None for a door without one, or without room."""
     thing = scene.objects[number]
     own = np.flatnonzero(scene.instance == number)
     at = scene.mesh.corners()[own].astype(np.float64)

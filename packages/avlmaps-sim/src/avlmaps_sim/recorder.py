@@ -148,27 +148,17 @@ class RecordSettings:
 
 @dataclass(frozen=True, slots=True)
 class SceneRecording:
-    """The content of a finished recording.
+    """The content of a finished recording."""
 
-    Attributes:
-        path: the folder.
-        frames: how many.
-        duration_s: length of the walk.
-        heard: the sounds in it.
-        floor: how much of the building's floor was driven along and seen.
-    """
-
-    path: Path
-    frames: int
-    duration_s: float
-    heard: tuple[Sounding, ...]
-    floor: FloorCoverage
+    path: Path  # the folder
+    frames: int  # how many
+    duration_s: float  # length of the walk
+    heard: tuple[Sounding, ...]  # the sounds in it
+    floor: FloorCoverage  # how much of the building's floor was driven along and seen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Trip:
-    """Where the camera is when."""
-
     stamps_s: Float[np.ndarray, " n"]
     world_from_camera: Float[np.ndarray, "n 4 4"]
     duration_s: float
@@ -230,8 +220,7 @@ def sound_again(
 ) -> tuple[Sound | ChannelSound | None, list[Sounding]]:
     """Return the track of other sounds along a walk that was recorded, and these; no track for hearing ``none``.
 
-    Raises:
-        AudioError: the folder of clips cannot be used.
+    ``AudioError``: the folder of clips cannot be used.
     """
     trip = _Trip(walk.stamps_s, walk.world_from_body, duration_s)
     soundings = _soundings(scene, settings, trip, rng)
@@ -259,7 +248,6 @@ def _trip(scene: Scene, settings: RecordSettings, rng: np.random.Generator) -> _
 
 
 def _soundings(scene: Scene, settings: RecordSettings, trip: _Trip, rng: np.random.Generator) -> list[Sounding]:
-    """Place sounds and let each play as the robot comes by."""
     if settings.hearing == "none":
         return []
     bank = Synthesised() if settings.sounds is None else Recorded(settings.sounds, settings.rate_hz)
@@ -311,7 +299,6 @@ def _microphones(settings: RecordSettings) -> Microphones | None:
 def _write_frames(
     scene: Scene, settings: RecordSettings, trip: _Trip, writer: RecordingWriter, rng: np.random.Generator
 ) -> None:
-    """Draw every frame, in several processes where it pays, and hand the finished files to the writer."""
     seed = int(rng.integers(1 << 62))
     count = len(trip.stamps_s)
     names = [f"{index:06d}" for index in range(count)]
@@ -341,19 +328,15 @@ _Job = tuple[int, str, Float[np.ndarray, "4 4"], Shift]
 
 
 class _Artist:
-    """Draws frames into files; every frame has its own random numbers, in every process."""
-
     def __init__(self, renderer: Renderer, settings: RecordSettings, folder: Path, seed: int) -> None:
         self._renderer, self._settings, self._folder, self._seed = renderer, settings, folder, seed
         self.sensor = Sensor(PRESETS[settings.sensor])
 
     def files(self, name: str) -> tuple[Path, Path, Path]:
-        """Return where a frame's colour, depth and instances are."""
         colour = self._folder / f"{name}.{self._settings.colour}"
         return colour, self._folder / _DEPTH / f"{name}.png", self._folder / SEMANTIC / f"{name}.png"
 
     def draw(self, job: _Job) -> int:
-        """Draw one frame and return its index."""
         index, name, pose, shift = job
         camera = self._settings.camera
         view = self._renderer.render(camera, pose)
@@ -402,7 +385,6 @@ def _draw(job: _Job) -> int:
 
 
 def _drawn(artist: _Artist, jobs: list[_Job], workers: int) -> Iterator[int]:
-    """Yield the index of each frame when its files are there, in order."""
     if workers < 2 or len(jobs) < _FEWEST_FOR_PROCESSES:
         yield from map(artist.draw, jobs)
         return

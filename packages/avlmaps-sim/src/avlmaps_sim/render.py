@@ -115,15 +115,10 @@ _ROUGH = 1e-3  # metres: what lies no farther in front of a mirror than this lie
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plane:
-    """A plane: the points x with normal · x = offset; the normal points to the camera's side.
+    """A plane: the points x with normal · x = offset; the normal points to the camera's side."""
 
-    Attributes:
-        normal: unit vector, world.
-        offset_m: metres.
-    """
-
-    normal: Float[np.ndarray, "3"]
-    offset_m: float
+    normal: Float[np.ndarray, "3"]  # unit vector, world
+    offset_m: float  # metres
 
 
 def planes_shown(
@@ -239,8 +234,6 @@ class View:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Groups:
-    """Triangles in their stored order, and the groups they form."""
-
     order: Int[np.ndarray, " t"]
     first: Int[np.ndarray, " g1"]
     box: Float[np.ndarray, "g 6"]
@@ -271,13 +264,11 @@ class _Layer:
 
     @classmethod
     def empty(cls, pixels: int) -> "_Layer":
-        """Return memory for a picture of this number of pixels."""
         return cls(np.zeros(pixels, np.float32), np.zeros(pixels, np.int32), np.zeros((pixels, 3), np.float32),
                    np.zeros(pixels, np.float32), np.zeros((pixels, 3), np.float32))  # fmt: skip
 
 
 def _grouped(mesh: Mesh) -> _Groups:
-    """Sort triangles into groups that lie close together, the large ones and those one sees through apart."""
     corners = mesh.corners().astype(np.float64)
     low, high = corners.min(axis=1), corners.max(axis=1)
     large = (high - low).max(axis=1, initial=0.0) > _LARGE_M
@@ -361,7 +352,6 @@ class Renderer:
         return view
 
     def _reflect(self, view: View, pixels: Int[np.ndarray, " m"], plane: Plane, eye: _Eye, gain: float) -> None:
-        """Draw what a mirror reflects into the pixels of a view that show it."""
         front, behind = self._layers_for(view.depth_m.size)
         rotation, shift = reflected(plane, eye.rotation, eye.shift)
         self._paint(front, behind, replace(eye, rotation=rotation, shift=shift), in_front_of(plane, self._corner))
@@ -390,7 +380,6 @@ class Renderer:
         return self._layers
 
     def _draw(self, front: _Layer, behind: _Layer, eye: _Eye, corners: _Corners) -> None:
-        """Find the first surface of each pixel, and the first surface that nothing shines through."""
         groups = self._groups
         front.inverse.fill(0.0)
         front.shown.fill(NOTHING)
@@ -409,7 +398,6 @@ class Renderer:
                                 eye.lens, eye.width, eye.height, layer.inverse, layer.shown)  # fmt: skip
 
     def _shade(self, layer: _Layer, eye: _Eye) -> None:
-        """Work out the linear light that comes from what each pixel shows."""
         inverse, shown, place, side = layer.inverse, layer.shown, layer.place, layer.side
         lens, rotation = eye.lens.astype(np.float32), eye.rotation.astype(np.float32)
         origin = (-eye.shift @ eye.rotation).astype(np.float32)

@@ -16,25 +16,15 @@ NOTHING = -1  # the instance of a pixel that shows no triangle
 
 @dataclass(frozen=True, slots=True)
 class SceneObject:
-    """One thing with a name: furniture, a picture, a wall.
+    """One thing with a name: furniture, a picture, a wall."""
 
-    Attributes:
-        category: what it is (``chair``).
-        low: lowest corner of the box round it, world axes.
-        high: highest corner.
-        heading_rad: where its front looks, counter-clockwise from +x.
-        family: which recipe it was made by, ``""`` where it was read from a file.
-        name: what the file calls it, or category and number.
-        area: index of the area that it stands in, −1 for none.
-    """
-
-    category: str
-    low: Triple
-    high: Triple
-    heading_rad: float = 0.0
-    family: str = ""
-    name: str = ""
-    area: int = -1
+    category: str  # what it is (``chair``)
+    low: Triple  # lowest corner of the box round it, world axes
+    high: Triple  # highest corner
+    heading_rad: float = 0.0  # where its front looks, counter-clockwise from +x
+    family: str = ""  # which recipe it was made by, ``""`` where it was read from a file
+    name: str = ""  # what the file calls it, or category and number
+    area: int = -1  # index of the area that it stands in, −1 for none
 
     @property
     def centre(self) -> Triple:
@@ -51,21 +41,13 @@ class SceneObject:
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """One room, or part of an open plan.
+    """One room, or part of an open plan."""
 
-    Attributes:
-        kind: ``kitchen``, ``bedroom`` ...
-        polygon: (k, 2) top-down corners, counter-clockwise.
-        floor_m: height of its floor.
-        ceiling_m: height of its ceiling.
-        name: kind and number.
-    """
-
-    kind: str
-    polygon: Float[np.ndarray, "k 2"]
-    floor_m: float = 0.0
-    ceiling_m: float = 2.6
-    name: str = ""
+    kind: str  # ``kitchen``, ``bedroom``
+    polygon: Float[np.ndarray, "k 2"]  # (k, 2) top-down corners, counter-clockwise
+    floor_m: float = 0.0  # height of its floor
+    ceiling_m: float = 2.6  # height of its ceiling
+    name: str = ""  # kind and number
 
     def contains(self, xy: Float[np.ndarray, "*n 2"]) -> np.ndarray:
         """Return which points lie inside it, top-down."""
@@ -94,25 +76,15 @@ class Light:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A building to look at.
+    """A building to look at."""
 
-    Attributes:
-        name: ``house:12`` or the file's name.
-        mesh: every triangle.
-        instance: (t,) which object each triangle belongs to, an index into ``objects``.
-        objects: what is there; walls, floors and ceilings are among them.
-        areas: its rooms.
-        lights: its lamps.
-        mirrors: whether its mirrors reflect; otherwise they show the colour of their glass.
-    """
-
-    name: str
-    mesh: Mesh
-    instance: Int32[np.ndarray, " t"]
-    objects: tuple[SceneObject, ...]
-    areas: tuple[Area, ...] = ()
-    lights: tuple[Light, ...] = ()
-    mirrors: bool = False
+    name: str  # ``house:12`` or the file's name
+    mesh: Mesh  # every triangle
+    instance: Int32[np.ndarray, " t"]  # (t,) which object each triangle belongs to, an index into ``objects``
+    objects: tuple[SceneObject, ...]  # what is there; walls, floors and ceilings are among them
+    areas: tuple[Area, ...] = ()  # its rooms
+    lights: tuple[Light, ...] = ()  # its lamps
+    mirrors: bool = False  # whether its mirrors reflect; otherwise they show the colour of their glass
 
     def __post_init__(self) -> None:
         if self.instance.shape != (len(self.mesh.triangle),):

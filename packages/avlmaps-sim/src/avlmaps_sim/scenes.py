@@ -63,8 +63,7 @@ def _rearranged(before: str, day: int) -> tuple[Scene, tuple[Change, ...]]:
 def on_day(spec: str, day: int) -> str:
     """Return the name of a scene made by rule on a later day.
 
-    Raises:
-        SceneError: the day is before the first, the name says one already, or it is that of a file.
+    ``SceneError``: the day is before the first, the name says one already, or it is that of a file.
     """
     if day < 0:
         raise SceneError(f"a scene cannot be rearranged {day} times; give 0 or more")
@@ -99,7 +98,6 @@ def _opened(spec: str) -> Scene:
 
 
 def _made(kind: str, seed: str, *words: str, spec: str) -> Scene:
-    """Return a building made by rule, as the words behind its seed say."""
     which = [word for word in words if word != _LIVED_IN]
     if not seed.isdecimal() or len(which) > 1 or not set(which) <= _FAMILIES.keys() or words.count(_LIVED_IN) > 1:
         raise SceneError(

@@ -29,42 +29,25 @@ EVENTS_HEADER = (*COMMON_HEADER, "source_x", "source_y", "source_z", "instance")
 
 @dataclass(frozen=True, slots=True)
 class HeardEvent:
-    """One sound of a recording.
+    """One sound of a recording."""
 
-    Attributes:
-        onset_s: when it is first heard, the recording's time.
-        offset_s: when it ends.
-        category: what it is.
-        clip: the clip's name.
-        robot: where the robot was when it was half over.
-        source: where it came from.
-        instance: the object that made it, −1 for none.
-    """
-
-    onset_s: float
-    offset_s: float
-    category: str
-    clip: str
-    robot: Triple
-    source: Triple
-    instance: int
+    onset_s: float  # when it is first heard, the recording's time
+    offset_s: float  # when it ends
+    category: str  # what it is
+    clip: str  # the clip's name
+    robot: Triple  # where the robot was when it was half over
+    source: Triple  # where it came from
+    instance: int  # the object that made it, −1 for none
 
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """The truth of a scene: sounds, things, rooms.
+    """The truth of a scene: sounds, things, rooms."""
 
-    Attributes:
-        simulation: the scene's name, the seed and the settings that made the recording.
-        events: in the order of their onsets.
-        objects: indexed by the instance that ``semantic/`` and the events name.
-        areas: the rooms.
-    """
-
-    simulation: dict[str, Any]
-    events: tuple[HeardEvent, ...]
-    objects: tuple[SceneObject, ...]
-    areas: tuple[Area, ...]
+    simulation: dict[str, Any]  # the scene's name, the seed and the settings that made the recording
+    events: tuple[HeardEvent, ...]  # in the order of their onsets
+    objects: tuple[SceneObject, ...]  # indexed by the instance that ``semantic/`` and the events name
+    areas: tuple[Area, ...]  # the rooms
 
 
 def write_truth(out: Path, scene: Scene, soundings: Sequence[Sounding], simulation: dict[str, Any]) -> None:
@@ -95,8 +78,7 @@ def write_true_poses(
 def read_truth(recording: Path) -> Truth:
     """Read the truth beside a recording.
 
-    Raises:
-        RecordingError: there is none, or a file does not hold what this program writes.
+    ``RecordingError``: there is none, or a file does not hold what this program writes.
     """
     for name in (EVENTS, OBJECTS, AREAS, SIMULATION):
         if not (recording / name).is_file():

@@ -70,8 +70,7 @@ def random_views(
     A share of the views looks towards an object that is in sight; the others anywhere where the next thing ahead is
     0.8 to 6 m away.
 
-    Raises:
-        ValueError: nowhere is there a free place.
+    ``ValueError``: nowhere is there a free place.
     """
     floors = [free_space(scene, 0.15, 1.9, floor=k) for k in range(len(floor_heights(scene)))]
     room = np.array([space.area_m2 for space in floors])

@@ -30,21 +30,13 @@ _LEAST_GAIN = 0.9  # a place that adds less is not gone to
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
-    """The targets on a floor: things, and pieces of the floor.
+    """The targets on a floor: things, and pieces of the floor."""
 
-    Attributes:
-        low: (t, 2) lowest xy of the box round each.
-        high: (t, 2) highest xy.
-        nearest_m: (t,) from nearer than this the camera looks over it.
-        worth: (t,) of seeing it.
-        area: (t,) which area it is in, −1 for none: from another area it is not seen well enough.
-    """
-
-    low: Float[np.ndarray, "t 2"]
-    high: Float[np.ndarray, "t 2"]
-    nearest_m: Float[np.ndarray, " t"]
-    worth: Float[np.ndarray, " t"]
-    area: Int[np.ndarray, " t"]
+    low: Float[np.ndarray, "t 2"]  # (t, 2) lowest xy of the box round each
+    high: Float[np.ndarray, "t 2"]  # (t, 2) highest xy
+    nearest_m: Float[np.ndarray, " t"]  # (t,) from nearer than this the camera looks over it
+    worth: Float[np.ndarray, " t"]  # (t,) of seeing it
+    area: Int[np.ndarray, " t"]  # (t,) which area it is in, −1 for none: from another area it is not seen well enough
 
     @property
     def middle(self) -> Float[np.ndarray, "t 2"]:
@@ -63,15 +55,10 @@ class Targets:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Viewpoints:
-    """Places to stand, and which targets each is for.
+    """Places to stand, and which targets each is for."""
 
-    Attributes:
-        place: (k, 2) xy, metres.
-        purpose: for each place the targets, by index.
-    """
-
-    place: Float[np.ndarray, "k 2"]
-    purpose: tuple[Int[np.ndarray, " _"], ...]
+    place: Float[np.ndarray, "k 2"]  # (k, 2) xy, metres
+    purpose: tuple[Int[np.ndarray, " _"], ...]  # for each place the targets, by index
 
 
 def viewpoints(
@@ -305,8 +292,7 @@ def walk_through(
 ) -> Float[np.ndarray, "n 4 4"]:
     """Return the poses ``world_from_camera`` of a walk that sees every area and object of a floor, or of all of them.
 
-    Raises:
-        ValueError: the scene has no floor to stand on.
+    ``ValueError``: the scene has no floor to stand on.
     """
     settings = settings or WalkSettings()
     eye_m = float(rng.uniform(*settings.camera_height_m))
@@ -435,7 +421,6 @@ def _nearest_neighbour(cost: np.ndarray, start: int) -> list[int]:
 
 
 def _improved(tour: list[int], cost: np.ndarray) -> list[int]:
-    """Turn round parts of an open tour as long as that makes it shorter."""
     better = True
     while better:
         better = False

@@ -138,8 +138,7 @@ class LabelledFolder:
     def __init__(self, folder: Path) -> None:
         """Read the index and the camera.
 
-        Raises:
-            RecordingError: there is no index, it or the camera's file is damaged, or it names no frame.
+        ``RecordingError``: there is no index, it or the camera's file is damaged, or it names no frame.
         """
         self.folder = folder
         index = folder / "frames.csv"
@@ -169,8 +168,7 @@ class LabelledFolder:
     def read(self, number: int) -> LabelledFrame:
         """Read one frame by its row in the index.
 
-        Raises:
-            RecordingError: a picture is missing, damaged, or of another size or depth.
+        ``RecordingError``: a picture is missing, damaged, or of another size or depth.
         """
         name = self.names[number]
         is_png = (self.folder / f"{name}.color.png").is_file()
@@ -325,8 +323,7 @@ def _figures(counts: Sequence[Int[np.ndarray, "37 37"]], labelled: int) -> Frame
 def run_frames(encoder: EmbeddedPixels, folder: Path) -> dict[str, Table]:
     """Return the tables of a folder of labelled frames.
 
-    Raises:
-        RecordingError: the folder has no index, or a frame cannot be read.
+    ``RecordingError``: the folder has no index, or a frame cannot be read.
     """
     figures = measure(encoder, LabelledFolder(folder))
     return {

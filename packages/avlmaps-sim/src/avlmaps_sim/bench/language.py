@@ -104,8 +104,7 @@ def _judge_question(row: Row) -> Judged:
 def _asked(sentence: str, given: Attachments) -> dict[str, Any]:
     """Return the query of a sentence, as JSON; `query` takes storeys, lists and numbers in the same order.
 
-    Raises:
-        QueryError: the sentence is not understood.
+    ``QueryError``: the sentence is not understood.
     """
     from avlmaps.language.list_questions import read_list, said_alternatives, said_number, speaks_of_photo
     from avlmaps.language.questions import read_question

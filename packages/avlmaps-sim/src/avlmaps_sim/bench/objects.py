@@ -165,8 +165,7 @@ def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any
 
     Recordings and maps stay in ``out/work``.
 
-    Raises:
-        BackendError: a model is missing; nothing is recorded then.
+    ``BackendError``: a model is missing; nothing is recorded then.
     """
     from avlmaps_sim.bench.harness.workplace import Workplace, scene_jobs
     from avlmaps_sim.bench.indexing.runs import IndexingSettings

@@ -87,8 +87,7 @@ def kind_names(encoder: EmbeddedSounds) -> dict[str, str]:
 def read_clips(folder: Path, encoder: EmbeddedSounds) -> list[NamedClip]:
     """Read the index of a folder, or that of ESC-50 as it is downloaded.
 
-    Raises:
-        AudioError: there is no index, it lacks a column, or names no clip.
+    ``AudioError``: there is no index, it lacks a column, or names no clip.
     """
     rows = index_rows(folder)
     if not rows:
@@ -106,8 +105,7 @@ def read_clips(folder: Path, encoder: EmbeddedSounds) -> list[NamedClip]:
 def run(folder: Path) -> dict[str, Table]:
     """Return the tables of a folder of clips.
 
-    Raises:
-        AudioError: there is no index, no clip that the weights were not fitted to, or a file cannot be read.
+    ``AudioError``: there is no index, no clip that the weights were not fitted to, or a file cannot be read.
     """
     encoder = EmbeddedSounds()
     clips = read_clips(folder, encoder)

@@ -64,8 +64,7 @@ class Evidence:
     def of(cls, recording: Recording) -> "Evidence":
         """Read the truth beside a recording, and count in its instance pictures what was shown.
 
-        Raises:
-            RecordingError: the recording has no truth.
+        ``RecordingError``: the recording has no truth.
         """
         truth = read_truth(recording.path)
         shown = _shown(recording.path / SEMANTIC, len(truth.objects))

@@ -46,27 +46,16 @@ REACH_M = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """One question and its truth.
+    """One question and its truth."""
 
-    Attributes:
-        kind: what it shows: ``words``, ``sound``, ``clip``, ``area``, ``photo`` or ``absent``.
-        title: as a person would say it.
-        why: why it is not easy, one sentence.
-        command: what to type in the demonstration's folder.
-        question: the query.
-        truth: places that would be right; empty where the right answer is that there is none.
-        others: things of the same kind that would be wrong.
-        about: the category, or the sound, that it is about.
-    """
-
-    kind: str
-    title: str
-    why: str
-    command: str
-    question: Question
-    truth: tuple[Box, ...]
-    others: tuple[Box, ...] = ()
-    about: str = ""
+    kind: str  # what it shows: ``words``, ``sound``, ``clip``, ``area``, ``photo`` or ``absent``
+    title: str  # as a person would say it
+    why: str  # why it is not easy, one sentence
+    command: str  # what to type in the demonstration's folder
+    question: Question  # the query
+    truth: tuple[Box, ...]  # places that would be right; empty where the right answer is that there is none
+    others: tuple[Box, ...] = ()  # things of the same kind that would be wrong
+    about: str = ""  # the category, or the sound, that it is about
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -202,7 +202,6 @@ def _home(sheet: Sheet, home: TopView, evidence: "Evidence") -> str:
 
 
 def _strip(recording: "Recording", avlmap: "AVLMap", moments: int) -> Strip:
-    """Encode some moments of the walk again, as the map's own pixel encoder does."""
     from avlmaps.core.progress import progress
     from avlmaps.maps.estimate import Start
     from avlmaps.maps.gravity import GroundedRecording
@@ -323,7 +322,6 @@ def _question(number: int, step: "Step", answer: "Answer", sheet: Sheet, photo: 
 
 
 def _panels(step: "Step", answer: "Answer", sheet: Sheet, photo: "PhotoView | None") -> str:
-    """Draw the whole heat with goals and truth large, and what it is made of small beside it."""
     heat, ask = answer.heat, step.ask
     if heat is None:
         return ""
@@ -378,7 +376,6 @@ def _read(step: "Step", name: str) -> np.ndarray:
 
 
 def _said(step: "Step") -> str:
-    """Return the answer in a sentence, with the distance to the truth."""
     if not step.answer["found"]:
         notes = "; ".join(_without_folder(part["note"], step) for part in step.answer["parts"] if part["note"])
         finding = "The map says that there is none here" + (f" ({escape(notes)})" if notes else "")

@@ -50,8 +50,7 @@ _EVERYWHERE = {"door", "folding door", "window", "picture"}
 def choose_home(seed: int) -> Scene:
     """Return the first home from a seed on that fits; only its furniture decides, never an answer of a map.
 
-    Raises:
-        AvlmapsError: none of many fits.
+    ``AvlmapsError``: none of many fits.
     """
     for number in range(_TRIES):
         scene = open_scene(f"house:{FIRST_SEED + SEEDS_APART * seed + number}:held-out")
@@ -168,8 +167,7 @@ def run_demo(
 
     Another seed takes another home, walk, sounds and questions; a scene is walked through instead of the home.
 
-    Raises:
-        MapError: the folder holds something that is not a demonstration.
+    ``MapError``: the folder holds something that is not a demonstration.
     """
     from avlmaps.maps.build import build_map
     from avlmaps.maps.store.map_data import describe
@@ -261,7 +259,6 @@ def _choose(
     for_questions: np.random.Generator,
     for_photos: np.random.Generator,
 ) -> "tuple[list[Ask], PhotoView | None]":
-    """Choose the questions, and take the photo that one of them asks with."""
     import cv2
 
     from avlmaps_sim.demo.questions import choose_questions

@@ -163,13 +163,9 @@ WAVE_WIDTH, WAVE_HEIGHT = 1000, 170
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """A drawing's frame: which part of the world it shows.
+    """A drawing's frame: which part of the world it shows."""
 
-    Attributes:
-        extent: left, right, bottom and top, metres.
-    """
-
-    extent: Extent
+    extent: Extent  # left, right, bottom and top, metres
 
     @classmethod
     def round(cls, *extents: Extent) -> "Sheet":

@@ -87,8 +87,7 @@ def load_gltf(path: Path, up_axis: Axis = "auto") -> Scene:
 def read_parts(path: Path) -> list[MeshPart]:
     """Read every mesh of a glTF file as often as it is placed.
 
-    Raises:
-        SceneError: a file is missing, truncated, not glTF or packed in a form that is not read here.
+    ``SceneError``: a file is missing, truncated, not glTF or packed in a form that is not read here.
     """
     header = header_of(path)
     packed = sorted(set(header.get("extensionsRequired", ())) & set(_UNREADABLE))
@@ -164,7 +163,6 @@ def _parts(loaded: trimesh.Scene) -> Iterator[MeshPart]:
 
 
 def _meaning(loaded: trimesh.Scene, node: str, geometry: trimesh.Trimesh, parents: dict) -> tuple[str, str]:
-    """Return the category and the instance of a node, from extras of it, its mesh or a node above, or its name."""
     above = [node]
     while above[-1] in parents:
         above.append(parents[above[-1]])
@@ -221,7 +219,6 @@ def _vertex_colour(geometry: trimesh.Trimesh) -> UInt8[np.ndarray, "v 3"] | None
 
 
 def _look(material: PBRMaterial) -> Material:
-    """Translate a glTF material."""
     factor = material.baseColorFactor
     values = np.ones(4) if factor is None else np.asarray(factor, np.float64)
     if factor is not None and np.asarray(factor).dtype.kind in "iu":
@@ -275,7 +272,6 @@ def _up(path: Path, notes: dict[str, Any], parts: Sequence[MeshPart]) -> str:
 
 
 def _up_of_stage(path: Path) -> str:
-    """Return the up axis that a ``.stage_config.json`` of Habitat says of a file, or nothing."""
     for file in sorted(path.parent.glob("*.stage_config.json")):
         stage = read_json(file)
         up, asset = stage.get("up"), Path(str(stage.get("render_asset", ""))).name

@@ -55,7 +55,6 @@ class _DataSet:
     meshes: dict[Path, Mesh] = field(default_factory=dict)
 
     def template(self, name: str, ending: str) -> _Template:
-        """Find a template by its name, which may begin with folders. ``SceneError``: there is none."""
         short = Path(name).name.removesuffix(_MODEL).removesuffix(ending)
         for key in (short + ending, short + _MODEL):
             found = self.files.get(key)
@@ -68,13 +67,11 @@ class _DataSet:
         raise SceneError(f"no template {short} is below {self.root}: fetch the data set's stages and objects as well")
 
     def mesh(self, model: Path) -> Mesh:
-        """Return a model, read once."""
         if model not in self.meshes:
             self.meshes[model] = joined([part.mesh for part in read_parts(model)])
         return self.meshes[model]
 
     def category(self, template: str, config: dict[str, Any]) -> str:
-        """Return the category of a template."""
         short = Path(template).name
         known = self.categories.get(short) or self.words.get(int(config.get("semantic_id", -1)), "")
         for prefix in _PREFIXES:
@@ -85,8 +82,7 @@ class _DataSet:
 def load_habitat(path: Path) -> Scene:
     """Read a scene that is put together from models by its ``.scene_instance.json``.
 
-    Raises:
-        SceneError: a file is missing, truncated or of another layout.
+    ``SceneError``: a file is missing, truncated or of another layout.
     """
     layout = read_json(path)
     name = path.name.removesuffix(ENDING)
@@ -106,7 +102,6 @@ def load_habitat(path: Path) -> Scene:
 
 
 def _data_set(path: Path) -> _DataSet:
-    """Find the data set's folder, its template files and its words."""
     folders = list(path.resolve().parents)[:4]
     root, config = folders[min(1, len(folders) - 1)], {}
     for folder in folders:
@@ -240,8 +235,7 @@ def _anticlockwise(polygon: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "k 2"
 def read_urdf(path: Path) -> list[tuple[Path, Float[np.ndarray, "4 4"]]]:
     """Return the model files of a URDF, each with its pose in the root link's axes (scale included).
 
-    Raises:
-        SceneError: it is missing, no XML, or its joints go round in a ring.
+    ``SceneError``: it is missing, no XML, or its joints go round in a ring.
     """
     try:
         robot = ElementTree.parse(path).getroot()

@@ -39,8 +39,7 @@ def annotation_of(path: Path) -> Path | None:
 def load_hm3d(path: Path) -> Scene:
     """Read an HM3D building by any of its files, or by the folder that holds them.
 
-    Raises:
-        SceneError: a file is missing, truncated or of another layout, or the pictures are packed for graphics cards.
+    ``SceneError``: a file is missing, truncated or of another layout, or the pictures are packed for graphics cards.
     """
     text = annotation_of(path)
     if text is None:
@@ -66,8 +65,7 @@ def load_hm3d(path: Path) -> Scene:
 def read_annotation(path: Path) -> tuple[dict[int, int], dict[int, Label], dict[int, int]]:
     """Read a ``.semantic.txt``: the object of each colour (0xRRGGBB), what each object is, and its region.
 
-    Raises:
-        SceneError: it is missing or of another layout.
+    ``SceneError``: it is missing or of another layout.
     """
     try:
         lines = path.read_text("utf-8").splitlines()

@@ -56,8 +56,7 @@ def load_matterport(path: Path) -> Scene:
 
     Without a ``.glb`` the colours are those of the PLY.
 
-    Raises:
-        SceneError: a file is missing, truncated or of another layout.
+    ``SceneError``: a file is missing, truncated or of another layout.
     """
     house_file = house_of(path)
     if house_file is None:
@@ -108,7 +107,6 @@ def read_house(path: Path) -> House:
 
 
 def _note(house: House, words: list[str]) -> None:
-    """Take in one line of a ``.house`` file."""
     kind = words[0]
     if kind == "R":
         low, high = (np.array(words[k : k + 3], np.float64) for k in (9, 12))

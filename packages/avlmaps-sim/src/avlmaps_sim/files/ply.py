@@ -19,19 +19,12 @@ _LONGEST_HEADER = 1 << 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlyMesh:
-    """The content of a PLY file.
+    """The content of a PLY file."""
 
-    Attributes:
-        vertex: (v, 3) places.
-        triangle: (t, 3) rows of ``vertex``; polygons are cut into fans.
-        colour: (v, 3) sRGB, None where vertices have none.
-        face: properties of the faces by name, one value for each triangle.
-    """
-
-    vertex: Float32[np.ndarray, "v 3"]
-    triangle: Int32[np.ndarray, "t 3"]
-    colour: UInt8[np.ndarray, "v 3"] | None
-    face: dict[str, Int[np.ndarray, " t"]]
+    vertex: Float32[np.ndarray, "v 3"]  # (v, 3) places
+    triangle: Int32[np.ndarray, "t 3"]  # (t, 3) rows of ``vertex``; polygons are cut into fans
+    colour: UInt8[np.ndarray, "v 3"] | None  # (v, 3) sRGB, None where vertices have none
+    face: dict[str, Int[np.ndarray, " t"]]  # properties of the faces by name, one value for each triangle
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +63,6 @@ def read_ply(path: Path) -> PlyMesh:
 
 
 def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
-    """Return the byte order, the elements and where the values begin."""
     end = content.find(b"end_header", 0, _LONGEST_HEADER)
     if not content.startswith(b"ply") or end < 0:
         raise SceneError(f"{path} is not a PLY file: it has no PLY header")
@@ -136,7 +128,6 @@ def _from_bytes(
 def _row_by_row(
     element: _Element, content: bytes, start: int, order: str
 ) -> tuple[dict[str, np.ndarray | list[np.ndarray]], int]:
-    """Read the values of an element whose lists differ in length."""
     values: dict[str, list] = {item.name: [] for item in element.properties}
     at = start
     for _ in range(element.count):
@@ -152,7 +143,6 @@ def _row_by_row(
 
 
 def _from_words(element: _Element, words: list[bytes]) -> tuple[dict[str, np.ndarray | list[np.ndarray]], list[bytes]]:
-    """Read the values of one element of an ASCII file; return the words behind it."""
     values: dict[str, list] = {item.name: [] for item in element.properties}
     at = 0
     for _ in range(element.count):
@@ -195,7 +185,6 @@ def _mesh(tables: dict[str, dict[str, np.ndarray | list[np.ndarray]]]) -> PlyMes
 
 
 def _fans(lists: np.ndarray | list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Cut polygons into triangles round their first corner; say which polygon each came from."""
     if isinstance(lists, np.ndarray):
         groups = [(np.arange(len(lists)), lists.astype(np.int64))]
     else:

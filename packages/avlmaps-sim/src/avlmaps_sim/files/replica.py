@@ -23,8 +23,7 @@ def replica_folder(path: Path) -> Path | None:
 def load_replica(path: Path) -> Scene:
     """Read a Replica scene by its folder, its ``habitat`` folder or the mesh in it.
 
-    Raises:
-        SceneError: a file is missing, truncated or of another layout.
+    ``SceneError``: a file is missing, truncated or of another layout.
     """
     folder = replica_folder(path)
     if folder is None:

@@ -37,21 +37,13 @@ from avlmaps_sim.shapes import (
 
 @dataclass(frozen=True, slots=True)
 class BedPlan:
-    """The measures of a bed, metres; the head of the mattress is at x = 0, its middle at y = 0.
+    """The measures of a bed, metres; the head of the mattress is at x = 0, its middle at y = 0."""
 
-    Attributes:
-        length: of the mattress.
-        width: of the mattress.
-        base: height of its underside.
-        top: height of its upper side.
-        sleepers: one or two.
-    """
-
-    length: float
-    width: float
-    base: float
-    top: float
-    sleepers: int
+    length: float  # of the mattress
+    width: float  # of the mattress
+    base: float  # height of its underside
+    top: float  # height of its upper side
+    sleepers: int  # one or two
 
     @property
     def bedding(self) -> Bedding:

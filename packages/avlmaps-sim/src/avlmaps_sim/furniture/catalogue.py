@@ -27,38 +27,23 @@ _MODULES = (
 
 @dataclass(frozen=True, slots=True)
 class Support:
-    """A flat top that small things may stand on.
+    """A flat top that small things may stand on."""
 
-    Attributes:
-        low: least x and y.
-        high: greatest x and y.
-        z: height.
-        clearance_m: free height over it.
-    """
-
-    low: tuple[float, float]
-    high: tuple[float, float]
-    z: float
-    clearance_m: float = 1.0
+    low: tuple[float, float]  # least x and y
+    high: tuple[float, float]  # greatest x and y
+    z: float  # height
+    clearance_m: float = 1.0  # free height over it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """One thing, ready to be put somewhere.
+    """One thing, ready to be put somewhere."""
 
-    Attributes:
-        mesh: standing as the module says.
-        supports: where clutter may stand.
-        light: places in the piece's frame that shine (a lamp's bulb).
-        category: filled in by the register.
-        family: filled in by the register.
-    """
-
-    mesh: Mesh
-    supports: tuple[Support, ...] = ()
-    light: tuple[Triple, ...] = ()
-    category: str = ""
-    family: str = ""
+    mesh: Mesh  # standing as the module says
+    supports: tuple[Support, ...] = ()  # where clutter may stand
+    light: tuple[Triple, ...] = ()  # places in the piece's frame that shine (a lamp's bulb)
+    category: str = ""  # filled in by the register
+    family: str = ""  # filled in by the register
 
 
 # What a recipe makes: meshes, tops where clutter may stand, and places that shine, all in one frame of its own choice.

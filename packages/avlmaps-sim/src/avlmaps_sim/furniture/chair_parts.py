@@ -15,25 +15,15 @@ from avlmaps_sim.shapes import box, loft, prism, rounded_rectangle, tube
 
 @dataclass(frozen=True, slots=True)
 class ChairFrame:
-    """The measures of a chair, metres, about the origin.
+    """The measures of a chair, metres, about the origin."""
 
-    Attributes:
-        depth: of the seat, along x.
-        front: width of the seat at its front edge.
-        rear: width of the seat at its back.
-        seat: height of the top of the seat.
-        top: height of the top of the back.
-        rake: how far the top of the back lies behind the seat.
-        kick: how far the rear feet stand behind the seat.
-    """
-
-    depth: float
-    front: float
-    rear: float
-    seat: float
-    top: float
-    rake: float
-    kick: float
+    depth: float  # of the seat, along x
+    front: float  # width of the seat at its front edge
+    rear: float  # width of the seat at its back
+    seat: float  # height of the top of the seat
+    top: float  # height of the top of the back
+    rake: float  # how far the top of the back lies behind the seat
+    kick: float  # how far the rear feet stand behind the seat
 
     def back_x(self, z: float) -> float:
         """Return where the middle of the back lies at a height."""

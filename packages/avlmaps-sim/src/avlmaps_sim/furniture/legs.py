@@ -25,17 +25,11 @@ _PROFILES: dict[str, tuple[tuple[float, float], ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class LegStyle:
-    """How a leg is shaped.
+    """How a leg is shaped."""
 
-    Attributes:
-        profile: rows of (share of the leg's height, thickness against ``thickness_m``).
-        sides: of its section: 4 for square, more for round.
-        thickness_m: of a straight leg, metres.
-    """
-
-    profile: tuple[tuple[float, float], ...]
-    sides: int
-    thickness_m: float
+    profile: tuple[tuple[float, float], ...]  # rows of (share of the leg's height, thickness against ``thickness_m``)
+    sides: int  # of its section: 4 for square, more for round
+    thickness_m: float  # of a straight leg, metres
 
 
 def leg_style(rng: np.random.Generator, thin: float = 0.03, thick: float = 0.055, plain: bool = False) -> LegStyle:

@@ -27,31 +27,19 @@ _SIDES = 10
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Angles of the joints, radians; pairs are left and right.
+    """Angles of the joints, radians; pairs are left and right."""
 
-    Attributes:
-        lean: of the trunk, forward from upright.
-        hip: how far each thigh is raised forward from straight down.
-        knee: how far each shank is bent back from its thigh.
-        spread: how far the thighs are apart sideways, each.
-        shoulder: how far each upper arm is raised forward from straight down the trunk.
-        aside: how far each is raised sideways.
-        elbow: how far each forearm is bent forward from its upper arm.
-    """
-
-    lean: float = 0.0
-    hip: tuple[float, float] = (0.0, 0.0)
-    knee: tuple[float, float] = (0.0, 0.0)
-    spread: float = 0.06
-    shoulder: tuple[float, float] = (0.0, 0.0)
-    aside: float = 0.12
-    elbow: tuple[float, float] = (0.2, 0.2)
+    lean: float = 0.0  # of the trunk, forward from upright
+    hip: tuple[float, float] = (0.0, 0.0)  # how far each thigh is raised forward from straight down
+    knee: tuple[float, float] = (0.0, 0.0)  # how far each shank is bent back from its thigh
+    spread: float = 0.06  # how far the thighs are apart sideways, each
+    shoulder: tuple[float, float] = (0.0, 0.0)  # how far each upper arm is raised forward from straight down the trunk
+    aside: float = 0.12  # how far each is raised sideways
+    elbow: tuple[float, float] = (0.2, 0.2)  # how far each forearm is bent forward from its upper arm
 
 
 @dataclass(frozen=True, slots=True)
 class _Looks:
-    """What a person wears and looks like."""
-
     skin: Material
     hair: Material
     shirt: Material

@@ -15,29 +15,17 @@ from avlmaps_sim.shapes import along_y, box, loft, rounded_box, rounded_rectangl
 
 @dataclass(frozen=True, slots=True)
 class SofaPlan:
-    """The measures of a sofa, metres; the seat's rear edge is at x = 0, its middle at y = 0.
+    """The measures of a sofa, metres; the seat's rear edge is at x = 0, its middle at y = 0."""
 
-    Attributes:
-        depth: of the seat, along x, from the front of the back.
-        width: between the arms.
-        seat: height of the seat's top.
-        clear: height of the body's underside over the floor.
-        back: thickness of the back.
-        top: height of the back's top.
-        arm: width of an arm; 0 for none.
-        arm_top: height of the arms.
-        lean: of the back, radians.
-    """
-
-    depth: float
-    width: float
-    seat: float
-    clear: float
-    back: float
-    top: float
-    arm: float
-    arm_top: float
-    lean: float
+    depth: float  # of the seat, along x, from the front of the back
+    width: float  # between the arms
+    seat: float  # height of the seat's top
+    clear: float  # height of the body's underside over the floor
+    back: float  # thickness of the back
+    top: float  # height of the back's top
+    arm: float  # width of an arm; 0 for none
+    arm_top: float  # height of the arms
+    lean: float  # of the back, radians
 
     @property
     def outer(self) -> float:

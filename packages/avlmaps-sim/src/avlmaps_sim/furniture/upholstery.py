@@ -87,15 +87,10 @@ def back_cushions(
 
 @dataclass(frozen=True, slots=True)
 class Bedding:
-    """Where bedding lies.
+    """Where bedding lies."""
 
-    Attributes:
-        low: least corner of the mattress (x, y, z), metres; the head of the bed is at its least x.
-        high: greatest corner of the mattress.
-    """
-
-    low: Triple
-    high: Triple
+    low: Triple  # least corner of the mattress (x, y, z), metres; the head of the bed is at its least x
+    high: Triple  # greatest corner of the mattress
 
 
 def mattress(bed: Bedding, look: Material) -> Mesh:

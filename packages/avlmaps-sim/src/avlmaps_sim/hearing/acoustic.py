@@ -119,7 +119,6 @@ def _moving(
     rng: np.random.Generator,
     settings: AcousticSettings,
 ) -> Float[np.ndarray, " m"]:
-    """Return a clip at the moving microphone: triangular windows, each by the response at its middle."""
     from scipy.signal import oaconvolve
 
     hop = max(1, round(settings.step_s * settings.rate_hz))

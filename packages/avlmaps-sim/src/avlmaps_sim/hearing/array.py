@@ -34,8 +34,6 @@ _INAUDIBLE = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Heard:
-    """A source and the floor that it sounds on."""
-
     air: Air
     rooms: Rooms
     own: int
@@ -79,7 +77,6 @@ def _moving(
     rng: np.random.Generator,
     rate_hz: int,
 ) -> Float[np.ndarray, "m t"]:
-    """Return a clip at the moving microphones: triangular windows, each by the responses at its middle."""
     hop = round(_STEP_S * rate_hz)
     knots = np.arange(0, len(dry) + hop, hop)
     at_s = sounding.onset_s + knots / rate_hz
@@ -97,7 +94,6 @@ def _moving(
 
 
 def _windowed(dry: Float[np.ndarray, " n"], response: Float[np.ndarray, "k m t"], hop: int) -> np.ndarray:
-    """Return a signal by responses that are cross-faded, one every ``hop`` samples."""
     from scipy.signal import oaconvolve
 
     count, channels, taps = response.shape
@@ -147,7 +143,6 @@ def _early(
     ways: Sequence[Way],
     reflections: Sequence[tuple[Float[np.ndarray, "i 3"], Float[np.ndarray, " i"]] | None],
 ) -> Float[np.ndarray, "k m t"]:
-    """Return direct sound and reflections at each microphone, as far as the late field does not stand for them."""
     rate_hz = building.rate_hz
     first_s = np.array([min(delay_s for delay_s, _ in arrivals(way)) for way in ways])
     # From LATE_BY_S after the direct sound on the late field stands for the reflections; without it nothing does.
@@ -216,7 +211,6 @@ def _late(
     reflects: Sequence[bool],
     rng: np.random.Generator,
 ) -> Float[np.ndarray, "l m t"] | None:
-    """Return the diffuse field at each microphone: plane waves of independent noise from all around."""
     envelope = building.late_envelope(heard.rooms, heard.own)
     if envelope is None:
         return None

@@ -113,7 +113,6 @@ class Acoustics:
     def _response(
         self, way: Way, images: Float[np.ndarray, "i 2"] | None, late: Float[np.ndarray, " t"] | None
     ) -> Float[np.ndarray, " t"]:
-        """Put direct sound, reflections and the late field together."""
         rate_hz = self.rate_hz
         length = round(_LONGEST_S * rate_hz) if late is None else len(late)
         out = np.zeros(length)

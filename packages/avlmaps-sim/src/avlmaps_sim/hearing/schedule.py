@@ -21,23 +21,14 @@ _FROM_WALL_M = 0.4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Source:
-    """Something that sounds once.
+    """Something that sounds once."""
 
-    Attributes:
-        category: what it sounds like.
-        position: where, metres, world.
-        instance: the object that makes it, an index into the scene's objects; −1 for none.
-        clip: the name of the clip.
-        sound: the sound itself, as recorded close by.
-        level_db: loudness at 1 m against other kinds.
-    """
-
-    category: str
-    position: Triple
-    instance: int
-    clip: str
-    sound: Sound
-    level_db: float = 0.0
+    category: str  # what it sounds like
+    position: Triple  # where, metres, world
+    instance: int  # the object that makes it, an index into the scene's objects; −1 for none
+    clip: str  # the name of the clip
+    sound: Sound  # the sound itself, as recorded close by
+    level_db: float = 0.0  # loudness at 1 m against other kinds
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,19 +147,12 @@ class ScheduleRule:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sounding:
-    """A source, and when it sounds.
+    """A source, and when it sounds."""
 
-    Attributes:
-        source: what.
-        onset_s: when it begins to sound (the recording's time, at the source).
-        offset_s: when it ends.
-        robot: where the robot is when it is half over.
-    """
-
-    source: Source
-    onset_s: float
-    offset_s: float
-    robot: Triple
+    source: Source  # what
+    onset_s: float  # when it begins to sound (the recording's time, at the source)
+    offset_s: float  # when it ends
+    robot: Triple  # where the robot is when it is half over
 
 
 def schedule(
@@ -204,8 +188,6 @@ def schedule(
 
 @dataclass(slots=True)
 class _Planner:
-    """Takes sources into the schedule one by one."""
-
     scene: Scene
     walk: Walk
     rule: ScheduleRule
@@ -213,7 +195,6 @@ class _Planner:
     _areas: np.ndarray | None = None
 
     def take_several_of(self, sources: Sequence[Source], places: int) -> bool:
-        """Let as many of these play that are far apart from each other, or none."""
         before = len(self.found)
         for first in range(len(sources)):
             for source in sources[first:]:
@@ -226,7 +207,6 @@ class _Planner:
         return False
 
     def take_one_of(self, sources: Sequence[Source]) -> bool:
-        """Let the first of these play for which there is room."""
         for source in sources:
             if any(_distance_m(source, other.source) < self.rule.distance_m for other in self.found):
                 continue

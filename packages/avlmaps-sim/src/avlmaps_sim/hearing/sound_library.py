@@ -150,8 +150,7 @@ class Recorded:
 def chosen_categories(bank: Bank, wanted: tuple[str, ...] | None) -> tuple[str, ...]:
     """Return the requested categories, or those of the bank that homes make, sorted.
 
-    Raises:
-        AudioError: the bank lacks a requested one, or has none of a home.
+    ``AudioError``: the bank lacks a requested one, or has none of a home.
     """
     if not wanted:
         of_homes = tuple(name for name in bank.categories if kind_of(name).indoors)

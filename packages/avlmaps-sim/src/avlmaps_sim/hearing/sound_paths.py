@@ -142,7 +142,6 @@ class Air:
     def _length_round(
         self, before: np.ndarray, a: Float[np.ndarray, "2"], b: Float[np.ndarray, "2"]
     ) -> tuple[float, tuple[float, float] | None]:
-        """Return length and last corner of the shortest path round the walls: that of the grid, pulled tight."""
         way = self._space.path(before, b)
         start, goal = (self._space.nearest(end) for end in (a, b))
         if np.linalg.norm(way[0] - start) > 2 * self.cell_m:

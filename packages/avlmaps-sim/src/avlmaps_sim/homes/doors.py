@@ -15,7 +15,6 @@ _OPEN_KINDS = (*SOCIAL, "hallway", "entrance hall", "kitchenette", "open-plan of
 
 
 def _price(a: str, b: str) -> float:
-    """Return how little a door between two kinds of room is wanted."""
     if WELL in (a, b):
         return 0.5 if "hallway" in (a, b) else np.inf
     if a in HUBS or b in HUBS:
@@ -113,7 +112,6 @@ def _opened(rng: np.random.Generator, wall: Wall, rooms: list[Room]) -> Wall:
 
 
 def _door(rng: np.random.Generator, wall: Wall, rooms: list[Room], needed: bool) -> Hole:
-    """Draw a door; one that is needed to reach a room stands open or has no leaf."""
     ceiling = min(rooms[wall.left].height_m, rooms[wall.right].height_m)
     width = min(draw(rng, 0.95, 1.1), wall.length_m - 0.2)
     wide = draw(rng, 1.9, 2.1)
@@ -137,7 +135,6 @@ def _door(rng: np.random.Generator, wall: Wall, rooms: list[Room], needed: bool)
 
 
 def _swung_free(rooms: list[Room], walls: list[Wall], index: int, leaves: dict[int, list[np.ndarray]]) -> Wall:
-    """Return a wall whose open doors swing to where they stand in no other door's way; where none can, leafless."""
     wall = walls[index]
     holes = []
     for hole in wall.holes:
@@ -167,7 +164,6 @@ def _leaf_places(wall: Wall, hole: Hole) -> np.ndarray:
 def _leaf_is_free(
     rooms: list[Room], walls: list[Wall], index: int, hole: Hole, leaves: dict[int, list[np.ndarray]]
 ) -> bool:
-    """Return whether an open door leaves room to pass by it, between it and walls, other doorways and their leaves."""
     wall = walls[index]
     room = wall.left if hole.to_left else wall.right
     polygon, places = rooms[room].polygon, _leaf_places(wall, hole)

@@ -32,7 +32,6 @@ RULES: dict[str, Callable[[Furnisher], None]] = {
 
 
 def _plan(rng: np.random.Generator, programme: Programme, corridor: str, stairs: bool = False) -> Storey:
-    """Draw plans until every room can be reached, and no more through other rooms than can be helped."""
     height = draw(rng, 2.3, 3.4) if chance(rng, 0.4) else draw(rng, 2.45, 2.75)
     open_plan = 0.85 if chance(rng, 0.5) else 0.1
     patience = 7.0
@@ -60,7 +59,6 @@ def _upper(rng: np.random.Generator, ground: Storey) -> Storey | None:
 
 
 def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Storey, which: Families) -> None:
-    """Build a floor and furnish its rooms."""
     home = looks_of(rng, replace(plan.rooms[0], kind="living room"), None)
     looks = [looks_of(rng, room, home) for room in plan.rooms]
     first = len(builder.areas)

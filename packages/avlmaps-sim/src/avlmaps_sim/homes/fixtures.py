@@ -174,7 +174,6 @@ def _columns(f: Furnisher, wall: Material, number: int) -> None:
 
 
 def _beams(f: Furnisher) -> None:
-    """Lay beams under the ceiling, all one way."""
     rng = f.rng
     side = max(f.ground.sides, key=lambda s: s.length_m)
     way, look = side.along, surface(pick(rng, ("wood", "wood", "painted", "concrete")), rng)

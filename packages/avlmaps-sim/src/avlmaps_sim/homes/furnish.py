@@ -345,7 +345,6 @@ def meets_legs(table: PlacedPiece, foot: Footprint, centre: np.ndarray, heading_
 
 
 def _seat_places(table: PlacedPiece, width_m: float) -> list[tuple[float, float, float]]:
-    """Return places (x, y, heading) along the four edges of a table, in its own frame."""
     half_x, half_y = table.foot.half
     out = []
     for sign in (1.0, -1.0):

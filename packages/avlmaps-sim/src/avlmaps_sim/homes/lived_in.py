@@ -44,15 +44,12 @@ _FEWEST_M2 = 0.02  # of a top on which something lies
 
 @dataclass(eq=False)
 class _Filled:
-    """A scene, and the builder that adds to it."""
-
     scene: Scene
     rng: np.random.Generator
     which: Families
     builder: SceneBuilder
 
     def piece(self, category: str, *, on_wall: bool = False) -> Mesh:
-        """Return something that lies or stands by itself, or that hangs on a wall."""
         names = list(families(category, self.which))
         if category == "person":
             fit = [name for name in names if name in _ON_THEIR_FEET]
@@ -96,7 +93,6 @@ def with_curtains_apart(scene: Scene) -> Scene:
 
 
 def _on(filled: _Filled, thing: SceneObject, corners: np.ndarray) -> None:
-    """Lay things on one, seat somebody there, hang cloth over its back or along its front."""
     rng, kind = filled.rng, thing.category
     for category, means in (("clothing", _CLOTHES_ON), ("paper", _PAPERS_ON)):
         for _ in filled.times(means.get(kind, 0.0)):
@@ -131,7 +127,6 @@ def _no_larger(mesh: Mesh, thing: SceneObject) -> Mesh:
 def _a_top(
     rng: np.random.Generator, corners: np.ndarray, lowest_m: float = 0.05, highest_m: float = 1.6
 ) -> np.ndarray | None:
-    """Return a place on one of the upper sides of a thing, which lies so high over its foot, or None."""
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(across, axis=1) / 2
     foot = corners[..., 2].min()
@@ -152,7 +147,6 @@ def _forward(thing: SceneObject) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _throw_over(filled: _Filled, thing: SceneObject, corners: np.ndarray) -> None:
-    """Hang a garment over the back of a seat: over what of it is highest."""
     rng, points = filled.rng, corners.reshape(-1, 3)
     top = float(points[:, 2].max())
     edge = points[points[:, 2] > top - 0.06]
@@ -181,7 +175,6 @@ def _curtain_before(filled: _Filled, thing: SceneObject, corners: np.ndarray) ->
 
 
 def _in_rooms(filled: _Filled) -> None:
-    """Lay clothes and papers on floors, hang them on walls, and have people stand about."""
     scene, rng = filled.scene, filled.rng
     for floor, floor_m in enumerate(floor_heights(scene)):
         middles = free_space(scene, 0.3, 1.9, floor=floor).middles()
@@ -209,7 +202,6 @@ def _in_rooms(filled: _Filled) -> None:
 def _on_wall(
     filled: _Filled, category: str, polygon: np.ndarray, floor_m: float, heights_m: tuple[float, float]
 ) -> None:
-    """Hang something on a wall of a room; at times in front of a window or a picture, as people do."""
     rng = filled.rng
     edge = np.roll(polygon, -1, axis=0) - polygon
     length = np.linalg.norm(edge, axis=1)

@@ -113,48 +113,28 @@ HoleKind = Literal["door", "closed door", "doorless", "folding door", "gap", "wi
 
 @dataclass(frozen=True, slots=True)
 class Hole:
-    """An opening in a wall.
+    """An opening in a wall."""
 
-    Attributes:
-        kind: what fills it; a ``gap`` is a wide opening of an open plan.
-        at_m: its middle, along the wall from ``a``.
-        width_m: how wide it is.
-        sill_m: its lower edge above the floor.
-        head_m: its upper edge above the floor.
-        open_rad: how far a leaf stands open.
-        to_left: a leaf opens (a window looks) into the room on the wall's left.
-        hinge: the leaf hangs on the side towards the wall's end (1) or its beginning (-1).
-    """
-
-    kind: HoleKind
-    at_m: float
-    width_m: float
-    sill_m: float = 0.0
-    head_m: float = 2.1
-    open_rad: float = 0.0
-    to_left: bool = True
-    hinge: int = 1
+    kind: HoleKind  # what fills it; a ``gap`` is a wide opening of an open plan
+    at_m: float  # its middle, along the wall from ``a``
+    width_m: float  # how wide it is
+    sill_m: float = 0.0  # its lower edge above the floor
+    head_m: float = 2.1  # its upper edge above the floor
+    open_rad: float = 0.0  # how far a leaf stands open
+    to_left: bool = True  # a leaf opens (a window looks) into the room on the wall's left
+    hinge: int = 1  # the leaf hangs on the side towards the wall's end (1) or its beginning (-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wall:
-    """A straight wall from a to b, with one room on either side.
+    """A straight wall from a to b, with one room on either side."""
 
-    Attributes:
-        a: where its middle line begins.
-        b: where it ends.
-        left: index of the room on the left of a → b.
-        right: index of the room on the right, or ``OUTSIDE``.
-        holes: openings.
-        built: False where an open plan has no wall there at all.
-    """
-
-    a: Float[np.ndarray, "2"]
-    b: Float[np.ndarray, "2"]
-    left: int
-    right: int
-    holes: tuple[Hole, ...] = ()
-    built: bool = True
+    a: Float[np.ndarray, "2"]  # where its middle line begins
+    b: Float[np.ndarray, "2"]  # where it ends
+    left: int  # index of the room on the left of a → b
+    right: int  # index of the room on the right, or ``OUTSIDE``
+    holes: tuple[Hole, ...] = ()  # openings
+    built: bool = True  # False where an open plan has no wall there at all
 
     @property
     def length_m(self) -> float:
@@ -183,40 +163,24 @@ class Wall:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """One room, or one part of an open plan.
+    """One room, or one part of an open plan."""
 
-    Attributes:
-        kind: ``kitchen``, ``bedroom`` ...
-        polygon: (k, 2) its corners on the middle lines of its walls, convex, counter-clockwise.
-        floor_m: height of its floor.
-        height_m: of its ceiling above the floor.
-    """
-
-    kind: str
-    polygon: Float[np.ndarray, "k 2"]
-    floor_m: float = 0.0
-    height_m: float = 2.6
+    kind: str  # ``kitchen``, ``bedroom``
+    polygon: Float[np.ndarray, "k 2"]  # (k, 2) its corners on the middle lines of its walls, convex, counter-clockwise
+    floor_m: float = 0.0  # height of its floor
+    height_m: float = 2.6  # of its ceiling above the floor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Storey:
-    """One floor of a building.
+    """One floor of a building."""
 
-    Attributes:
-        rooms: its rooms.
-        walls: its walls.
-        wall_m: thickness of the walls between rooms; outer walls reach as far inwards from their middle line.
-        outer_m: thickness of the outer walls.
-        ceiling: its rooms have ceilings.
-        slab_m: what lies between its ceilings and the floor above; its walls reach up through it.
-    """
-
-    rooms: tuple[Room, ...]
-    walls: tuple[Wall, ...]
-    wall_m: float
-    outer_m: float
-    ceiling: bool = True
-    slab_m: float = 0.0
+    rooms: tuple[Room, ...]  # its rooms
+    walls: tuple[Wall, ...]  # its walls
+    wall_m: float  # thickness of the walls between rooms; outer walls reach as far inwards from their middle line
+    outer_m: float  # thickness of the outer walls
+    ceiling: bool = True  # its rooms have ceilings
+    slab_m: float = 0.0  # what lies between its ceilings and the floor above; its walls reach up through it
 
     def walls_of(self, room: int) -> list[tuple[Wall, bool]]:
         """Return the walls of a room, each with whether the room lies on its left."""

@@ -60,7 +60,6 @@ def living_room(f: Furnisher) -> None:
 
 
 def _screen(f: Furnisher) -> PlacedPiece | None:
-    """Stand a tv on its cabinet, or hang it."""
     if not chance(f.rng, 0.85):
         return None
     cabinet = f.stand("tv cabinet", 0.85, 0.6, corner=0.1, at_middle=0.6)

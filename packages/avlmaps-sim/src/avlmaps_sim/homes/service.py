@@ -43,7 +43,6 @@ def kitchen(f: Furnisher) -> None:
 
 
 def _above(f: Furnisher, fitted: list[PlacedPiece]) -> None:
-    """Hang the hood over the stove and cabinets over the counters."""
     for stood in [s for s in f.stood if s.piece.category == "stove"]:
         hood = f.new("range hood")
         if hood is not None and chance(f.rng, 0.85):

@@ -108,23 +108,14 @@ _TRIES = 12  # clips that are tried for the last gaps, before the track counts a
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A sound that was put into a track.
+    """A sound that was put into a track."""
 
-    Attributes:
-        onset_s: where it begins, the recording's time.
-        offset_s: where it ends.
-        category: what it is.
-        clip: the clip's name.
-        position: where the robot was when the sound was half over, metres, world.
-        gain_db: how much the clip was amplified.
-    """
-
-    onset_s: float
-    offset_s: float
-    category: str
-    clip: str
-    position: tuple[float, float, float]
-    gain_db: float
+    onset_s: float  # where it begins, the recording's time
+    offset_s: float  # where it ends
+    category: str  # what it is
+    clip: str  # the clip's name
+    position: tuple[float, float, float]  # where the robot was when the sound was half over, metres, world
+    gain_db: float  # how much the clip was amplified
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values for JSON."""
@@ -140,8 +131,6 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class _Placed:
-    """A sound in the track: read twice, so that the sounds of hours need not be in memory at once."""
-
     clip: Clip
     begin: int
     length: int
@@ -237,7 +226,6 @@ def _check(interval_s: float, min_distance_m: float, loudness_db: float, snr_db:
 
 
 def _rule(walk: Walk, wanted: Spacing) -> tuple[Placer, float | None, list[str]]:
-    """Choose how distance is measured and how long a sound may be, so that a small room holds several."""
     notices: list[str] = []
     spacing = chosen_spacing(walk, wanted, _USUAL_LENGTH_S)
     if spacing.measure != wanted.measure:
@@ -265,7 +253,6 @@ def _place(
     rng: np.random.Generator,
     notices: list[str],
 ) -> list[_Placed]:
-    """Draw clips and put them one after the other, until none of several fits any more."""
     rate_hz, wanted_db, longest_s = wanted
     placed: list[_Placed] = []
     failures = 0
@@ -322,7 +309,6 @@ def _event(sound: _Placed, walk: Walk, rate_hz: int) -> Event:
 def _mixed(
     recording: Recording, placed: Sequence[_Placed], noise: Iterator[np.ndarray] | None, rate_hz: int
 ) -> Iterator[Sound]:
-    """Yield the track second by second: what was there, the background, and the sounds."""
     end_s = max(float(recording.stamps_s[-1]), recording.audio.end_s if recording.audio else 0.0)
     end = max(int(np.ceil(end_s * rate_hz)), *(sound.begin + sound.length for sound in placed))
     there, below = _there(recording.audio, rate_hz), seconds_of(noise, rate_hz)
@@ -343,7 +329,6 @@ def _mixed(
 
 
 def _there(track: AudioTrack | None, rate_hz: int) -> Iterator[Float32[np.ndarray, " second"]]:
-    """Yield a recording's own track, second by second from the recording's time 0, then silence."""
     waiting = np.zeros(0, np.float32)
     if track is not None:
         late = round(track.start_s * rate_hz)

@@ -26,17 +26,11 @@ _HIGHEST_PEAK_DB = -1.0  # no clip is made so loud that it would be cut off
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """A sound file of a known category.
+    """A sound file of a known category."""
 
-    Attributes:
-        path: the file.
-        category: what it is, in words (``dog bark``).
-        name: its path below the folder of clips, with slashes.
-    """
-
-    path: Path
-    category: str
-    name: str
+    path: Path  # the file
+    category: str  # what it is, in words (``dog bark``)
+    name: str  # its path below the folder of clips, with slashes
 
 
 def find_clips(folder: Path, categories: Sequence[str] | None = None) -> tuple[Clip, ...]:
@@ -46,8 +40,7 @@ def find_clips(folder: Path, categories: Sequence[str] | None = None) -> tuple[C
     (underscores stand for spaces); else all files are of one category, named as the folder.
     ``categories`` are taken in any case, with spaces or underscores.
 
-    Raises:
-        AudioError: no such folder, no clips, an index without those columns, or an unknown category.
+    ``AudioError``: no such folder, no clips, an index without those columns, or an unknown category.
     """
     folder = user_path(folder)
     if not folder.is_dir():
@@ -76,8 +69,7 @@ def audible(sound: Sound, name: str = "the sound") -> Sound:
     Heard is what is less than 40 dB below the loudest 10 ms; digital silence, which collections pad short clips
     with, and inaudible ends are cut off.
 
-    Raises:
-        AudioError: there is nothing to hear.
+    ``AudioError``: there is nothing to hear.
     """
     level = _levels(sound)
     if level.max(initial=0.0) < _SILENT**2:
@@ -98,8 +90,7 @@ def loudness_db(sound: Sound) -> float:
 def audible_part(clip: Clip, rate_hz: int, longest_s: float | None = None) -> Sound:
     """Read a clip, cut it to its audible part (and to a length), and fade its ends within 5 ms.
 
-    Raises:
-        AudioError: the clip cannot be read or is silent.
+    ``AudioError``: the clip cannot be read or is silent.
     """
     sound = audible(resample(AudioTrack.open(clip.path).read(), rate_hz), str(clip.path))
     if longest_s is not None:
@@ -149,8 +140,7 @@ def index_rows(folder: Path) -> list[dict[str, str]] | None:
     The index is ``index.csv``, or ``meta/esc50.csv`` of ESC-50 as it is downloaded, whose fold 1 trained no weights:
     its rows have no fold.
 
-    Raises:
-        AudioError: the index is no table in UTF-8, or lacks a column.
+    ``AudioError``: the index is no table in UTF-8, or lacks a column.
     """
     esc50 = not (folder / INDEX).is_file()
     index = folder / (ESC50_INDEX if esc50 else INDEX)

@@ -17,17 +17,11 @@ Measure = Literal["straight", "walked"]
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """A robot's path on a fine time grid.
+    """A robot's path on a fine time grid."""
 
-    Attributes:
-        stamps_s: the grid, seconds.
-        position: where the robot was, metres, world.
-        walked_m: how far it had walked by then, trembling left out.
-    """
-
-    stamps_s: Float[np.ndarray, " n"]
-    position: Float[np.ndarray, "n 3"]
-    walked_m: Float[np.ndarray, " n"]
+    stamps_s: Float[np.ndarray, " n"]  # the grid, seconds
+    position: Float[np.ndarray, "n 3"]  # where the robot was, metres, world
+    walked_m: Float[np.ndarray, " n"]  # how far it had walked by then, trembling left out
 
     @classmethod
     def along(cls, stamps_s: Float[np.ndarray, " f"], position: Float[np.ndarray, "f 3"]) -> "Walk":

@@ -14,8 +14,7 @@ def synthesise(category: str, rng: np.random.Generator) -> Float32[np.ndarray, "
 
     Categories are the keys of ``MAKERS``.
 
-    Raises:
-        ValueError: no sound of that name is made here.
+    ``ValueError``: no sound of that name is made here.
     """
     if category not in MAKERS:
         raise ValueError(f"there is no rule for the sound of {category!r}; there are: {', '.join(MAKERS)}")

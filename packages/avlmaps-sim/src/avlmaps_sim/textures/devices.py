@@ -20,7 +20,6 @@ def _dark_screen(rng: np.random.Generator, size: int) -> Picture:
 
 
 def _desktop(rng: np.random.Generator, size: int) -> Picture:
-    """Return windows with text on a background, a task bar and icons."""
     image = landscape(rng, size) if rng.random() < 0.4 else np.ones((size, size, 3), np.float32)
     if image.min() == 1.0:
         image *= harmony(rng, 1)[0].astype(np.float32) * 0.6

@@ -29,7 +29,6 @@ def _ridge(rng: np.random.Generator, size: int, height: float, rough: float) -> 
 
 
 def _houses(rng: np.random.Generator, image: Picture, ground: float) -> None:
-    """Build a row of houses with roofs and windows whose feet stand on row ``ground``."""
     size = len(image)
     x, tall = int(rng.integers(-20, 10)), rng.random() < 0.4
     while x < size:
@@ -54,7 +53,6 @@ def _houses(rng: np.random.Generator, image: Picture, ground: float) -> None:
 
 
 def _trees(rng: np.random.Generator, image: Picture, ground: float) -> None:
-    """Plant trees whose crowns are heaps of leaves."""
     size = len(image)
     for _ in range(int(rng.integers(1, 7))):
         x, r = int(rng.integers(0, size)), int(rng.integers(10, 42))

@@ -42,7 +42,6 @@ def _shapes(rng: np.random.Generator, size: int) -> Picture:
 
 
 def _fields(rng: np.random.Generator, size: int) -> Picture:
-    """Return a grid of panes with dark bars, or large fields with soft rims."""
     colours = harmony(rng, 5)
     cuts = [np.sort(rng.choice(np.arange(10, size - 10), int(rng.integers(1, 5)), replace=False)) for _ in range(2)]
     column, row = (np.searchsorted(c, np.arange(size)) for c in cuts)
@@ -67,7 +66,6 @@ def _poured(rng: np.random.Generator, size: int) -> Picture:
 
 
 def _portrait(rng: np.random.Generator, size: int) -> Picture:
-    """Return a head on shoulders before a dim ground, lit from one side."""
     colours = harmony(rng, 3) * 0.6
     skin = np.array((0.92, 0.72, 0.58)) * float(rng.uniform(0.35, 1.0))
     image = _plane(colours[0], size) * (1.0 + 0.2 * cloud(rng, size, 1.8))[..., None]
@@ -87,7 +85,6 @@ def _portrait(rng: np.random.Generator, size: int) -> Picture:
 
 
 def _still_life(rng: np.random.Generator, size: int) -> Picture:
-    """Return fruit, bottles and flowers on a table."""
     ground, table = earthy(rng, 2)
     image = _plane(ground * 0.6, size)
     image[int(size * rng.uniform(0.55, 0.75)) :] = table * 0.8

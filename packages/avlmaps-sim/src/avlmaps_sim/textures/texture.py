@@ -15,19 +15,12 @@ FILL: Size = (1.0, 1.0)  # the picture is laid once over a whole sheet
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Texture:
-    """One picture of a surface.
+    """One picture of a surface."""
 
-    Attributes:
-        image: sRGB; near-grey where it is meant to be multiplied with a colour.
-        size_m: metres that its columns and rows cover; ``FILL`` for pictures that fill a sheet once.
-        mean: mean of each channel, in [0, 1].
-        emission: light the surface gives off itself.
-    """
-
-    image: UInt8[np.ndarray, "h w 3"]
-    size_m: Size
-    mean: tuple[float, float, float]
-    emission: float = 0.0
+    image: UInt8[np.ndarray, "h w 3"]  # sRGB; near-grey where it is meant to be multiplied with a colour
+    size_m: Size  # metres that its columns and rows cover; ``FILL`` for pictures that fill a sheet once
+    mean: tuple[float, float, float]  # mean of each channel, in [0, 1]
+    emission: float = 0.0  # light the surface gives off itself
 
 
 def _finished(image: UInt8[np.ndarray, "h w 3"], size_m: Size, emission: float = 0.0) -> Texture:

@@ -141,7 +141,6 @@ Level = Int[np.ndarray, "s s"]
 
 
 def _oriental(rng: np.random.Generator, size: int) -> Level:
-    """Return borders round a field with a medallion and corner pieces, mirrored in both axes."""
     x, y = grid(size)
     u, v = np.abs(2 * x - 1), np.abs(2 * y - 1)
     quarter = levels(rng, size // 2)
@@ -168,7 +167,6 @@ def _framed(rng: np.random.Generator, size: int) -> Level:
 
 
 def _modern(rng: np.random.Generator, size: int) -> Level:
-    """Return overlapping discs, blocks and bars, or large soft patches."""
     x, y = grid(size)
     if rng.random() < 0.3:
         return np.digitize(cloud(rng, size, 2.0), (-0.7, 0.2, 0.9)).astype(np.int64)

@@ -173,7 +173,6 @@ def run_change(
 
 
 def _home(job: SceneJob, days: int, open_spec: Callable[[str], Scene]) -> dict[str, HomeResult]:
-    """Return the results of a home, by perception."""
     jobs = [replace(job, spec=on_day(job.spec, day)) for day in range(days)]
     places = [Workplace(jobs[0], open_spec), *(TurnedPlace(TurnedJob.of(one), open_spec) for one in jobs[1:])]
     seen = [_seen_names(place) for place in places]  # each day is opened from the one before
@@ -196,7 +195,6 @@ def _seen_names(place: Workplace) -> set[str]:
 
 
 def _true_things(places: Sequence[Workplace]) -> ThingsOf:
-    """Return what lists the true things of any of these days' maps."""
     of = {place.avlmap.path: place for place in places}
 
     def things(avlmap: AVLMap) -> list[Thing]:
@@ -225,7 +223,6 @@ def _lived(
     way: str,
     noticeable_on: Callable[[int, tuple[Happened, ...]], list[Happened]],
 ) -> HomeResult:
-    """Merge the days of a home and judge what is said on each."""
     result = HomeResult(scene, area_m2=_floor_m2(places[0]))
     merged = places[0].avlmap
     names_before, hidden = set(seen[0]), list[Happened]()

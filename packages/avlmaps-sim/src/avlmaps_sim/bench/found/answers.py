@@ -64,7 +64,6 @@ def labelled_queries(
 
 
 def _of_task(task: Task, sought: str | None = None, context: str | None = None) -> LabelledQuery:
-    """Return a task as a query; with another thing or context nothing is right."""
     kinds = {
         TaskKind.AREA: (Modality.OBJECT, Modality.AREA),
         TaskKind.SOUND: (Modality.SOUND, Modality.OBJECT),
@@ -83,7 +82,6 @@ def _of_task(task: Task, sought: str | None = None, context: str | None = None) 
 def _twins(
     task: Task, evidence: Evidence, absent: Sequence[str], silent: Sequence[str], rng: np.random.Generator
 ) -> Iterator[LabelledQuery]:
-    """Yield a task with another thing, and where it can be with another context, so that nothing is right."""
     lacking = str(rng.choice(absent)) if len(absent) else None
     if task.kind is TaskKind.SOUND:
         if lacking:
@@ -212,14 +210,11 @@ def judged(place: Workplace, tasks: Sequence[Task]) -> list[Judged]:
 
 
 class _Asked:
-    """A map under query; each part's heat is computed once."""
-
     def __init__(self, place: Workplace) -> None:
         self._place = place
         self._known: dict[tuple[object, ...], Heatmap | None] = {}
 
     def judge(self, query: LabelledQuery) -> Judged:
-        """Ask one query."""
         heats = [self._heat(part, query.task) for part in query.parts]
         known = [heat for heat in heats if heat is not None]
         facts = self._place.job.spec, query.kind, query.words, bool(query.targets)

@@ -26,22 +26,17 @@ _WALL_M = 0.1  # and this far into its walls: a voxel of a thing at a wall may l
 
 @dataclass(frozen=True, eq=False)
 class VoxelHeat(Factor):
-    """Heat given voxel by voxel; only ever context, since it has no instances of its own.
-
-    Attributes:
-        voxel: heat of every voxel, in [0, 1].
-        regional: whether it says in which region a voxel lies.
-    """
+    """Heat given voxel by voxel; only ever context, since it has no instances of its own."""
 
     space: Space
     part: Part
-    voxel: Float32[np.ndarray, " n"]
+    voxel: Float32[np.ndarray, " n"]  # heat of every voxel, in [0, 1]
     found: bool = True
     falloff_per_m: float = 0.0
     understood: str = ""
     note: str = ""
     flat: bool = field(default=False, init=False)
-    regional: bool = False
+    regional: bool = False  # whether it says in which region a voxel lies
 
     anchors = np.zeros((0, 3))
     instance = np.zeros(0, np.int64)

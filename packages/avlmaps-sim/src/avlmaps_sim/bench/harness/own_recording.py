@@ -79,8 +79,7 @@ class OwnRecording:
     def label(self, centres: Float[np.ndarray, "n 3"], up_in_world: Float[np.ndarray, "3"]) -> Int[np.ndarray, " n"]:
         """Return the smallest box round each point, -1 for none.
 
-        Raises:
-            TaskError: the world's z axis does not point up.
+        ``TaskError``: the world's z axis does not point up.
         """
         if float(up_in_world[2]) < _MOST_TILT:
             raise TaskError(

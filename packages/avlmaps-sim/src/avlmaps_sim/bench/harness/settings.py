@@ -35,8 +35,7 @@ def trained_sources() -> frozenset[int]:
 def unheard_rows(folder: Path) -> list[dict[str, str]]:
     """Return the rows of a folder's index that the shipped weights were not trained on.
 
-    Raises:
-        AudioError: there is no index, or no such row.
+    ``AudioError``: there is no index, or no such row.
     """
     rows = index_rows(folder)
     if rows is None:
@@ -62,8 +61,7 @@ def _trained(row: dict[str, str]) -> bool:
 def unheard_folder(folder: Path, work: Path) -> Path:
     """Return a folder whose index lists the unheard clips of another one, which stay where they are.
 
-    Raises:
-        AudioError: see ``unheard_rows``.
+    ``AudioError``: see ``unheard_rows``.
     """
     rows = unheard_rows(folder)
     text = io.StringIO(newline="")
@@ -80,8 +78,7 @@ def unheard_folder(folder: Path, work: Path) -> Path:
 def models_of(name: str, words: Sequence[str] = ()) -> Encoders:
     """Return a profile's encoders, with the backends or models that ``module=backend[@model]`` say instead of some.
 
-    Raises:
-        BackendError: a word is not of that form, or there is no such profile or backend.
+    ``BackendError``: a word is not of that form, or there is no such profile or backend.
     """
     try:
         choices = read_choices(words)
@@ -93,8 +90,7 @@ def models_of(name: str, words: Sequence[str] = ()) -> Encoders:
 def checksums(used: Encoders) -> dict[str, str]:
     """Return the checksum of every model of some encoders, by module. Loads the models: one that is missing raises.
 
-    Raises:
-        BackendError: a model's package or files are missing.
+    ``BackendError``: a model's package or files are missing.
     """
     return {kind.value: card.checksum for kind, card in used.cards().items()}
 
@@ -117,29 +113,17 @@ class TaskError(AvlmapsError):
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """How the scenes of a set of tasks were recorded: the same tasks need the same recordings.
+    """How the scenes of a set of tasks were recorded: the same tasks need the same recordings."""
 
-    Attributes:
-        hearing: ``overlay`` or ``acoustic``.
-        frames: limit of frames in a scene.
-        sources: limit of sounds in a scene.
-        ambiguous: how many kinds of sound play in several places.
-        places: in how many.
-        sensor: whose faults colour and depth have.
-        sounds: name of the folder of clips; ``""`` for sounds made by rule.
-        seed: of walks, sounds and tasks.
-        clips: which clips of the folder; see ``SceneSettings``.
-    """
-
-    hearing: str
-    frames: int
-    sources: int
-    ambiguous: int
-    sensor: str
-    sounds: str
-    seed: int
-    clips: str = "all"
-    places: int = 2
+    hearing: str  # ``overlay`` or ``acoustic``
+    frames: int  # limit of frames in a scene
+    sources: int  # limit of sounds in a scene
+    ambiguous: int  # how many kinds of sound play in several places
+    sensor: str  # whose faults colour and depth have
+    sounds: str  # name of the folder of clips; ``""`` for sounds made by rule
+    seed: int  # of walks, sounds and tasks
+    clips: str = "all"  # which clips of the folder; see ``SceneSettings``
+    places: int = 2  # in how many
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,17 +179,14 @@ class SceneSettings:
     def used(self) -> Encoders:
         """The encoders of the profile, with the models that were chosen.
 
-        Raises:
-            BackendError: there is no such profile or backend.
+        ``BackendError``: there is no such profile or backend.
         """
         return models_of(self.profile, self.models)
 
     def checked(self) -> dict[str, str]:
         """Check everything that is given before anything is recorded; return the models' checksums by module.
 
-        Raises:
-            BackendError: a model is not known, or missing.
-            AudioError: the folder of clips cannot be used.
+        ``BackendError``: a model is not known, or missing. ``AudioError``: the folder of clips cannot be used.
         """
         weights = checksums(self.used)
         if self.sounds is not None:

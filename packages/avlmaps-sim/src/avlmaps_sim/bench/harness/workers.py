@@ -47,7 +47,6 @@ def _begin() -> None:
 
 
 def _ticks(futures: Sequence[Future[T]], done: Callable[[], int] | None) -> Iterator[None]:
-    """Yield once for each part that is done; a process that fails ends all."""
     shown, waiting = 0, set(futures)
     while waiting:
         over, waiting = wait(waiting, _LOOK_S, FIRST_COMPLETED)

@@ -191,8 +191,7 @@ class Workplace:
     def scene(self) -> Scene:
         """The scene itself; making it takes seconds, and a second run needs it only for new photos.
 
-        Raises:
-            TaskError: it is not the scene that was recorded, or a recording, of which no geometry is known.
+        ``TaskError``: it is not the scene that was recorded, or a recording, of which no geometry is known.
         """
         if self.own is not None:
             raise TaskError(

@@ -283,8 +283,6 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class _Todo:
-    """The work of one process: make a scene's tasks, or answer some."""
-
     job: SceneJob
     open_spec: Callable[[str], Scene]
     most: int = 0
@@ -316,7 +314,6 @@ def _named(todo: _Todo) -> str:
 
 
 def _tasks(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Scene]) -> TaskSet:
-    """Return the tasks of a file, or make them."""
     if settings.load is not None:
         given = load_tasks(settings.load)
         if given.recorded.sounds != settings.recorded.sounds:
@@ -367,7 +364,6 @@ def scene_tasks(job: SceneJob, open_spec: Callable[[str], Scene], most: int) -> 
 
 
 def _run_scene(todo: _Todo) -> SceneOutcome:
-    """Put a scene's tasks to every configuration that the profile has the models for, unless that is done."""
     begin = perf_counter()
     place = Workplace(todo.job, todo.open_spec)
     info = place.avlmap.data.info

@@ -93,7 +93,6 @@ def _paper_rows(kind: TaskKind) -> list[list[Any]]:
 
 
 def _figures(outcome: Outcome) -> dict[str, Any]:
-    """Return the recall of ours within 0.5 m beside that of the best single modality and of the ceiling."""
     rows: list[list[Any]] = []
     for kind in TaskKind:
         by_role: dict[str, list[float]] = {}
@@ -111,7 +110,6 @@ def _figures(outcome: Outcome) -> dict[str, Any]:
 
 
 def _found(outcome: Outcome) -> dict[str, Any]:
-    """Return how often ours was reported as found where its first goal was within 0.5 m, and where it was not."""
     rows: list[list[Any]] = []
     for kind in TaskKind:
         ours = next(one for one in configurations(kind) if one.role == OURS)
@@ -179,7 +177,6 @@ def run_indexing(settings: IndexingSettings | None, out: Path) -> dict[str, Any]
 
 
 def _answers(outcome: Outcome) -> bytes:
-    """Return every answer beside its task, to look into failures."""
     by_task: dict[str, list[Any]] = {}
     for scene in outcome.scenes:
         for given in scene.answers:

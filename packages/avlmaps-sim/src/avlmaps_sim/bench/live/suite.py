@@ -152,8 +152,7 @@ def run_live(
 ) -> dict[str, Table]:
     """Return the tables; ``out/work`` stores the outcome of each kill.
 
-    Raises:
-        BenchError: no recording was given, or one of fewer than two frames.
+    ``BenchError``: no recording was given, or one of fewer than two frames.
     """
     if not scenes:
         raise BenchError(f"This suite measures on recordings with poses; name one or more with {option('scenes')}.")
@@ -232,7 +231,6 @@ def _processor(found: Played) -> list[float]:
 
 
 def _kills(recording: Path, path: Path, profile: str, kills: int, seed: int, work: Path) -> list[float]:
-    """Return how much each kill lost; those of before are read from the folder of work, and each new one is added."""
     facts = open_recording(recording).fingerprint, profile, seed, _code(Path(avlmaps.__file__).parent, _KILLED)
     stored = work / f"live-kills-{sha256(repr(facts).encode()).hexdigest()[:12]}.json"
     lost: list[float] = json.loads(stored.read_bytes())[:kills] if stored.is_file() else []

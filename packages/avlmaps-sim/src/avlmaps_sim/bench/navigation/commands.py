@@ -201,7 +201,6 @@ def command_missions(ground: Ground, series: Series, rng: np.random.Generator) -
 
 
 def _filled(ground: Ground, series: Series, form: Form, rng: np.random.Generator) -> Mission | None:
-    """Return a form with parts drawn at random; None where none fit."""
     for _ in range(_TRIES):
         parts, photos = _drawn(ground, form.parts, rng)
         if len(parts) < len(form.parts) or len({part.said for part in parts}) < len(parts):
@@ -230,7 +229,6 @@ def _shown(form: Form) -> str:
 
 
 def _drawn(ground: Ground, kinds: Sequence[str], rng: np.random.Generator) -> tuple[list[Goal], list[Photo]]:
-    """Draw a part of each kind; fewer where the scene lacks one."""
     parts: list[Goal] = []
     photos: list[Photo] = []
     for kind in kinds:
@@ -276,7 +274,6 @@ _SOURCES: dict[str, Callable[[Ground], _Found]] = {
 
 
 def _related(form: Form, parts: Sequence[Goal], start: tuple[float, float, float]) -> list[Goal]:
-    """Return the goals of a form whose parts stand in a relation."""
     if form.relation == "turn":
         return [Goal(GoalKind.LOOK, "a quarter to the left", "robot.turn(-90)", heading_rad=start[2] + pi / 2)]
     if form.relation == "face":

@@ -122,7 +122,6 @@ class Pilot:
         )  # fmt: skip
 
     def _driven(self, mission: Mission, robot: Robot, driver: Driver) -> _Log:
-        """Give the whole command; where its program breaks off, give the remaining goals one by one."""
         files, goals, log = self.photo_names(mission), mission.goals, _Log()
         error = self._command(mission.sentence(files), mission.program(files), goals, robot, log)
         broke_off = error is not None and log.understood and len(goals) > 1

@@ -251,8 +251,7 @@ def save_missions(missions: MissionSet, path: Path) -> None:
 def load_missions(path: Path) -> MissionSet:
     """Read missions that ``save_missions`` wrote.
 
-    Raises:
-        TaskError: there are none, they are of another schema, or damaged.
+    ``TaskError``: there are none, they are of another schema, or damaged.
     """
     return load_versioned(path, MissionSet, SCHEMA_VERSION)
 
@@ -288,21 +287,13 @@ _PAIRS_OF_200 = 119
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NavigationSettings(SceneSettings):
-    """The settings of the benchmark.
+    """The settings of the benchmark."""
 
-    Attributes:
-        scenes: held-out homes by default.
-        series: which experiments.
-        sequences: of four sounds (at each range), and of an image and two things; pairs are 119 for each 200.
-        language: what turns sentences into programs; ``none`` gives robots the programs themselves.
-        guess: whether robots go to the best guess where nothing is found, as the paper's always do.
-    """
-
-    scenes: tuple[str, ...] = DEFAULT_SCENES
-    series: tuple[Series, ...] = tuple(Series)
-    sequences: int = 200
-    language: Language = "learned"
-    guess: bool = True
+    scenes: tuple[str, ...] = DEFAULT_SCENES  # held-out homes by default
+    series: tuple[Series, ...] = tuple(Series)  # which experiments
+    sequences: int = 200  # of four sounds (at each range), and of an image and two things; pairs are 119 for each 200
+    language: Language = "learned"  # what turns sentences into programs; ``none`` gives robots the programs themselves
+    guess: bool = True  # whether robots go to the best guess where nothing is found, as the paper's always do
 
     def __post_init__(self) -> None:
         if self.frames < 20 or self.sequences < 1 or self.jobs < 0 or not self.scenes or not self.series:

@@ -186,8 +186,6 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class _Todo:
-    """The work of one process: make a scene's missions, or send robots on some."""
-
     job: SceneJob
     settings: NavigationSettings
     missions: tuple[Mission, ...]
@@ -253,7 +251,6 @@ def _count(todo: Sequence[_Todo]) -> int:
 
 
 def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> MissionSet:
-    """Return the missions of a file, of a run that was broken off, or made again."""
     if settings.load is not None:
         given = load_missions(settings.load)
         if given.recorded.sounds != settings.recorded.sounds:
@@ -289,7 +286,6 @@ def _made(todo: _Todo) -> list[Mission]:
 
 
 def _sent(todo: _Todo) -> SceneFacts:
-    """Send robots on a scene's missions, those aside that are done."""
     settings, journal = todo.settings, Journal(todo.journal)
     done = journal.read()
     place = NavigationPlace(todo.job, settings, todo.open_spec)

@@ -105,7 +105,6 @@ def _paper_row(series: Series, paper: dict[str, Any]) -> list[Any]:
 
 
 def _forms(outcome: Outcome) -> dict[str, Any]:
-    """Return how each form of command went, so that one sees what is not understood or not reached."""
     rows: list[list[Any]] = []
     for series in (Series.COMMANDS, Series.SPATIAL):
         forms = dict.fromkeys(one.form for one in outcome.missions.missions if one.series is series)
@@ -124,7 +123,6 @@ def _whole(episodes: list[Episode]) -> object:
 
 
 def _figures(outcome: Outcome) -> dict[str, Any]:
-    """Return the notes that hold for all experiments together."""
     true = [one for one in outcome.episodes if one.configuration == CEILING]
     reachable = share_of(true, is_reachable, outcome.settings.seed)
     rows: list[list[Any]] = []
@@ -139,7 +137,6 @@ def _figures(outcome: Outcome) -> dict[str, Any]:
 
 
 def _scenes(outcome: Outcome) -> dict[str, Any]:
-    """Return the scenes, and the number of missions of each."""
     shown = [series for series in Series if series in outcome.settings.series]
     rows: list[list[Any]] = []
     for one in outcome.scenes:

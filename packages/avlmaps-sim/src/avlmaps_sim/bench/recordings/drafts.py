@@ -121,37 +121,21 @@ def _millimetres(depth_m: Float[np.ndarray, "h w"]) -> Picture:
 
 @dataclass(frozen=True, slots=True)
 class RoomWalk:
-    """A walk through the ray-cast room.
+    """A walk through the ray-cast room."""
 
-    Attributes:
-        name: of it.
-        seed: of the path and the noise.
-        frames: how many.
-        rate_hz: frames a second.
-        turn_rad_s: how fast the camera turns.
-        round_rad_s: how fast it goes round the middle of the room; 0: it stands.
-        even: whether it turns evenly, and looks as far down all the time.
-        people: how many people walk about.
-        moved_chair: whether a chair stands elsewhere in the second half.
-        noise: of depth, in shares of the square of the distance in metres: a Kinect has 0.0019 or so.
-        holes: share of pixels without a depth.
-        drift: noise of each step of the poses, metres and tenths of a radian.
-        flicker: by how much the exposure changes.
-    """
-
-    name: str
-    seed: int = 0
-    frames: int = 40
-    rate_hz: float = 5.0
-    turn_rad_s: float = 0.7
-    round_rad_s: float = 0.25
-    even: bool = False
-    people: int = 0
-    moved_chair: bool = False
-    noise: float = 0.0
-    holes: float = 0.0
-    drift: float = 0.0
-    flicker: float = 0.0
+    name: str  # of it
+    seed: int = 0  # of the path and the noise
+    frames: int = 40  # how many
+    rate_hz: float = 5.0  # frames a second
+    turn_rad_s: float = 0.7  # how fast the camera turns
+    round_rad_s: float = 0.25  # how fast it goes round the middle of the room; 0: it stands
+    even: bool = False  # whether it turns evenly, and looks as far down all the time
+    people: int = 0  # how many people walk about
+    moved_chair: bool = False  # whether a chair stands elsewhere in the second half
+    noise: float = 0.0  # of depth, in shares of the square of the distance in metres: a Kinect has 0.0019 or so
+    holes: float = 0.0  # share of pixels without a depth
+    drift: float = 0.0  # noise of each step of the poses, metres and tenths of a radian
+    flicker: float = 0.0  # by how much the exposure changes
 
     def draft(self, camera: Pinhole | None = None) -> Draft:
         """Walk, look, and return what was recorded."""
@@ -171,7 +155,6 @@ class RoomWalk:
         return Draft(self.name, Rig(camera, camera), tuple(rgb), tuple(depth), poses, stamps_s, stamps_s)
 
     def _path(self, stamps_s: Float[np.ndarray, " n"], rng: np.random.Generator) -> Float[np.ndarray, "n 4 4"]:
-        """Return poses on an ellipse in the middle of the room; the camera looks about, and a little down."""
         start, nod, sway = rng.uniform(0.0, 2.0 * np.pi, 3)
         round_rad = start + self.round_rad_s * stamps_s
         swing = (not self.even) * 0.35 * np.sin(rng.uniform(0.7, 1.6) * stamps_s + sway)

@@ -30,17 +30,11 @@ _MOST = 65_535
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """How a draft is written.
+    """How a draft is written."""
 
-    Attributes:
-        name: of the format on the command line.
-        write: writes a draft into a new folder and returns it.
-        holds: whether the format can hold a draft: its unit, clocks and cameras.
-    """
-
-    name: str
-    write: Callable[[Draft, Path], Path]
-    holds: Callable[[Draft], bool]
+    name: str  # of the format on the command line
+    write: Callable[[Draft, Path], Path]  # writes a draft into a new folder and returns it
+    holds: Callable[[Draft], bool]  # whether the format can hold a draft: its unit, clocks and cameras
 
 
 def _write_tum(draft: Draft, path: Path) -> Path:

@@ -86,7 +86,6 @@ def _one_less(written: np.ndarray) -> np.ndarray:
 
 
 def _coarse(written: np.ndarray) -> np.ndarray:
-    """Round how far each camera is turned from the first about the axis that is up in the mean."""
     up = -written[:, :3, 1].mean(axis=0)
     up /= np.linalg.norm(up)
     level = np.cross(np.cross(up, written[:, :3, 2]), up)
@@ -149,7 +148,6 @@ def _cut_to_wide(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
 
 
 def _of_a_lens(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
-    """Bend both pictures as a wide lens does."""
     import cv2
 
     def bent(picture: Picture, camera: Pinhole) -> Picture:

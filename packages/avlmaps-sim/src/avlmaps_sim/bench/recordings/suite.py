@@ -119,7 +119,6 @@ class _Source:
     step: tuple[int, int] = (0, 1)
 
     def chosen(self) -> list[int]:
-        """Return the numbers of the mistakes."""
         known = situations()
         every = range(self.step[0], len(known), self.step[1])
         return [number for number in every if not self.groups or known[number].group in self.groups]

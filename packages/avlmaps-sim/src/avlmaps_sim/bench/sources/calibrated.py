@@ -36,23 +36,14 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """What a trial varies.
+    """What a trial varies."""
 
-    Attributes:
-        rt60_s: how long the room takes to fall by 60 dB.
-        snr_db: of the sound at 1 m against the noise.
-        walked_m: how far the robot drives while it sounds.
-        pose_m: standard deviation of an error of place that a walk has throughout.
-        pose_deg: of heading.
-        others: how many more sources sound at once.
-    """
-
-    rt60_s: float = 0.5
-    snr_db: float = 20.0
-    walked_m: float = 1.0
-    pose_m: float = 0.0
-    pose_deg: float = 0.0
-    others: int = 0
+    rt60_s: float = 0.5  # how long the room takes to fall by 60 dB
+    snr_db: float = 20.0  # of the sound at 1 m against the noise
+    walked_m: float = 1.0  # how far the robot drives while it sounds
+    pose_m: float = 0.0  # standard deviation of an error of place that a walk has throughout
+    pose_deg: float = 0.0  # of heading
+    others: int = 0  # how many more sources sound at once
 
 
 USUAL = Condition()
@@ -220,8 +211,7 @@ def calibrated(
 
     The array's frame is level here, and the rate of the settings is not used.
 
-    Raises:
-        RecordingError: the drive does not determine the array.
+    ``RecordingError``: the drive does not determine the array.
     """
     level, walk = (
         Wrong(Microphones(wrong.true.position_m), Microphones(wrong.given.position_m), wrong.late_s),

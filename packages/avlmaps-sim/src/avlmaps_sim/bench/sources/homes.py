@@ -178,8 +178,6 @@ def _map_of(recorded: Path, path: Path) -> AVLMap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Played:
-    """One set of sounds on a walk."""
-
     events: tuple[HeardEvent, ...]
     audio: AudioTrack
     heard: HeardSounds
@@ -187,8 +185,6 @@ class _Played:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Home:
-    """One home, recorded and mapped."""
-
     job: HomeJob
     scene: Scene
     settings: RecordSettings
@@ -196,7 +192,6 @@ class _Home:
     avlmap: AVLMap
 
     def outcome(self, folder: Path, number: int) -> HomeOutcome:
-        """Measure the set of sounds of a number; the first one also with an array that was put wrong."""
         folder.mkdir(exist_ok=True)
         recording, truth = open_recording(self.recorded), read_truth(self.recorded)
         rng = np.random.default_rng([self.job.seed, crc32(self.job.spec.encode()), number])
@@ -242,7 +237,6 @@ class _Home:
         return HomeOutcome(self.job.spec, len(played.events), len(pairs), tuple(placed), mended)
 
     def _played(self, recording: Recording, folder: Path, rng: np.random.Generator) -> _Played:
-        """Let sounds play on the walk, and find them as a build does."""
         own = recording.audio
         assert own is not None and own.microphones is not None
         track, soundings = sound_again(self.scene, recording.walk, own.end_s - own.start_s, self.settings, rng)
@@ -260,7 +254,6 @@ class _Home:
         return _Played(events, with_microphones(recording.audio, own.microphones), heard)
 
     def _wrong(self, audio: AudioTrack, folder: Path, rng: np.random.Generator) -> tuple[dict[str, AudioTrack], Mended]:
-        """Return the tracks of an array that was put wrong, as given and calibrated, and how far it errs then."""
         assert audio.microphones is not None
         wrong = Wrong.of(audio.microphones, rng)
         tracks = {GIVEN: wrong.track(read_channels(audio, audio.start_s, audio.end_s), folder / "wrong.flac")}
@@ -287,7 +280,6 @@ class _Home:
         things: Sequence[Thing],
         each_s: float,
     ) -> Placed:
-        """Return one sound as it was placed, against the truth."""
         at, plan = known.position_of(one), one.density.plan
         cell = nearest_held(plan.is_held, plan.cell_of(true[None, :2])[0])
         likely = [number for number, _ in things_that_may_be(known, one, things)]

@@ -39,8 +39,7 @@ class MeasuredRoom:
     def read(cls, folder: Path) -> "MeasuredRoom":
         """Read the room from a folder that holds ``measured/S1R01.flac`` to ``S1R25.flac``.
 
-        Raises:
-            AvlmapsError: they are not there.
+        ``AvlmapsError``: they are not there.
         """
         from avlmaps.recordings.audio import AudioTrack
 
@@ -165,21 +164,13 @@ _PROMISED = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 
 @dataclass(frozen=True, slots=True)
 class SourcesBench:
-    """What the suite runs on.
+    """What the suite runs on."""
 
-    Attributes:
-        homes: names of scenes.
-        rooms: folder of the measured room; None leaves it out.
-        trials: of each condition of the sweep; 0 leaves it out.
-        jobs: homes side by side; 0 takes as many as there are cores.
-        sounds: folder of clips; None for sounds made by rule.
-    """
-
-    homes: tuple[str, ...] = HOMES
-    rooms: Path | None = None
-    trials: int = 12
-    jobs: int = 0
-    sounds: Path | None = None
+    homes: tuple[str, ...] = HOMES  # names of scenes
+    rooms: Path | None = None  # folder of the measured room; None leaves it out
+    trials: int = 12  # of each condition of the sweep; 0 leaves it out
+    jobs: int = 0  # homes side by side; 0 takes as many as there are cores
+    sounds: Path | None = None  # folder of clips; None for sounds made by rule
 
 
 def run_sources(settings: SourcesBench, out: Path, seed: int) -> dict[str, Table]:
