@@ -23,7 +23,7 @@ from avlmaps.core.columns import concat
 from avlmaps.core.poses import inverse
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.free_space import FreeViews, clean, count_where_it_matters, free_views
+from avlmaps.maps.fusion.free_space import FreeViews, clean, count_through, count_where_it_matters, free_views
 from avlmaps.maps.fusion.sensor import PERFECT
 from avlmaps.maps.fusion.submaps import MovedSubmaps, submap_of
 from avlmaps.maps.grid import GridSpec
@@ -73,7 +73,8 @@ def fused(frames: list[Frame], poses: np.ndarray, features: np.ndarray, step: in
 def surface(total: MovedSubmaps, clear_mm: np.ndarray, poses: np.ndarray, rig: Rig) -> np.ndarray:
     """Return the voxels that are a surface."""
     evidence = total.evidence()
-    kept, _ = clean(evidence, [FreeViews(clear_mm, poses)], rig.depth, GRID, PERFECT)
+    views = FreeViews(clear_mm, poses)
+    kept, _ = clean(evidence, PERFECT, lambda index: count_through(index, GRID, rig.depth, [views]))
     total.voxels(kept=kept)
     return evidence.index[kept]
 
@@ -84,9 +85,7 @@ def followed(submaps: Submaps, poses: np.ndarray, rig: Rig) -> tuple[np.ndarray,
     total, views = MovedSubmaps(submaps, poses, GRID), FreeViews(submaps.clear_mm, poses)
     at_s.append(process_time())
     evidence, camera = total.evidence(), rig.depth
-    kept, _ = clean(
-        evidence, [views], camera, GRID, PERFECT, lambda _: count_where_it_matters(evidence, GRID, camera, views)
-    )
+    kept, _ = clean(evidence, PERFECT, lambda _: count_where_it_matters(evidence, GRID, camera, views))
     at_s.append(process_time())
     index = total.voxels(kept=kept).index
     return index, np.diff([*at_s, process_time()])

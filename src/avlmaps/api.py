@@ -81,13 +81,9 @@ def build_map(
 def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap":
     """Open a map's folder; its large arrays stay on disk until they are used.
 
-    Args:
-        path: the folder.
-        encoders: the models to ask with, where the map was made with objects; by default, and for modules that
-            are left out, those that the map names. Points, colours and places of sounds need none.
-
-    Raises:
-        MapError: it is not a map, or damaged, or of another schema.
+    ``encoders`` are the models to ask with, where the map was made with objects; by default, and for modules that are
+    left out, those that the map names. Points, colours and places of sounds need none. ``MapError``: it is not a map,
+    or damaged, or of another schema.
     """
     from avlmaps.maps.store.folder import read
     from avlmaps.query.avlmap import AVLMap

@@ -51,8 +51,7 @@ def evidence(track: DirectionTrack, walk: Trajectory, spans: list[tuple[float, f
     walls = Walls.of(surface(), 1.1)
     heard = [Bearings.of(track, walk, span) for span in spans]
     expected = [expected_alone(walk, span, candidates, walls, SourceSettings.of(0)) for span in spans]
-    found = evidence_of_bearings(heard, [walls] * len(spans), candidates, expected, track.known_rad)
-    return candidates, found.heard, found.device
+    return candidates, *evidence_of_bearings(heard, [walls] * len(spans), candidates, expected, track.known_rad)
 
 
 def errors_m(candidates: Candidates, values: list[np.ndarray], places: np.ndarray) -> np.ndarray:

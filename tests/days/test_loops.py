@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.columns import take
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse
 from avlmaps.days import loops
@@ -160,7 +161,7 @@ def test_some_keyframes_have_their_own_keypoints_and_pictures() -> None:
         score=np.linspace(0, 1, 9).astype(np.float16),
     )  # fmt: skip
     rows = np.array([3, 0])
-    some = keyframes.take(rows)
+    some = take(keyframes, rows)
     for place, row in enumerate(rows.tolist()):
         own, whole = slice(*some.offsets[place : place + 2]), slice(*offsets[row : row + 2])
         for name in ("xy", "descriptors", "points_world", "score"):

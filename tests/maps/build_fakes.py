@@ -150,6 +150,23 @@ class Ears:
         return np.zeros((len(sounds), len(words)), np.float32)
 
 
+class Words(Pixels):
+    """The fake pixels, which know a word."""
+
+    def encode_words(self, words: Sequence[str]) -> np.ndarray:
+        return np.tile(np.float32([0.5, 0.5, 0.5, 0.5]), (len(words), 1))
+
+
+class Hears(Ears):
+    """The fake ears, which can be asked."""
+
+    def score_words(self, sounds: list[np.ndarray], words: list[str]) -> np.ndarray:
+        return np.ones((len(sounds), len(words)), np.float32)
+
+    def score_sounds(self, sounds: list[np.ndarray], asked: np.ndarray) -> np.ndarray:
+        return np.ones(len(sounds), np.float32)
+
+
 def register_fakes() -> str:
     """Make the profile ``fake`` known; return its name."""
     for kind, maker in ((Kind.PIXELS, Pixels), (Kind.LOCAL, Corners), (Kind.PLACE, Places), (Kind.SOUNDS, Ears)):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from build_fakes import SETTINGS, Corners, Pixels, Places, Walk, _card
+from build_fakes import SETTINGS, Corners, Places, Walk, Words, _card
 
 from avlmaps.maps.build import build_map
 from avlmaps.maps.finish import feature_doubts
@@ -19,19 +19,10 @@ from avlmaps.recordings.types import Frame
 WALK = Walk(4)
 
 
-class Words(Pixels):
-    """The fake pixels, which know a word."""
-
-    def encode_words(self, words: list[str]) -> np.ndarray:
-        """Return a feature for each."""
-        return np.tile(np.float32([0.5, 0.5, 0.5, 0.5]), (len(words), 1))
-
-
 class Writing(Words):
     """Blackens all that it is given."""
 
     def encode(self, frame: Frame) -> np.ndarray:
-        """Return features."""
         made = super().encode(frame)
         frame.rgb[:], frame.depth_m[:], frame.world_from_camera[:] = 0, 0.0, 0.0
         return made
@@ -41,7 +32,6 @@ class WritingCorners(Corners):
     """Blackens the picture."""
 
     def encode(self, rgb: np.ndarray) -> Any:
-        """Return keypoints."""
         found = super().encode(rgb)
         rgb[:] = 0
         return found
@@ -54,7 +44,6 @@ class Constant(Words):
         self.said = np.float32([said, 0.0, 0.0, 0.0])
 
     def encode(self, frame: Frame) -> np.ndarray:
-        """Return features."""
         return np.tile(self.said, (*frame.rgb[::4, ::4].shape[:2], 1))
 
 
@@ -64,11 +53,9 @@ class ConstantViews:
     card = _card("views", 3)
 
     def encode(self, frames: list[Frame]) -> np.ndarray:
-        """Return a feature for each."""
         return np.tile(np.float32([0.6, 0.8, 0.0]), (len(frames), 1))
 
     def encode_words(self, words: list[str]) -> np.ndarray:
-        """Return a feature for each."""
         return np.tile(np.float32([0.6, 0.8, 0.0]), (len(words), 1))
 
 

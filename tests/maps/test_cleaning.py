@@ -42,6 +42,10 @@ def views_of(frames, sensor=PERFECT):
     return free_views(list(frames), sensor)
 
 
+def cleaned(evidence, views, sensor):
+    return clean(evidence, sensor, lambda index: count_through(index, GRID, CAMERA, views))
+
+
 def evidence_of(index, views=1, sharp=256, hits=1):
     index = np.asarray(index, np.int32).reshape(-1, 3)
     shape = len(index)
@@ -116,11 +120,11 @@ def test_the_order_and_the_parts_of_the_frames_do_not_matter(seed):
     frames = random_views(rng, 5)
     index = rng.integers((-20, -15, 0), (20, 15, 50), (500, 3)).astype(np.int32)
     evidence = evidence_of(np.unique(index, axis=0))
-    whole = clean(evidence, [views_of(frames)], CAMERA, GRID, PERFECT)
+    whole = cleaned(evidence, [views_of(frames)], PERFECT)
     order = [frames[n] for n in rng.permutation(5)]
     parts = [views_of(order[:2]), views_of(order[2:])]
     for views in (parts, [concat(parts)]):
-        kept, removed = clean(evidence, views, CAMERA, GRID, PERFECT)
+        kept, removed = cleaned(evidence, views, PERFECT)
         np.testing.assert_array_equal(kept, whole[0])
         assert removed == whole[1]
 
@@ -133,15 +137,15 @@ def test_what_moved_away_goes_and_the_wall_behind_it_stays():
     for frame in frames:
         total.add(frame)
     evidence = total.evidence()
-    kept, removed = clean(evidence, [views_of(frames)], CAMERA, GRID, PERFECT)
+    kept, removed = cleaned(evidence, [views_of(frames)], PERFECT)
     np.testing.assert_array_equal(kept, evidence.index[:, 2] == 30)
     assert removed["seen_through"] == (~kept).sum() > 0
-    assert clean(evidence, [views_of(frames, NONE)], CAMERA, GRID, NONE)[0].all()
+    assert cleaned(evidence, [views_of(frames, NONE)], NONE)[0].all()
 
 
 def test_one_frame_with_a_wrong_pose_removes_nothing():
     evidence = evidence_of([[0, 0, 15]])
-    assert clean(evidence, [views_of([frame_of(3.0)])], CAMERA, GRID, PERFECT)[0].all()
+    assert cleaned(evidence, [views_of([frame_of(3.0)])], PERFECT)[0].all()
 
 
 @given(st.integers(0, 50), st.integers(1, 50))
@@ -163,12 +167,12 @@ def test_smears_are_found_as_by_comparing_all_pairs(seed):
     apart = np.linalg.norm(index[:, None] - index[None], axis=2)
     better = evidence.sharp[None] >= ONLY_SMEARS.smear_ratio * evidence.sharp[:, None]
     expected = ~((apart <= reach[:, None]) & (apart > 0) & better).any(axis=1)
-    np.testing.assert_array_equal(clean(evidence, [], CAMERA, GRID, ONLY_SMEARS)[0], expected)
+    np.testing.assert_array_equal(cleaned(evidence, [], ONLY_SMEARS)[0], expected)
 
 
 def test_hits_without_error_are_no_smears():
     evidence = evidence_of([[0, 0, 0], [0, 0, 1]], 1, [256, 256_000], [1, 1000])
-    assert clean(evidence, [], CAMERA, GRID, ONLY_SMEARS)[0].all()
+    assert cleaned(evidence, [], ONLY_SMEARS)[0].all()
 
 
 @given(seeds)
@@ -185,11 +189,11 @@ def test_specks_are_found_as_by_walking_from_neighbour_to_neighbour(seed):
                 break
             group = set(np.flatnonzero(near))
         expected[start] = len(group) > 2 or evidence.views[list(group)].max() > 2
-    np.testing.assert_array_equal(clean(evidence, [], CAMERA, GRID, ONLY_SPECKS)[0], expected)
+    np.testing.assert_array_equal(cleaned(evidence, [], ONLY_SPECKS)[0], expected)
 
 
 @pytest.mark.parametrize("sensor", [PERFECT, KINECT, NONE, ONLY_SPECKS])
 def test_a_map_without_voxels_stays_one(sensor):
-    kept, removed = clean(evidence_of(np.zeros((0, 3))), [], CAMERA, GRID, sensor)
+    kept, removed = cleaned(evidence_of(np.zeros((0, 3))), [], sensor)
     assert len(kept) == 0
     assert set(removed.values()) == {0}

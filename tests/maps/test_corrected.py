@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from build_fakes import SETTINGS, Corners, Ears, Pixels, Places, Walk, write_beeps
+from build_fakes import SETTINGS, Corners, Hears, Pixels, Places, Walk, Words, write_beeps
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import KDTree
@@ -40,23 +40,6 @@ from avlmaps.recordings.microphones import microphones_named
 
 WITH = replace(SETTINGS, frames=replace(SETTINGS.frames, per_submap=4))
 FRAMES = 22
-
-
-class Words(Pixels):
-    """The fake pixels, which know a word."""
-
-    def encode_words(self, words: list[str]) -> np.ndarray:
-        return np.tile(np.float32([0.5, 0.5, 0.5, 0.5]), (len(words), 1))
-
-
-class Hears(Ears):
-    """The fake ears, which can be asked."""
-
-    def score_words(self, sounds: list[np.ndarray], words: list[str]) -> np.ndarray:
-        return np.ones((len(sounds), len(words)), np.float32)
-
-    def score_sounds(self, sounds: list[np.ndarray], asked: np.ndarray) -> np.ndarray:
-        return np.ones(len(sounds), np.float32)
 
 
 def encoders() -> Encoders:

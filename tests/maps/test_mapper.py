@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from build_fakes import SETTINGS, Corners, Ears, Pixels, Places, Walk, write_beeps
+from build_fakes import SETTINGS, Corners, Hears, Places, Walk, Words, write_beeps
 
 from avlmaps.core.errors import BackendError, MapError, RecordingError
 from avlmaps.maps.build import build_map
@@ -16,25 +16,8 @@ from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.types import Frame
 
 
-class Words(Pixels):
-    """The fake pixels, which know a word."""
-
-    def encode_words(self, words: list[str]) -> np.ndarray:
-        return np.tile(np.float32([0.5, 0.5, 0.5, 0.5]), (len(words), 1))
-
-
-class Hears(Ears):
-    """The fake ears, which can be asked."""
-
-    def score_words(self, sounds: list[np.ndarray], words: list[str]) -> np.ndarray:
-        return np.ones((len(sounds), len(words)), np.float32)
-
-    def score_sounds(self, sounds: list[np.ndarray], asked: np.ndarray) -> np.ndarray:
-        return np.ones(len(sounds), np.float32)
-
-
 class Few(Words):
-    """The same, for keyframes alone."""
+    """The fake pixels for keyframes alone."""
 
     keyframes_only = True
 

@@ -85,11 +85,6 @@ def test_a_turned_floor_has_no_holes():
     assert np.all(obstacles.state_at(inner) == FREE)
 
 
-def test_the_first_voxel_is_an_obstacle_like_any_other():
-    voxels = voxels_of(np.concatenate([box((-1, -1, 0.52), (-0.98, -0.98, 0.54)), box((-1, -1, 0), (1, 1, 0.02))]))
-    assert find_obstacles(voxels, GRID, UP).state_at(np.array([-0.99, -0.99, 0.0])) == OCCUPIED
-
-
 def test_the_body_decides_what_is_in_the_way():
     voxels = voxels_of(room())
     lamp, table = np.array([3.1, 0.3, 0.0]), np.array([1.5, 1.3, 0.0])
@@ -128,23 +123,18 @@ def test_the_floor_is_the_lowest_crowded_height_and_not_the_most_crowded():
     assert floor_height(np.concatenate(heights), 0.05) == pytest.approx(-1.5, abs=0.03)
 
 
-def test_a_map_without_sure_voxels_is_told():
-    with pytest.raises(MapError) as error:
-        find_obstacles(voxels_of([[0.0, 0.0, 0.0]], hits=2), GRID, UP)
-    assert str(error.value) == (
-        "None of the map's 1 voxels was hit 3 times, so that no floor can be found; lower min_hits or map more frames."
-    )
+FAR = [[0.0, 0.0, 0.0], [5e6, 5e6, 0.0]]
+REFUSED = [
+    ([[0.0, 0.0, 0.0]], 2, None, "None of the map's 1 voxels was hit 3 times"),
+    ([[0.0, 0.0, 0.0]], 10, 0.01, "Cells of 0.01 m are smaller than the map's voxels of 0.05 m"),
+    (FAR, 10, None, "A grid of 100000001 x 100000001 cells is too large"),
+]
 
 
-def test_cells_smaller_than_voxels_are_refused():
-    with pytest.raises(MapError, match=r"Cells of 0.01 m are smaller than the map's voxels of 0.05 m; ask for larger"):
-        find_obstacles(voxels_of(room()), GRID, UP, cell_size_m=0.01)
-
-
-def test_a_grid_too_large_for_memory_is_refused():
-    far = np.array([[0.0, 0.0, 0.0], [5e6, 5e6, 0.0]])
-    with pytest.raises(MapError, match="A grid of 100000001 x 100000001 cells is too large"):
-        find_obstacles(voxels_of(far), GRID, UP)
+@pytest.mark.parametrize(("points", "hits", "cell_size_m", "said"), REFUSED)
+def test_a_grid_that_cannot_be_drawn_is_refused(points, hits, cell_size_m, said):
+    with pytest.raises(MapError, match=said):
+        find_obstacles(voxels_of(points, hits), GRID, UP, cell_size_m=cell_size_m)
 
 
 def test_a_body_that_is_none_is_refused():

@@ -5,7 +5,6 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from build_fakes import SETTINGS, Pixels, Walk, register_fakes
 from hypothesis import given
@@ -156,9 +155,3 @@ def test_other_keypoints_bring_the_matcher_that_was_made_for_them() -> None:
 def test_an_unknown_choice_is_told_before_anything_is_built() -> None:
     with pytest.raises(BackendError, match="no pixels backend called 'nope'"):
         profile("foundation").choosing({Kind.PIXELS: "nope@x"})
-
-
-def test_features_of_chosen_models_are_written(tmp_path: Path) -> None:
-    stored = build_map(Walk(), tmp_path / "map", used_with("chosen@org/large"), SETTINGS)
-    assert np.isfinite(np.asarray(stored.voxels.feature, np.float32)).all()
-    assert stored.voxels.feature.shape[1] == Pixels.card.dim

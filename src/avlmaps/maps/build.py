@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
@@ -17,7 +18,6 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
 from avlmaps.maps.estimate import Start, doubts_of
 from avlmaps.maps.frame_sums import bad_frames, load_state, save_state
-from avlmaps.maps.gravity import GroundedRecording
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.perceived import encode_pixels
 from avlmaps.maps.plan import BuildPlan, Span, claim, make_plan, require_unchanged, strip_folder
@@ -29,7 +29,7 @@ from avlmaps.maps.store.tables import lock_folder
 from avlmaps.perception.cache import DEFAULT_CACHE, CacheSettings, cache_note, with_cache
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.protocols import BatchPixelEncoder, PixelEncoder
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.types import Frame, Ground, Recording
 
 _MOST_HELD = 4  # frames in memory for each that is encoded
 EncodedFrame = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
@@ -53,23 +53,13 @@ def build_map(
     progress: bool = True,
     finds: Finds = find_nothing,
 ) -> MapData:
-    """Build a map of a recording, or finish one that was begun; see ``api.build_map``.
+    """Build a map of a recording, or finish one that was begun; ``api.build_map`` says what the arguments are.
 
     A build that is killed at any instant continues from its last finished stretch of frames when it is started again,
     and ends with the same map. A finished map in the folder stays whole and readable until the new one replaces it.
-
-    Args:
-        recording: from ``open_recording``.
-        path: the map's folder, by custom ``NAME.avlmap``.
-        profile: which models perceive: encoders, a profile, or a profile's name.
-        settings: all that can be chosen.
-        cache: whether features are stored, so that another build of the same frames encodes nothing again.
-        workers: who maps the stretches; this process if None.
-        allow: names of reasons for which the recording is not refused (``recordings.consistency.check.Reason``).
-        resume: continue with what a stopped build had finished; otherwise begin again.
-        overwrite: replace a finished map there that came from another recording, or with other settings.
-        progress: show how far it is on standard error.
-        finds: what is stored with the map of what its encoders see; see ``query.avlmap.with_findings``.
+    ``workers`` map the stretches, this process if None; a ``cache`` stores features, so that another build of the same
+    frames encodes nothing again; what ``finds`` finds by the encoders (``query.avlmap.with_findings``) is stored with
+    the map.
     """
     began_s, stamp = perf_counter(), recording.change_stamp()
     plan = make_plan(recording, user_path(path), with_cache(encoders_of(profile), cache), settings)
@@ -105,16 +95,15 @@ def spans_of_frames(plan: BuildPlan, start: Start, spans: Sequence[Span]) -> Gen
     """Yield the frames of stretches with their features, decoded and encoded ahead, each in a thread of its own."""
     encoders = plan.encoders
     encoder = encoders.pixels if Kind.PIXELS in encoders else None
-    grounded = GroundedRecording(plan.recording, start.ground)
     chosen = plan.keyframes if encoders.keyframes_only else None
-    return encode_frames(grounded, [range(*span) for span in spans], encoder, chosen)
+    return encode_frames(plan.recording, [range(*span) for span in spans], encoder, chosen, start.ground)
 
 
 def _map_frames(plan: BuildPlan, start: Start, workers: Workers | None) -> None:
     spans, step = plan.spans(), plan.settings.frames.step
     known = {file: bad_frames(file, plan.key) for file in spans}
     jobs = {file: span for file, span in spans.items() if known[file] is None}
-    tolerance = _Tolerance(plan, sum(len(bad or ()) for bad in known.values()))
+    meet = _tolerance(plan, sum(len(bad or ()) for bad in known.values()))
     total = len(range(0, len(plan.recording), step))
     done = total - sum(len(range(*span)) for span in jobs.values())
     if not jobs:
@@ -123,42 +112,42 @@ def _map_frames(plan: BuildPlan, start: Start, workers: Workers | None) -> None:
         ended = workers(plan, start, jobs)
         for file in progress(ended, "fusing", total=total, done=done, size=lambda at: len(range(*jobs[at]))):
             for one in bad_frames(file, plan.key) or ():
-                tolerance.meet(one)
+                meet(one)
         return
     with closing(spans_of_frames(plan, start, list(jobs.values()))) as ahead:
         note = lambda: cache_note(plan.encoders, Kind.PIXELS)  # noqa: E731
-        seen = tolerance.watch(progress(ahead, "fusing", total=total, done=done, note=note))
+        seen = _watched(progress(ahead, "fusing", total=total, done=done, note=note), meet)
         for file, span in jobs.items():
             map_span(plan, start, islice(seen, len(range(*span))), file)
         for _ in seen:  # nothing is left; this completes the bar
             pass
 
 
-class _Tolerance:
-    """Counts the frames that cannot be read, and says when there are too many."""
+def _watched(frames: Iterable[EncodedFrame], meet: Callable[[BadFrame], None]) -> Iterator[EncodedFrame]:
+    for frame, features in frames:
+        if isinstance(frame, BadFrame):
+            meet(frame)
+        yield frame, features
 
-    def __init__(self, plan: BuildPlan, known: int) -> None:
-        frames = plan.settings.frames
-        self._total = len(range(0, len(plan.recording), frames.step))
-        self._allowed = int(frames.max_bad_share * self._total) if frames.on_bad == "skip" else 0
-        self._met = known
 
-    def watch(self, frames: Iterable[EncodedFrame]) -> Iterator[EncodedFrame]:
-        for frame, features in frames:
-            if isinstance(frame, BadFrame):
-                self.meet(frame)
-            yield frame, features
+def _tolerance(plan: BuildPlan, met: int) -> Callable[[BadFrame], None]:
+    """Return what counts the frames that cannot be read, and raises ``RecordingError`` when there are too many."""
+    frames = plan.settings.frames
+    total = len(range(0, len(plan.recording), frames.step))
+    allowed = int(frames.max_bad_share * total) if frames.on_bad == "skip" else 0
 
-    def meet(self, bad: BadFrame) -> None:
-        self._met += 1
-        if self._met <= self._allowed:
-            return
-        if self._allowed == 0:
-            raise RecordingError(bad.why)
-        raise RecordingError(
-            f"{self._met} of {self._total} frames cannot be read, more than the {self._allowed} that may be left out; "
-            f"fix the recording or allow more ({option('max-bad-share')}). The last: {bad.why}"
-        )
+    def meet(bad: BadFrame) -> None:
+        nonlocal met
+        met += 1
+        if met > allowed:
+            raise RecordingError(
+                f"{met} of {total} frames cannot be read, more than the {allowed} that may be left out; fix the "
+                f"recording or allow more ({option('max-bad-share')}). The last: {bad.why}"
+                if allowed
+                else bad.why
+            )
+
+    return meet
 
 
 def encode_frames(
@@ -166,19 +155,20 @@ def encode_frames(
     stretches: Sequence[Sequence[int]],
     encoder: PixelEncoder | None,
     chosen: Collection[int] | None = None,
+    ground: Ground | None = None,
 ) -> Generator[EncodedFrame]:
     """Yield the frames with their features, in order; one that cannot be read yields its fault in its place.
 
     No batch reaches from one of the ``stretches`` into the next, so that a build that continues from a stretch encodes
     the same batches as one that was never stopped. Without an encoder frames come alone, as do those that are not
-    ``chosen``.
+    ``chosen``. An encoder that wants to know up and the floor has them from ``ground``.
     """
-    size = 1 if encoder is None else batch_of(encoder)
+    size = max(1, encoder.batch) if isinstance(encoder, BatchPixelEncoder) else 1
 
     def read() -> Generator[list[Frame | BadFrame]]:
         for stretch in stretches:
             for group in _groups(stretch, size, chosen):
-                yield [_frame(recording, index) for index in group]
+                yield [_frame(recording, index, ground) for index in group]
 
     def encoded() -> Generator[EncodedFrame]:
         with closing(run_ahead(read())) as groups:
@@ -193,9 +183,10 @@ def encode_frames(
         yield from frames
 
 
-def _frame(recording: Recording, index: int) -> Frame | BadFrame:
+def _frame(recording: Recording, index: int, ground: Ground | None) -> Frame | BadFrame:
     try:
-        return recording.frame(index)
+        frame = recording.frame(index)
+        return frame if ground is None else replace(frame, ground=ground)
     except RecordingError as fault:
         return BadFrame(index=index, why=strip_folder(str(fault), recording))
 
@@ -211,8 +202,3 @@ def _groups(stretch: Sequence[int], size: int, chosen: Collection[int] | None) -
             group, wanted = [], 0
     if group:
         yield group
-
-
-def batch_of(encoder: PixelEncoder) -> int:
-    """Return how many frames an encoder is to be given at once."""
-    return max(1, encoder.batch) if isinstance(encoder, BatchPixelEncoder) else 1

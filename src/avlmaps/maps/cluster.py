@@ -257,7 +257,10 @@ def cluster_workers(pool: Pool, reopen: Reopen, cache: CacheSettings = DEFAULT_C
         with closing(pool.run(span_job, orders)) as done:
             for number, _ in done:
                 if not orders[number].file.is_file():
-                    raise unseen("A worker", path)
+                    raise MapError(
+                        f"A worker does not see {path} as this machine does; the map must lie on storage that all "
+                        "machines of the cluster share, at the same path."
+                    )
                 yield list(jobs)[number]
 
     return map_spans
@@ -276,7 +279,11 @@ _known: dict[str, BuildPlan] = {}  # of this worker: that of the build that it w
 
 def _plan_of(job: SpanJob, host: str) -> BuildPlan:
     if job.key not in _known:
-        require_same_software(job.software, host)
+        if software() != job.software:
+            raise MapError(
+                f"The worker on {host} runs {software()}, and this machine {job.software}; install the same on all "
+                "machines of the cluster."
+            )
         recording, encoders = reopened(job.reopen, host), with_cache(job.models.encoders(), job.models.cache)
         plan = make_plan(recording, job.path, encoders, job.settings)
         if plan.key != job.key:
@@ -300,14 +307,6 @@ def reopened(reopen: Reopen, host: str) -> Recording:
         ) from fault
 
 
-def unseen(worker: str, folder: Path) -> MapError:
-    """Return the error of a worker that has another folder, or none, where this machine has that of the map."""
-    return MapError(
-        f"{worker} does not see {folder} as this machine does; the map must lie on storage that all machines of the "
-        "cluster share, at the same path."
-    )
-
-
 @cache
 def software() -> str:
     """Return what computes here: a hash of this avlmaps' code, and the versions of what it computes by."""
@@ -319,12 +318,3 @@ def software() -> str:
         with suppress(metadata.PackageNotFoundError):  # without models on torch nothing of it is there
             found.append(f"{name} {metadata.version(name)}")
     return ", ".join(found)
-
-
-def require_same_software(wanted: str, host: str) -> None:
-    """Raise ``MapError`` where this worker computes by other software than the machine that gave the job."""
-    if software() != wanted:
-        raise MapError(
-            f"The worker on {host} runs {software()}, and this machine {wanted}; install the same on all machines of "
-            "the cluster."
-        )

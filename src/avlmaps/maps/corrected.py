@@ -49,18 +49,12 @@ class Corrected:
 def correct_map(
     path: Path, stamps_s: Any, poses: Any, recording: Recording | None = None, finds: Finds = find_nothing
 ) -> Corrected:
-    """Make a map follow corrected poses, in its folder. Later corrections replace this one and do not add to it.
+    """Make a map, built with submaps, follow corrected poses. Later corrections replace this one and do not add to it.
 
-    Args:
-        path: folder of a map that was built with submaps.
-        stamps_s: (k,) of the corrected poses, rising, on the recording's clock.
-        poses: (k, 4, 4) world_from_camera of the depth camera then, metres. Between them frames follow smoothly.
-        recording: that the map is of: by it, where sounds came from is found again; without it that is not known.
-        finds: see ``build_map``.
-
-    Raises:
-        MapError: the map has no submaps, the poses are not of its frames, or it cannot be written.
-        RecordingError: a pose is no rigid motion.
+    Stamps (k,) rise, on the recording's clock; ``poses`` (k, 4, 4) are world_from_camera of the depth camera then, and
+    between them frames follow smoothly. By the recording, where sounds came from is found again; without it that is
+    not known. ``MapError``: the map has no submaps, or the poses are not of its frames; ``RecordingError``: one is no
+    rigid motion.
     """
     begin_s = perf_counter()
     data = read(path)
@@ -114,10 +108,7 @@ def _moved(data: MapData, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> 
     clear_mm = np.asarray(submaps.clear_mm)
     views = FreeViews(clear_mm, now[: len(clear_mm)])
     evidence, camera = total.evidence(), data.rig.depth
-    kept, removed = clean(
-        evidence, [views], camera, data.grid, sensor,
-        lambda _: count_where_it_matters(evidence, data.grid, camera, views),
-    )  # fmt: skip
+    kept, removed = clean(evidence, sensor, lambda _: count_where_it_matters(evidence, data.grid, camera, views))
     if not kept.any():
         raise MapError("With the corrected poses every voxel is seen through or a speck; check the poses.")
     row = np.minimum(np.searchsorted(np.asarray(submaps.stamp_s), np.asarray(data.keyframes.stamp_s)), len(now) - 1)

@@ -14,7 +14,7 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.estimate import Start, ground_notices
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts, clean
+from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts, clean, count_through
 from avlmaps.maps.fusion.sensor import FusionSettings, SensorModel
 from avlmaps.maps.plan import strip_folder
 from avlmaps.maps.store import manifest
@@ -52,8 +52,8 @@ def surfaces(
             f"No pixel has a depth between {fusion.min_depth_m} and {farthest:.4g} m, so that the map would be empty; "
             "check the recording's depth scale."
         )
-    count = None if counts is None else partial(counts.count, views=views[0])
-    kept, removed = clean(total.evidence(), views, camera, total.grid, sensor, count)
+    every = partial(count_through, grid=total.grid, camera=camera, parts=views)
+    kept, removed = clean(total.evidence(), sensor, every if counts is None else partial(counts.count, views=views[0]))
     if not kept.any():
         raise MapError(
             "Every voxel is seen through or a speck, so that the map would be empty; check the poses and the depth "

@@ -13,8 +13,7 @@ is a hypothesis, too. Each piece of evidence is a sum in nats; a softmax over th
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int64
@@ -28,7 +27,7 @@ from avlmaps.core.wording import option
 from avlmaps.maps.types import FloorGuess, FloorInfo
 from avlmaps.recordings.consistency.check import Finding, Grade, Reason
 from avlmaps.recordings.memory import is_of_program
-from avlmaps.recordings.types import Frame, Ground, Recording, Subset
+from avlmaps.recordings.types import Frame, Ground, Recording
 
 STEP_PIXELS = 6  # of a picture 640 wide: normals are measured over twice this distance
 MAX_DEPTH_M = 4.0  # beyond, a depth camera's noise tilts normals
@@ -359,17 +358,13 @@ def choose_floor(
     if expected is None or not expected.exact:
         weight *= np.array([1.0 if guess.in_view else _GUESSED for _, guess in found])
     height_m = np.array([guess.height_m for _, guess in found])
-    first, rest = None, np.ones(len(found), bool)
-    for _ in range(2):
-        if not rest.any():
-            break
-        near = rest & (np.abs(height_m - height_m[rest][0]) < SAME_M)
-        taken = structs.replace(found[int(rest.argmax())][1], confidence=float(weight[near].sum()))
-        if first is not None:
-            return first, taken
-        first, rest = taken, rest & ~near
-    assert first is not None
-    return first, None
+    rest, chosen = np.ones(len(found), bool), list[FloorGuess]()
+    while rest.any() and len(chosen) < 2:
+        best = int(rest.argmax())
+        near = rest & (np.abs(height_m - height_m[best]) < SAME_M)
+        chosen.append(structs.replace(found[best][1], confidence=float(weight[near].sum())))
+        rest &= ~near
+    return chosen[0], chosen[1] if len(chosen) > 1 else None
 
 
 def hypotheses(view: SurfacesAtHeight) -> list[float]:
@@ -570,20 +565,3 @@ def _floors(
         share = cameras / len(cameras_m)
         floors.append(FloorInfo(best=best, runner_up=others[0] if others else None, cameras=share))
     return tuple(floors)
-
-
-class GroundedRecording(Subset):
-    """A whole recording whose frames know the up direction and where the floor is."""
-
-    def __init__(self, whole: Recording, ground: Ground) -> None:
-        super().__init__(whole, range(len(whole)))
-        self.ground = ground
-
-    def frame(self, index: int) -> Frame:
-        """Read one frame and give it the ground."""
-        return replace(self.whole.frame(index), ground=self.ground)
-
-    @cached_property
-    def fingerprint(self) -> str:
-        """The recording's own: the ground follows from it."""
-        return self.whole.fingerprint

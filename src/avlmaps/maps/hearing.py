@@ -21,7 +21,7 @@ from avlmaps.maps.audio.events import SoundFinder, StoredSound, collect, detect_
 from avlmaps.maps.estimate import doubts_of_channels
 from avlmaps.maps.frame_sums import Walked
 from avlmaps.maps.settings import HearingSettings
-from avlmaps.maps.sources.find import SourceFinder, find_sources, require_fit
+from avlmaps.maps.sources.find import SourceFinder, find_sources
 from avlmaps.maps.store.folder import read
 from avlmaps.maps.types import HeardSounds, SourceEvidence
 from avlmaps.perception.encoders import Encoders
@@ -130,9 +130,14 @@ class Hearing:
         """
         assert self.came is not None
         if isinstance(chunk, ChannelSound):
-            require_fit(self.microphones, len(chunk.samples))
-            if self.microphones is None:
+            array, channels = self.microphones, len(chunk.samples)
+            if array is None:
                 chunk = Sound(chunk.samples.mean(axis=0), chunk.rate_hz)
+            elif channels != len(array):
+                raise AudioError(
+                    f"A piece of sound has {channels} channel(s), but {len(array)} microphone(s) are described; give "
+                    "one position for each channel."
+                )
         if self.came.end_s is None:
             _require_clock(walk.stamps_s, as_number(stamp_s))
         self.came.add(chunk, stamp_s)

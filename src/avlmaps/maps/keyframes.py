@@ -194,26 +194,18 @@ def lift_keypoints(xy: Float32[np.ndarray, "n 2"], frame: Frame, max_depth_m: fl
     z_m = _patch_depth(xy * scale, depth_m)
     z_m = np.where(z_m <= max_depth_m, z_m, np.nan)
     colour = frame.rig.rgb
-    points = np.empty((len(xy), 3))
-    points[:, 0] = (xy[:, 0] - colour.cx) / colour.fx * z_m
-    points[:, 1] = (xy[:, 1] - colour.cy) / colour.fy * z_m
-    points[:, 2] = z_m
+    rays = np.column_stack([(xy - (colour.cx, colour.cy)) / (colour.fx, colour.fy), np.ones(len(xy))])
     world_from_colour = frame.world_from_camera @ inverse(frame.rig.rgb_from_depth)
-    return apply(world_from_colour, points).astype(np.float32)
+    return apply(world_from_colour, rays * z_m[:, None]).astype(np.float32)
 
 
 def middle_of_view(frame: Frame, stride_px: int = 8) -> Float32[np.ndarray, "3"]:
     """Return the median, per axis, of the world points that the depth camera saw; its own place where it saw none."""
-    depth_m = frame.depth_m[stride_px // 2 :: stride_px, stride_px // 2 :: stride_px]
-    row, column = np.nonzero(depth_m > 0.0)
-    if not len(row):
+    points = frame.rig.depth.backproject(frame.depth_m)[stride_px // 2 :: stride_px, stride_px // 2 :: stride_px]
+    seen = points[points[..., 2] > 0.0]
+    if not len(seen):
         return frame.world_from_camera[:3, 3].astype(np.float32)
-    z = depth_m[row, column].astype(np.float64)
-    camera, first = frame.rig.depth, stride_px // 2 + 0.5
-    x = (column * stride_px + first - camera.cx) / camera.fx * z
-    y = (row * stride_px + first - camera.cy) / camera.fy * z
-    world = apply(frame.world_from_camera, np.stack([x, y, z], axis=1))
-    return np.median(world, axis=0).astype(np.float32)
+    return np.median(apply(frame.world_from_camera, seen), axis=0).astype(np.float32)
 
 
 def _patch_depth(xy: Float[np.ndarray, "n 2"], depth_m: Float32[np.ndarray, "h w"]) -> Float[np.ndarray, " n"]:

@@ -20,16 +20,8 @@ from avlmaps.core.progress import silence_progress
 from avlmaps.core.registry import Kind
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.version import __version__
+from avlmaps.maps import finish
 from avlmaps.maps.estimate import Start, doubts_of_walk, estimate_ground, estimate_up
-from avlmaps.maps.finish import (
-    carving_doubts,
-    feature_doubts,
-    given_model,
-    notices,
-    recording_info,
-    surfaces,
-    walked_info,
-)
 from avlmaps.maps.frame_sums import FrameSums, HeldFrames, MapState, SubmapBook, Walked
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts
@@ -265,9 +257,8 @@ class Mapper:
             assert self.start is not None
             whole = self._whole if self._whole is not None else self._sums.empty(self.start.sensor.model)
             stamps_s, poses = np.array(self._stamps_s), np.array(self._poses).reshape(-1, 4, 4)
-            return MapState(
-                whole.sums(), self._all_views(), self._album.plain(), stamps_s, poses, tuple(self._left_out)
-            )  # fmt: skip
+            views, keyframes = self._all_views(), self._album.plain()
+            return MapState(whole.sums(), views, keyframes, stamps_s, poses, tuple(self._left_out))
 
     def add_state(self, state: MapState) -> None:
         """Add what frames brought that come after those before; arrays may be memory-mapped."""
@@ -326,15 +317,7 @@ class Mapper:
     def correct_poses(self, stamps_s: Any, poses: Any) -> tuple[float, float]:
         """Move what came to corrected poses; return how far frames moved, the median and the most, metres.
 
-        Frames to come have poses of the corrected world.
-
-        Args:
-            stamps_s: (k,) of corrected poses, rising.
-            poses: (k, 4, 4) world_from_camera of the depth camera then. Between them frames follow smoothly.
-
-        Raises:
-            MapError: it stores no submaps, no frame came, or the poses are not of its frames.
-            RecordingError: a pose is no rigid motion.
+        Frames to come have poses of the corrected world. Arguments and errors are those of ``corrected.correct_map``.
         """
         if not self.settings.frames.per_submap:
             raise MapError(
@@ -437,16 +420,16 @@ class Mapper:
         ends = {"frames": perf_counter()}
         if recording is not None:
             walk, walked = recording.walk, Trajectory(recording.stamps_s, recording.world_from_camera)
-            of = recording_info(recording)
+            of = finish.recording_info(recording)
         else:
             walk = walked = self._walked.until_now()
-            of = walked_info(walk, self._fused, self._begins_s)
+            of = finish.walked_info(walk, self._fused, self._begins_s)
         if self._surfaces is None:
             if recording is None:
                 self._through = self._through or ThroughCounts(whole.grid, rig.depth)
             views = self._views if recording is not None else [self._all_views()]
             model = start.sensor.model
-            self._surfaces = surfaces(whole, views, rig.depth, self.settings.fusion, model, self._through)
+            self._surfaces = finish.surfaces(whole, views, rig.depth, self.settings.fusion, model, self._through)
         voxels, removed = self._surfaces
         ends["merging"] = perf_counter()
         rng = np.random.default_rng([self.settings.seed, _PLACES])
@@ -460,12 +443,12 @@ class Mapper:
         took = Timings.now(dict(zip(ends, np.diff([self.began_s, *ends.values()]).tolist(), strict=True)))
         models, name, settings = models_of(self.encoders), self.encoders.name, self.settings
         if self._sums.dim and Kind.PIXELS.value not in models:
-            models[Kind.PIXELS.value] = given_model(self._sums.dim)
-        odd = tuple(feature_doubts(voxels, keyframes, sounds, models))
-        known = *self._told, *self._found, *self._at_the_end, *carving_doubts(removed, len(voxels)), *odd
+            models[Kind.PIXELS.value] = finish.given_model(self._sums.dim)
+        odd = tuple(finish.feature_doubts(voxels, keyframes, sounds, models))
+        known = *self._told, *self._found, *self._at_the_end, *finish.carving_doubts(removed, len(voxels)), *odd
         self._at_the_end += odd if final else ()
         doubts, bad = tuple(dict.fromkeys(known)), tuple(sorted(self._left_out, key=lambda one: one.index))
-        worth_knowing = notices(start, self._fused, len(bad), has_sound=self.hearing.track is not None)
+        worth_knowing = finish.notices(start, self._fused, len(bad), has_sound=self.hearing.track is not None)
         info = MapInfo(
             avlmaps_version=__version__,
             build_key=self._key or key_of("map", BUILD_VERSION, of.fingerprint, name, models, settings),

@@ -175,23 +175,13 @@ def find_obstacles(
 
     A cell is occupied where a voxel stands between the body's step and its height over the floor, free where the floor
     was seen and nothing stands, and unknown elsewhere. For a body that flies, what it flies over is as good as a floor,
-    and only voxels that reach into its height are obstacles. Where the camera was carried the floor is free as well,
-    though it never looked down there, unless something was seen to stand there.
+    and only voxels that reach into its height are obstacles. Where only voxels stand that this body ignores, a cell is
+    free. Where the camera was carried on this storey (``walked``, world, in the order of time) the floor is free as
+    well, though it never looked down there, unless something was seen to stand there. Voxels with fewer than
+    ``min_hits`` pixels count for nothing.
 
-    Args:
-        voxels: the map's.
-        grid: their size.
-        up_in_world: the up direction.
-        body: of the robot that is to move there.
-        cell_size_m: edge of a cell; that of a voxel by default, and not smaller (the floor would have holes).
-        ignored: voxels of what this body passes through or over; where only such stand, a cell is free.
-        walked: where the camera was, world, in the order of time; only places of this storey count.
-        storeys: of the map, where it has more than one; without them the lowest floor is the floor.
-        storey: number of the storey that is drawn. The grids of all storeys have the same cells.
-        min_hits: voxels with fewer pixels count for nothing.
-
-    Raises:
-        MapError: the map has no voxel with enough hits, or would need too large a grid.
+    Cells are not smaller than voxels, or the floor would have holes; all storeys of a map have the same ones. Without
+    ``storeys`` the lowest floor is the floor. ``MapError``: no voxel has enough hits, or the grid would be too large.
     """
     body = body or BodyShape()
     cell_size_m = grid.voxel_size_m if cell_size_m is None else cell_size_m

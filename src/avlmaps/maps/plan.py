@@ -1,8 +1,8 @@
 """The plan of a build: what it is made of, which frames it fuses, and where it stores what it has finished."""
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -76,24 +76,21 @@ def models_of(encoders: Encoders) -> dict[str, ModelInfo]:
     return {kind.value: ModelInfo.of(encoders.sources[kind].chosen, card) for kind, card in encoders.cards().items()}
 
 
-def audio_key(recording: Recording) -> list[str | float] | None:
+def audio_key(recording: Recording) -> list[Any] | None:
     """Return the values that identify a sound track: a recording can be given another one."""
     track = recording.audio
     if track is None:
         return None
-    content = sampled_digest(track.path, LARGEST_BUDGET_BYTES).hex()
-    known: list[str | float] = [track.path.name, content, track.rate_hz, track.duration_s, track.start_s]
-    if track.directions is not None:
-        said = track.directions
-        known += hashlib.sha256(b"".join(value.tobytes() for value in (
-            said.stamp_s, said.azimuth_rad, said.elevation_rad, said.confidence
-        ))).hexdigest(),  # fmt: skip
-        known += said.known_rad or ()
-    if track.microphones is not None:
-        array = track.microphones
-        known += [*array.position_m.ravel().tolist(), *array.camera_from_robot.ravel().tolist()]
-        known += [*array.channels, *([] if array.delay_s is None else array.delay_s.tolist())]
-        known += [sampled_digest(path, LARGEST_BUDGET_BYTES).hex() for path in track.files[1:]]
+    said, array = track.directions, track.microphones
+    files = (track.path, *(() if array is None else track.files[1:]))
+    known: list[Any] = [track.path.name, track.rate_hz, track.duration_s, track.start_s]
+    known += [sampled_digest(path, LARGEST_BUDGET_BYTES).hex() for path in files]
+    if said is not None:
+        values = said.stamp_s, said.azimuth_rad, said.elevation_rad, said.confidence
+        known += [[value.tolist() for value in values], said.known_rad]
+    if array is not None:
+        late_s = None if array.delay_s is None else array.delay_s.tolist()
+        known += [array.position_m.tolist(), array.camera_from_robot.tolist(), array.channels, late_s]
     return known
 
 

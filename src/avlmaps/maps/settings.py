@@ -31,9 +31,7 @@ class KeyframeSettings:
     """Keypoints farther away get no 3D point: the depth of most sensors is poor out there."""
 
     def __post_init__(self) -> None:
-        hold_numbers(
-            self, MapError, positive="translation_m rotation_deg max_gap_s thumbnail_width_px max_depth_m"
-        )  # fmt: skip
+        hold_numbers(self, MapError, positive="translation_m rotation_deg max_gap_s thumbnail_width_px max_depth_m")
 
 
 DEFAULT_KEYFRAMES = KeyframeSettings()

@@ -1,5 +1,6 @@
 """The content of a map, in memory or memory-mapped: voxels, keyframes, sounds; all in the recording's world."""
 
+from collections.abc import Sized
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
@@ -7,12 +8,18 @@ from typing import ClassVar
 import msgspec
 import numpy as np
 
-from avlmaps.core.arrays import Float16, Float32, Float64, Int, Int8, Int32, Int64, UInt8, UInt16
-from avlmaps.core.columns import take
+from avlmaps.core.arrays import Float16, Float32, Float64, Int8, Int32, Int64, UInt8, UInt16
+
+
+class _Rows(Sized):
+    __slots__ = ()
+
+    def __repr__(self) -> str:  # of arrays, how many rows they have
+        return f"{type(self).__name__}({len(self):,})"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Voxels:
+class Voxels(_Rows):
     """Occupied voxels, sorted by index (x, then y, then z)."""
 
     index: Int32[np.ndarray, "n 3"]
@@ -25,12 +32,9 @@ class Voxels:
     def __len__(self) -> int:
         return len(self.index)
 
-    def __repr__(self) -> str:
-        return f"Voxels({len(self):,} with features of {self.feature.shape[1]} numbers)"
-
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Keyframes:
+class Keyframes(_Rows):
     """Chosen frames, in the order of time. Ragged arrays: keyframe k has rows ``offsets[k]:offsets[k + 1]``."""
 
     RAGGED: ClassVar = (("offsets", "xy"), ("thumbnail_offsets", "thumbnails"))
@@ -54,21 +58,14 @@ class Keyframes:
     def __len__(self) -> int:
         return len(self.stamp_s)
 
-    def __repr__(self) -> str:
-        return f"Keyframes({len(self)} with {len(self.xy):,} keypoints)"
-
     def jpeg(self, row: int) -> UInt8[np.ndarray, " n"]:
         """Return the file of a keyframe's picture; empty where it has none."""
         first, last = (int(edge) for edge in self.thumbnail_offsets[row : row + 2])
         return np.asarray(self.thumbnails[first:last])
 
-    def take(self, rows: Int[np.ndarray, " r"]) -> "Keyframes":
-        """Return some of them."""
-        return take(self, rows)
-
 
 @dataclass(frozen=True, slots=True, repr=False)
-class HeardSounds:
+class HeardSounds(_Rows):
     """Sounds in the order of onset. Ragged: sound i has rows ``track_offsets[i]:track_offsets[i + 1]`` and so on."""
 
     RAGGED: ClassVar = (("track_offsets", "track"), ("feature_offsets", "feature"))
@@ -83,12 +80,9 @@ class HeardSounds:
     def __len__(self) -> int:
         return len(self.onset_s)
 
-    def __repr__(self) -> str:
-        return f"HeardSounds({len(self)})"
-
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Submaps:
+class Submaps(_Rows):
     """A map's voxels before they were added up, some frames at a time, so that they can follow corrected poses.
 
     Ragged: submap b has voxels ``row_offsets[b]:row_offsets[b + 1]`` and frames ``frame_offsets[b]:...``. Fields
@@ -118,12 +112,9 @@ class Submaps:
     def __len__(self) -> int:
         return len(self.row_offsets) - 1
 
-    def __repr__(self) -> str:
-        return f"Submaps({len(self)} of {len(self.stamp_s)} frames with {len(self.index):,} voxels)"
-
 
 @dataclass(frozen=True, slots=True, repr=False)
-class SourceEvidence:
+class SourceEvidence(_Rows):
     """What the microphones say of where each sound began, over candidates: cells of surface, and air over the floor."""
 
     place: Float32[np.ndarray, "c 3"]  # the candidates, metres, world
@@ -137,9 +128,6 @@ class SourceEvidence:
 
     def __len__(self) -> int:
         return len(self.heard)
-
-    def __repr__(self) -> str:
-        return f"SourceEvidence({len(self)} sounds over {len(self.place):,} candidates)"
 
 
 class FloorGuess(msgspec.Struct, frozen=True, kw_only=True):

@@ -102,13 +102,9 @@ class NoiseFloor:
 
     def at(self, begin: int, count: int) -> Float32[np.ndarray, "count bands"]:
         """Return the background for frames ``begin`` to ``begin + count``, interpolated between blocks."""
-        place = (np.arange(begin, begin + count) + 0.5) / _BLOCK_FRAMES - 0.5
-        place = np.clip(place, 0.0, len(self.power) - 1.0)
-        low = np.floor(place).astype(np.int64)
-        high = np.minimum(low + 1, len(self.power) - 1)
-        share = (place - low).astype(np.float32)[:, None]
-        log = np.log(self.power)
-        return np.exp(log[low] * (1.0 - share) + log[high] * share)
+        place, blocks = (np.arange(begin, begin + count) + 0.5) / _BLOCK_FRAMES - 0.5, np.arange(len(self.power))
+        bands = [np.interp(place, blocks, band) for band in np.log(self.power).T]
+        return np.exp(np.stack(bands, axis=1).astype(np.float32))
 
 
 def find_noise_floor(
@@ -140,13 +136,10 @@ def _quantiles(
     levels: Float32[np.ndarray, "blocks bands"], reach: int
 ) -> tuple[Float32[np.ndarray, "blocks bands"], Float32[np.ndarray, "blocks bands"]]:
     length = min(2 * reach + 1, len(levels))
-    found = np.stack(
-        [
-            np.quantile(np.lib.stride_tricks.sliding_window_view(band, length), _QUANTILES, axis=1, method="lower")
-            for band in levels.T  # one band at a time: a day's windows need not be in memory at once
-        ],
-        axis=-1,
-    )
+    windows = np.lib.stride_tricks.sliding_window_view
+    # One band at a time: a day's windows need not be in memory at once.
+    bands = [np.quantile(windows(band, length), _QUANTILES, axis=1, method="lower") for band in levels.T]
+    found = np.stack(bands, axis=-1)
     nearest = np.clip(np.arange(len(levels)) - (length - 1) // 2, 0, found.shape[1] - 1)
     return found[0][nearest], found[1][nearest]
 
@@ -240,11 +233,10 @@ def _overlapped(spectra: Complex64[np.ndarray, "frames bins"], size: int, hop: i
 def _gains(
     spectra: Complex64[np.ndarray, "frames bins"], profile: NoiseProfile, reduction_db: float
 ) -> Float32[np.ndarray, "inner bins"]:
-    from scipy.ndimage import uniform_filter1d
+    from scipy.ndimage import uniform_filter
 
-    power = uniform_filter1d(np.abs(spectra) ** 2, _SMOOTH_BINS, axis=1, mode="nearest")
-    summed = np.cumsum(np.pad(power, ((1, 0), (0, 0))), axis=0, dtype=np.float64)
-    mean = (summed[_SMOOTH_FRAMES:] - summed[:-_SMOOTH_FRAMES]) / _SMOOTH_FRAMES
+    reach = _SMOOTH_FRAMES // 2
+    mean = uniform_filter(np.abs(spectra) ** 2, (_SMOOTH_FRAMES, _SMOOTH_BINS), mode="nearest")[reach:-reach]
     above = np.maximum(mean - _STEEPNESS * profile.power, 0.0)
     floor = 10.0 ** (-reduction_db / 20.0)
     return np.maximum(above / np.maximum(above + profile.power, 1e-30), floor).astype(np.float32)

@@ -154,13 +154,7 @@ def _check(rows: Float32[np.ndarray, "..."], wanted: int, encoder: FrameSoundEnc
 def split_at_changes(
     features: Float32[np.ndarray, "frames d"], hop_s: float, settings: SoundChangeSettings = _USUAL_CHANGES
 ) -> Int[np.ndarray, " edges"]:
-    """Return where a sequence of unit vectors is divided: 0, the first frame of each further stretch, their number.
-
-    Args:
-        features: in the order of time; none gives the single edge 0.
-        hop_s: seconds from one to the next.
-        settings: how.
-    """
+    """Return where a sequence of unit vectors is divided: 0, the first frame of each further stretch, their number."""
     count = len(features)
     price = settings.change_s / hop_s
     shortest = max(1, round(price))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Float32, Float64, Int32
 
-from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
 from avlmaps.maps.fusion import kernels
 from avlmaps.maps.fusion.sensor import NONE, FusionSettings, SensorModel
@@ -47,52 +47,36 @@ class PixelLookup:
         bool, Float64[np.ndarray, "4 4"], tuple[float, float, float, float], tuple[int, int], tuple[int, int]
     ]
 
-    @property
-    def longest_ray(self) -> float:
-        """Distance from the camera, per metre of depth, of the farthest pixel; at least 1."""
-        return float(np.sqrt(np.square(self.x).max() + np.square(self.y).max() + 1.0))
-
 
 def look_up(rig: Rig, feature_rows: int, feature_columns: int) -> PixelLookup:
     """Prepare the lookup for a rig and a feature map that covers the colour picture evenly (0 x 0 for none)."""
     depth, rgb = rig.depth, rig.rgb
     x = (np.arange(depth.width) + 0.5 - depth.cx) / depth.fx
     y = (np.arange(depth.height) + 0.5 - depth.cy) / depth.fy
-    column, row = _colour_place(rig, depth, rgb, x, y)
+    column, row = rgb.fx * x + rgb.cx, rgb.fy * y + rgb.cy
+    if rig.registered:  # exact, where a division and a multiplication by fx leave rounding
+        column = (np.arange(depth.width) + 0.5) * (rgb.width / depth.width)
+        row = (np.arange(depth.height) + 0.5) * (rgb.height / depth.height)
     tables = (
-        _cells(column, rgb.width, rgb.width),
-        _starts(_cells(row, rgb.height, rgb.height), rgb.width),
-        _cells(column, rgb.width, feature_columns),
-        _starts(_cells(row, rgb.height, feature_rows), feature_columns),
+        _cells(column, rgb.width, rgb.width, 1),
+        _cells(row, rgb.height, rgb.height, rgb.width),
+        _cells(column, rgb.width, feature_columns, 1),
+        _cells(row, rgb.height, feature_rows, feature_columns),
     )
-    same_axes = np.array_equal(rig.rgb_from_depth, np.eye(4))
-    intrinsics = (float(rgb.fx), float(rgb.fy), float(rgb.cx), float(rgb.cy))
     projection = (
-        not same_axes,
+        not np.array_equal(rig.rgb_from_depth, np.eye(4)),
         np.array(rig.rgb_from_depth, np.float64, order="C"),
-        intrinsics,
+        (float(rgb.fx), float(rgb.fy), float(rgb.cx), float(rgb.cy)),
         (rgb.height, rgb.width),
         (feature_rows, feature_columns),
     )
     return PixelLookup(x, y, tables, projection)
 
 
-def _colour_place(
-    rig: Rig, depth: Pinhole, rgb: Pinhole, x: Float64[np.ndarray, " wd"], y: Float64[np.ndarray, " hd"]
-) -> tuple[Float64[np.ndarray, " wd"], Float64[np.ndarray, " hd"]]:
-    if rig.registered:  # exact, where a division and a multiplication by fx would leave rounding
-        columns, rows = np.arange(depth.width) + 0.5, np.arange(depth.height) + 0.5
-        return columns * (rgb.width / depth.width), rows * (rgb.height / depth.height)
-    return rgb.fx * x + rgb.cx, rgb.fy * y + rgb.cy
-
-
-def _cells(place: Float64[np.ndarray, " n"], size: int, cells: int) -> Int32[np.ndarray, " n"]:
+def _cells(place: Float64[np.ndarray, " n"], size: int, cells: int, apart: int) -> Int32[np.ndarray, " n"]:
     inside = (place >= 0.0) & (place < size) & (cells > 0)
-    return np.where(inside, np.floor(np.where(inside, place, 0.0) * (cells / size)), -1.0).astype(np.int32)
-
-
-def _starts(row: Int32[np.ndarray, " n"], columns: int) -> Int32[np.ndarray, " n"]:
-    return np.where(row >= 0, row * np.int32(columns), -1).astype(np.int32)
+    cell = np.floor(np.where(inside, place, 0.0) * (cells / size)) * apart
+    return np.where(inside, cell, -1.0).astype(np.int32)
 
 
 class _Scratch:
@@ -100,9 +84,10 @@ class _Scratch:
 
     def __init__(self, height: int, width: int, *, with_spread: bool) -> None:
         pixels, spreads = height * width, kernels.SPREAD_COLUMNS - 1 if with_spread else 0
-        whole, real = np.dtype(np.int64), np.dtype(np.float64)
-        row = whole, real, whole, np.dtype(np.int32), np.dtype(np.int32)
-        self.row: kernels.Row = tuple(np.empty(width, dtype) for dtype in row)  # pyright: ignore[reportAttributeAccessIssue]
+        self.row: kernels.Row = (
+            np.empty(width, np.int64), np.empty(width), np.empty(width, np.int64), np.empty(width, np.int32),
+            np.empty(width, np.int32),
+        )  # fmt: skip
         self.voxels: kernels.FrameVoxels = (
             np.empty(_FIRST_SLOTS, np.int64), np.empty(_FIRST_SLOTS, np.int32), np.empty(pixels, np.int64),
             np.empty((pixels, kernels.SUM_COLUMNS)), np.empty((pixels, spreads)),
@@ -217,7 +202,8 @@ class VoxelAccumulator(VoxelTable):
             if known_rig is rig and (known_rows, known_columns) == (feature_rows, feature_columns):
                 return lookup
         lookup = look_up(rig, feature_rows, feature_columns)
-        reach = lookup.longest_ray * self.settings.max_depth_m / self.grid.voxel_size_m
+        longest_ray = np.sqrt(np.square(lookup.x).max() + np.square(lookup.y).max() + 1.0)  # per metre of depth
+        reach = longest_ray * self.settings.max_depth_m / self.grid.voxel_size_m
         if reach >= kernels.REACH_VOXELS - 1:
             raise MapError(
                 f"A depth of {self.settings.max_depth_m} m spans {reach:.0f} voxels of {self.grid.voxel_size_m} m, and "

@@ -7,11 +7,13 @@ how parts of a map can be carved as one.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, UInt8, UInt16
 
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.columns import take
 from avlmaps.core.progress import progress, silence_progress
 from avlmaps.maps.fusion.kernels import SHARP_UNITS, count_frames, find_rows
 from avlmaps.maps.fusion.sensor import SensorModel
@@ -95,8 +97,8 @@ def count_through(
     """Return how many frames see through each voxel.
 
     A frame does when every ray that may meet the voxel is free for a voxel's edge behind it; a pixel without depth in
-    the block of such a ray makes that unknown, and the frame does not count. Voxels are grouped into cubes, and a cube
-    whose sphere lies outside of the picture, or farther than anything that the frame sees, is passed over.
+    the block of such a ray makes that unknown, and the frame does not count. Cubes of voxels that lie outside of the
+    picture, or farther than anything that the frame sees, are passed over.
     """
     intrinsics = (float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy), camera.width, camera.height)
     cube = np.asarray(index, np.int32) >> _CUBE_SHIFT
@@ -115,9 +117,7 @@ def count_through(
     for part, some in progress(batches, "carving", total=frames, size=lambda one: len(one[0].clear_pose[one[1]])):
         clear, pose = np.array(part.clear_mm[some]), np.array(part.clear_pose[some], np.float64)
         visible = _visible(middle_m, reach_m, camera, clear, pose)
-        count_frames(
-            grouped, starts, visible, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through
-        )  # fmt: skip
+        count_frames(grouped, starts, visible, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through)
     counts = np.empty_like(through)
     counts[order] = through
     return counts
@@ -159,7 +159,8 @@ def count_where_it_matters(
     return counts
 
 
-_Count = Callable[[Int32[np.ndarray, "n 3"]], Int32[np.ndarray, " n"]]
+Count = Callable[[Int32[np.ndarray, "n 3"]], Int32[np.ndarray, " n"]]
+"""Returns how many frames see through each of some voxels."""
 
 FEWEST_THROUGH = 2  # frames: one may have a wrong pose
 THROUGH_SHARE = 0.5  # a voxel goes when more frames see through it than this share of those that hit it
@@ -167,34 +168,20 @@ SPECK_VIEWS = 2  # a group of which a voxel is hit by more frames is not a speck
 MOST_REACH = 4.0  # voxels: a smear is looked for no farther
 
 
-def clean(
-    evidence: VoxelViews,
-    views: Sequence[FreeViews],
-    camera: Pinhole,
-    grid: GridSpec,
-    sensor: SensorModel,
-    count: _Count | None = None,
-) -> tuple[Bool[np.ndarray, " n"], dict[str, int]]:
-    """Return which voxels are a surface, and how many are not: ``seen_through``, ``smeared``, ``specks``.
+def clean(evidence: VoxelViews, sensor: SensorModel, count: Count) -> tuple[Bool[np.ndarray, " n"], dict[str, int]]:
+    """Return which voxels are a surface, and how many are not: ``seen_through``, ``smeared``, ``specks``."""
+    kept, removed = np.ones(len(evidence), bool), dict[str, int]()
 
-    ``views`` says where the frames of a depth camera saw freely. It does not count where ``count`` gives how many
-    frames see through each of some voxels.
-    """
-    count = count or (lambda index: count_through(index, grid, camera, views))
-    kept = np.ones(len(evidence), bool)
-    removed: dict[str, int] = {}
-    for name, rule in (("seen_through", _through), ("smeared", _smeared), ("specks", _specks)):
+    def through(some: VoxelViews) -> Bool[np.ndarray, " m"]:
+        return seen_through(count(some.index), some.views) if sensor.carve else np.zeros(len(some), bool)
+
+    rules = {"seen_through": through, "smeared": partial(_smeared, sensor), "specks": partial(_specks, sensor)}
+    for name, rule in rules.items():
         there = np.flatnonzero(kept)
-        gone = rule(evidence.only(kept), count, sensor)
+        gone = rule(take(evidence, kept))
         kept[there[gone]] = False
         removed[name] = int(gone.sum())
     return kept, removed
-
-
-def _through(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
-    if not sensor.carve:
-        return np.zeros(len(evidence), bool)
-    return seen_through(count(evidence.index), evidence.views)
 
 
 def seen_through(through: Int32[np.ndarray, " n"], views: Int32[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
@@ -213,7 +200,7 @@ def smear_reach(evidence: VoxelViews, sensor: SensorModel) -> Float64[np.ndarray
     return np.minimum(sensor.smear_sigmas * 0.5 * np.sqrt(1.0 / exact - 1.0), MOST_REACH)
 
 
-def _smeared(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
+def _smeared(sensor: SensorModel, evidence: VoxelViews) -> Bool[np.ndarray, " n"]:
     smeared = np.zeros(len(evidence), bool)
     if sensor.smear_sigmas == 0.0 or not len(evidence):
         return smeared
@@ -228,7 +215,7 @@ def _smeared(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[n
     return smeared
 
 
-def _specks(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
+def _specks(sensor: SensorModel, evidence: VoxelViews) -> Bool[np.ndarray, " n"]:
     if sensor.speck_voxels == 0 or len(evidence) == 0:
         return np.zeros(len(evidence), bool)
     from scipy.sparse import csr_matrix

@@ -103,21 +103,11 @@ def trace(
 ):
     """Measure one frame: its voxels, with what they get of colour and hits, and its pairs of voxel and cell.
 
-    Args:
-        depth: metres.
-        rays: (x (w,), y (h,)), camera-frame direction of each column and row at z = 1.
-        pose: (rotation (3, 3), translation (3,), the camera's voxel (3,) int64).
-        limits: (voxel size, least and greatest depth in metres, 1 / (2 variance), error of a depth in half voxels at 0
-            m and its growth with the depth's square).
-        rgb: colours of the picture's pixels.
-        tables: see `accumulator.PixelLookup`.
-        projection: likewise.
-        row: working memory.
-        voxels: receives the voxels.
-        pairs: receives the pairs.
-
-    Returns:
-        Counts of points, of voxels and of pairs; no voxels where there are too many for the table.
+    ``rays`` are the camera-frame directions of columns and rows at z = 1; ``pose`` is rotation, translation and the
+    camera's voxel; ``limits`` are the voxel size, least and greatest depth in metres, 1 / (2 variance), and the error
+    of a depth in half voxels at 0 m and its growth with the depth's square. For ``tables`` and ``projection`` see
+    `accumulator.PixelLookup`. Voxels and pairs are filled in; returned are the counts of points, voxels and pairs, -1
+    where there are too many voxels for the table.
     """
     keys, weights, sharp, picture, cells = row
     slot_key, slot_voxel, voxel_key, voxel_sum, voxel_spread = voxels
@@ -379,16 +369,9 @@ def count_frames(
 ):
     """Add to each voxel how many views see through it: all rays that may meet it are free for an edge behind it.
 
-    Args:
-        index: voxels, cube by cube.
-        starts: where the voxels of each cube begin, and where the last end.
-        visible: which cubes each view may see through.
-        voxel_size: metres.
-        clear: millimetres up to which each block of pixels is free.
-        size: edge of a block, pixels.
-        camera: (fx, fy, cx, cy, width, height).
-        pose: world_from_camera.
-        through: added to.
+    Voxels lie cube by cube: ``starts`` is where those of each cube begin, and where the last end; ``visible`` which
+    cubes each view may see through. ``clear`` is millimetres up to which each block of ``size`` pixels is free;
+    ``camera`` is fx, fy, cx, cy, width, height.
     """
     fx, fy, cx, cy, width, height = camera
     ball = 0.5 * np.sqrt(3.0) * voxel_size  # the sphere round a voxel

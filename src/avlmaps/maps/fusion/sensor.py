@@ -11,7 +11,7 @@ of the depth: σ(z) = noise_m + noise_per_m · z².
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -75,16 +75,7 @@ PERFECT = SensorModel()
 KINECT = SensorModel(
     0.0012, 0.0019, worst_voxels=1.25, edge_sigmas=4.0, steepest_deg=85.0, smear_sigmas=2.0, speck_voxels=4
 )
-REALSENSE = SensorModel(
-    0.001,
-    0.0038,
-    worst_voxels=1.5,
-    edge_sigmas=4.0,
-    steepest_deg=85.0,
-    smear_sigmas=2.0,
-    smear_ratio=6.0,
-    speck_voxels=4,
-)
+REALSENSE = replace(KINECT, noise_m=0.001, noise_per_m=0.0038, worst_voxels=1.5, smear_ratio=6.0)
 NONE = SensorModel(carve=False)
 
 MODELS: dict[SensorName, SensorModel] = {"kinect": KINECT, "realsense": REALSENSE, "perfect": PERFECT, "none": NONE}

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
-from avlmaps.core.columns import take
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion.kernels import SPREAD_COLUMNS, Table, find_rows
 from avlmaps.maps.types import Voxels
@@ -55,10 +54,6 @@ class VoxelViews:
 
     def __len__(self) -> int:
         return len(self.index)
-
-    def only(self, kept: Bool[np.ndarray, " n"]) -> "VoxelViews":
-        """Return some of the voxels."""
-        return take(self, kept)
 
 
 class VoxelTable:

@@ -131,22 +131,14 @@ def _log_density(spread_deg: float, outliers: float) -> Float[np.ndarray, "b o"]
     return np.log(density)[step].astype(np.float32)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BearingEvidence:
-    """What the directions of some sounds say."""
-
-    heard: list[Float[np.ndarray, " c"]]  # for each sound the log-likelihood of each candidate
-    device: Device | None  # what all of them say of it; None without directions
-
-
 def evidence_of_bearings(
     heard: Sequence[Bearings],
     walls: Sequence[Walls],
     candidates: Candidates,
     expected: Sequence[Float[np.ndarray, " c"]],
     known_rad: tuple[float, float] | None = None,
-) -> BearingEvidence:
-    """Return the log-likelihood of each candidate for each sound, and what was found out about the device.
+) -> tuple[list[Float[np.ndarray, " c"]], Device | None]:
+    """Return the log-likelihood of each candidate for each sound, and what all say of the device, if they say anything.
 
     ``expected`` is the log-likelihood of each candidate without the sound, and ``known_rad`` the device's offset and
     its standard deviation, as an earlier recording has shown them.
@@ -183,7 +175,7 @@ def evidence_of_bearings(
                 parts = np.concatenate([parts, _log_sum(value.T)[None]])
         result.append(_log_sum(parts) + high)
     sounds = int((np.ptp(of_device, axis=(1, 2)) > 0.0).sum())  # those of which no direction was said have all alike
-    return BearingEvidence(result, _device(known, sounds) if sounds else None)
+    return result, _device(known, sounds) if sounds else None
 
 
 def _known_before(known_rad: tuple[float, float] | None) -> Float[np.ndarray, " o"]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float
+from avlmaps.core.columns import concat
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import apply, from_rotation, inverse, rotation_to_level
 from avlmaps.core.timeline import Trajectory
@@ -65,15 +66,8 @@ class ArrayCalibration:
 def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float] | None = None) -> ArrayCalibration:
     """Refine the places of the microphones, measured to centimetres, and the delays of the channels.
 
-    Args:
-        track: with its microphones.
-        walk: the camera's poses.
-        between_s: when the one source sounds, the recording's time; None for all of the track.
-
-    Raises:
-        RecordingError: there is no array, the sound is too little or of no still source, or the walk does not determine
-            the array; with the numbers.
-        AudioError: the track cannot be read.
+    One source sounds between ``between_s``, the recording's time, or all the time. ``RecordingError``: there is no
+    array, the sound is too little or of no still source, or the walk does not determine the array; with the numbers.
     """
     array = track.microphones
     if array is None or len(array) < 2:
@@ -164,11 +158,7 @@ def _frames(track: AudioTrack, array: Microphones, begin_s: float, end_s: float)
         found = correlate(sound.samples, sound.rate_hz, at_s, 0.0, longest_m, delay_s=array.delay_s, high_hz=_HIGH_HZ)
         pieces.append(found.take(loudest_frames(found, each)))
     first = pieces[0]
-    found = Correlations(
-        np.concatenate([piece.at_s for piece in pieces]), first.pair,
-        np.concatenate([piece.curve for piece in pieces]), first.first_s, first.step_s,
-        np.concatenate([piece.weight for piece in pieces]),
-    )  # fmt: skip
+    found = replace(concat(pieces, first_s=first.first_s, step_s=first.step_s), pair=first.pair)
     return found.take(np.flatnonzero((found.at_s >= begin_s) & (found.at_s <= end_s)))
 
 
@@ -232,15 +222,11 @@ class _Fit:
     ) -> Float[np.ndarray, " n"]:
         from scipy.optimize import least_squares
 
-        whole = solution.copy()
-
         def residual(values: Float[np.ndarray, " k"]) -> np.ndarray:
-            whole[chosen] = values
-            return self.residual_s(whole, measured) / _SPREAD_S
+            return self.residual_s(_with(solution, chosen, values), measured) / _SPREAD_S
 
         found = least_squares(residual, solution[chosen], loss="cauchy", x_scale="jac", max_nfev=_MOST_TRIES)
-        whole[chosen] = found.x
-        return whole
+        return _with(solution, chosen, found.x)
 
     def covariance(
         self, solution: Float[np.ndarray, " n"], measured: _Delays, hold_heights: bool
@@ -253,9 +239,7 @@ class _Fit:
             return unknown
 
         def residual(values: Float[np.ndarray, " k"]) -> np.ndarray:
-            whole = solution.copy()
-            whole[free] = values
-            return self.residual_s(whole, measured)
+            return self.residual_s(_with(solution, free, values), measured)
 
         slope = approx_fprime(solution[free], residual, 1e-6)
         # Pairs repeat one another (m - 1 of m (m - 1) / 2 are independent), and so do frames that overlap by half.
@@ -315,6 +299,12 @@ class _Fit:
         delay_s = self.found.first_s + (middle - reach - 1 + best + part) * step_s
         used = inside & is_peak & (top > _LEAST_PEAK * self.found.weight[:, None])
         return np.where(used, delay_s.astype(np.float64), np.nan)
+
+
+def _with(solution: Float[np.ndarray, " n"], chosen: np.ndarray, values: Float[np.ndarray, " k"]) -> np.ndarray:
+    whole = solution.copy()
+    whole[chosen] = values
+    return whole
 
 
 def _scale(residual: Float[np.ndarray, " k"]) -> float:

@@ -186,7 +186,7 @@ class Walls:
         if not len(nodes):
             return np.full(place_xy.shape, np.nan), np.zeros(len(place_xy))
         start = int(np.argmin(((middle - ear_xy) ** 2).sum(axis=1)))
-        length, before = dijkstra(_graph(number, step_m), indices=start, return_predecessors=True)
+        length, before = dijkstra(_graph(number, step_m), directed=False, indices=start, return_predecessors=True)
         seen = ~self.behind(ear_xy, middle) | (np.arange(len(nodes)) == start)
         gate = np.full(len(nodes), -1)
         for node in np.argsort(length, kind="stable").tolist():
@@ -213,22 +213,14 @@ class Walls:
 def _graph(number: Int[np.ndarray, "nx ny"], step_m: float) -> Any:
     from scipy.sparse import csr_matrix
 
-    rows: list[Int[np.ndarray, " k"]] = []
-    columns: list[Int[np.ndarray, " k"]] = []
-    lengths: list[Float[np.ndarray, " k"]] = []
+    pairs: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
         here = number[: number.shape[0] - dx, max(-dy, 0) : number.shape[1] - max(dy, 0)]
         there = number[dx:, max(dy, 0) : number.shape[1] - max(-dy, 0)]
         both = (here >= 0) & (there >= 0)
-        rows.append(here[both])
-        columns.append(there[both])
-        lengths.append(np.full(int(both.sum()), step_m * np.hypot(dx, dy)))
-    size = int(number.max()) + 1
-    one, other = np.concatenate(rows), np.concatenate(columns)
-    return csr_matrix(
-        (np.tile(np.concatenate(lengths), 2), (np.concatenate([one, other]), np.concatenate([other, one]))),
-        shape=(size, size),
-    )
+        pairs.append((here[both], there[both], np.full(int(both.sum()), step_m * np.hypot(dx, dy))))
+    one, other, length = (np.concatenate(column) for column in zip(*pairs, strict=True))
+    return csr_matrix((length, (one, other)), shape=(int(number.max()) + 1,) * 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -205,19 +205,22 @@ def steer_pairs(
     """
     total = np.zeros((len(found.pair), len(place_m)), np.float32)
     place = np.ascontiguousarray(place_m.T, np.float32)
-    scale, last = np.float32(1.0 / (SPEED_M_S * found.step_s)), found.curve.shape[2] - 2
+    scale = np.float32(1.0 / (SPEED_M_S * found.step_s))
     first = np.float32(found.first_s / found.step_s)
     for curve, ears in zip(found.curve, ear_m.astype(np.float32), strict=True):
         away = np.stack([
             np.sqrt((place[0] - x) ** 2 + (place[1] - y) ** 2 + (place[2] - z) ** 2) for x, y, z in ears
         ]) * scale  # fmt: skip
         for number, (one, other) in enumerate(found.pair):
-            at = away[one] - away[other] - first
-            whole = np.clip(at.astype(np.int32), 0, last)
-            part = at - whole
-            own = curve[number]
-            total[number] += own[whole] * (1.0 - part) + own[whole + 1] * part
+            total[number] += at_delay(curve[number], away[one] - away[other] - first)
     return total.astype(np.float64)
+
+
+def at_delay(curve: Float32[np.ndarray, "*p l"], at: Float32[np.ndarray, " c"]) -> Float32[np.ndarray, "*p c"]:
+    """Return curves between their steps; ``at`` is in steps from the first."""
+    whole = np.clip(at.astype(np.int32), 0, curve.shape[-1] - 2)
+    part = at - whole.astype(np.float32)
+    return curve[..., whole] * (1.0 - part) + curve[..., whole + 1] * part
 
 
 _WINDOW_S = 0.3

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float16, Int
-from avlmaps.core.errors import AudioError
 from avlmaps.core.poses import apply, from_rotation, rotation_to_level
 from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
@@ -117,14 +116,8 @@ def carry_evidence(
     """Return the evidence of all sounds of some maps over the surfaces of one; None where it has no candidates.
 
     A candidate has the mean of the nearest ones of the sound's own map, nearer ones counting more. Where its own map
-    had none the sound is as likely as there, and the place less so with the distance.
-
-    Args:
-        parts: the evidence of each map and world_from_its_world, in the order of the sounds; of one number of
-            microphones.
-        voxel_m: middles of the voxels of the map, world.
-        robot_m: where the robot was, world.
-        up_in_world: unit vector.
+    had none the sound is as likely as there, and the place less so with the distance. The maps, each with
+    world_from_its_world, are in the order of the sounds, and of one number of microphones.
     """
     level = rotation_to_level(up_in_world)
     candidates = candidates_of(voxel_m @ level.T, robot_m @ level.T)
@@ -189,13 +182,8 @@ def find_sources(
 ) -> SourceEvidence | None:
     """Return the evidence of every sound over the candidates of a map; None where nothing can be said.
 
-    Args:
-        track: with its microphones, with what a device said of directions, or both.
-        walk: the camera's poses in the world.
-        spans_s: onset and offset of each sound, the recording's time.
-        voxel_m: middles of the map's voxels, world.
-        up_in_world: unit vector.
-        signs_by_s: the sounds by which the signs of the channels are found; these by default.
+    The track has its microphones, what a device said of directions, or both. Spans are onset and offset of each sound;
+    by those of ``signs_by_s``, or all, the signs of the channels are found. Poses, voxels and up are in the world.
     """
     microphones, directions = track.microphones, track.directions
     if (microphones is None and directions is None) or not len(spans_s) or not len(voxel_m):
@@ -230,14 +218,14 @@ def find_sources(
         else:
             alone = expected_alone(walked, span, candidates, walls[layer], settings)
             heard.append(EventEvidence(np.zeros(len(candidates)), None, alone))
-    said = None
+    device = None
     if directions is not None:
         bearings = [Bearings.of(directions, walked, (float(begin_s), float(end_s))) for begin_s, end_s in spans_s]
         expected = [one.expected for one in heard]
-        said = evidence_of_bearings(bearings, layers, candidates, expected, directions.known_rad)
-        if said.device is not None:
-            say(f"note: {said.device.sentence}")
-        both = [one.heard + other for one, other in zip(heard, said.heard, strict=True)]
+        said, device = evidence_of_bearings(bearings, layers, candidates, expected, directions.known_rad)
+        if device is not None:
+            say(f"note: {device.sentence}")
+        both = [one.heard + other for one, other in zip(heard, said, strict=True)]
         heard = [replace(one, heard=total - total.max()) for one, total in zip(heard, both, strict=True)]
     return SourceEvidence(
         place=(candidates.place_m.astype(np.float64) @ level).astype(np.float32),
@@ -246,7 +234,7 @@ def find_sources(
         expected=np.maximum(np.stack([one.expected for one in heard]), LEAST).astype(np.float16),
         moving=np.array([moves(one, plan, candidates.prior, settings) for one in heard], np.uint8),
         channels=np.array([channels], np.int64),
-        device=np.zeros((0, 4)) if said is None or said.device is None else said.device.row[None],
+        device=np.zeros((0, 4)) if device is None else device.row[None],
     )
 
 
@@ -344,12 +332,3 @@ def _joined(new: SourceEvidence, before: SourceEvidence) -> SourceEvidence:
         new, heard=np.concatenate([new.heard, heard]), expected=np.concatenate([new.expected, expected]),
         moving=np.concatenate([new.moving, before.moving]),
     )  # fmt: skip
-
-
-def require_fit(microphones: Microphones | None, channels: int) -> None:
-    """Refuse a piece of sound whose channels are not those of the microphones."""
-    if microphones is not None and channels != len(microphones):
-        raise AudioError(
-            f"A piece of sound has {channels} channel(s), but {len(microphones)} microphone(s) are described; give one "
-            "position for each channel."
-        )

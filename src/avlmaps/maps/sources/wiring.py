@@ -19,6 +19,7 @@ from avlmaps.maps.sources.correlation import (
     SPEED_M_S,
     Correlations,
     SourceSettings,
+    at_delay,
     loudest_of_sound,
     signs_of,
 )
@@ -168,12 +169,9 @@ def _pair_fits(
 ) -> Float[np.ndarray, "p m m c"]:
     count = ear.shape[1]
     total = np.zeros((len(found.pair), count, count, len(place)), np.float32)
-    last = found.curve.shape[2] - 2
     for curve, ears in zip(found.curve, ear, strict=True):
         away = np.linalg.norm(place[None] - ears[:, None], axis=2) / (SPEED_M_S * found.step_s)
         for one, other in itertools.permutations(range(count), 2):
             at = away[one] - away[other] - found.first_s / found.step_s
-            whole = np.clip(at.astype(np.int64), 0, last)
-            part = (at - whole).astype(np.float32)
-            total[:, one, other] += curve[:, whole] * (1.0 - part) + curve[:, whole + 1] * part
+            total[:, one, other] += at_delay(curve, at.astype(np.float32))
     return total / _greatest(found)

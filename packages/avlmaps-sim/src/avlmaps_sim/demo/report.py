@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -204,16 +204,15 @@ def _home(sheet: Sheet, home: TopView, evidence: "Evidence") -> str:
 def _strip(recording: "Recording", avlmap: "AVLMap", moments: int) -> Strip:
     from avlmaps.core.progress import progress
     from avlmaps.maps.estimate import Start
-    from avlmaps.maps.gravity import GroundedRecording
     from avlmaps.maps.settings import DEFAULTS
     from avlmaps.perception.embedded.pixels import EmbeddedPixels
 
     encoder = EmbeddedPixels()
-    whole = GroundedRecording(recording, Start.of(recording, DEFAULTS).ground)
+    ground = Start.of(recording, DEFAULTS).ground
     index = np.unique(np.linspace(0, len(recording) - 1, moments).round().astype(int))
     frames = []
     for number in progress(index, "looking again"):
-        frame = whole.frame(int(number))
+        frame = replace(recording.frame(int(number)), ground=ground)
         feature = encoder.encode(frame)
         category = np.where(feature.any(axis=-1), (feature @ encoder.codes.T).argmax(axis=-1), -1)
         frames.append((int(number), frame.rgb, frame.depth_m, category))
