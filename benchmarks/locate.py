@@ -27,7 +27,7 @@ import cv2  # noqa: E402
 import numpy as np  # noqa: E402
 
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
-from avlmaps.core.columns import concat  # noqa: E402
+from avlmaps.core.columns import concat, take  # noqa: E402
 from avlmaps.core.poses import inverse, rotation_angle_rad  # noqa: E402
 from avlmaps.maps.types import Keyframes  # noqa: E402
 from avlmaps.perception.encoders import Encoders  # noqa: E402
@@ -173,7 +173,7 @@ def pairs_of(stored: LocatableMap, recording: Recording, between_deg: tuple[int,
         if len(fits) and made < count:
             made += 1
             (truth,) = photos_of(recording, [int(rng.choice(fits))])
-            yield replace(stored, keyframes=keyframes.take(np.array([row]))), truth
+            yield replace(stored, keyframes=take(keyframes, np.array([row]))), truth
 
 
 def measure(method: str, recording: Recording, elsewhere: Sequence[Picture], photos: int, pairs: int) -> list[Any]:

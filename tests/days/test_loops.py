@@ -153,7 +153,7 @@ def test_some_keyframes_have_their_own_keypoints_and_pictures() -> None:
     offsets = np.concatenate([[0], np.cumsum(size)])
     pictures = np.concatenate([[0], np.cumsum(10 * size)])
     keyframes = replace(
-        stored(np.tile(np.eye(4), (COUNT, 1, 1))).data.keyframes.take(np.arange(4)),
+        take(stored(np.tile(np.eye(4), (COUNT, 1, 1))).data.keyframes, np.arange(4)),
         offsets=offsets, xy=np.arange(18, dtype=np.float32).reshape(9, 2),
         descriptors=rng.standard_normal((9, 4)).astype(np.float16),
         points_world=rng.standard_normal((9, 3)).astype(np.float32),

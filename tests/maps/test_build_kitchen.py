@@ -36,14 +36,6 @@ def test_the_kitchen_is_of_a_kitchens_size_and_stands_upright(kitchen: MapData) 
 
 @pytest.mark.nightly
 @pytest.mark.shared
-def test_its_voxels_have_colours_and_features_of_unit_length(kitchen: MapData) -> None:
-    length = np.linalg.norm(kitchen.voxels.feature.astype(np.float32), axis=1)
-    assert (np.abs(length - 1.0) < 2e-3).mean() > 0.9
-    assert 20 < kitchen.voxels.rgb.mean() < 230
-
-
-@pytest.mark.nightly
-@pytest.mark.shared
 def test_its_keyframes_keep_points_where_their_cameras_looked(kitchen: MapData) -> None:
     keyframes = kitchen.keyframes
     assert len(keyframes) >= 8 and keyframes.offsets[-1] > 100 * len(keyframes)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from build_fakes import SETTINGS, Corners, Places, Walk, Words, _card
+from msgspec import structs
 
 from avlmaps.maps.build import build_map
 from avlmaps.maps.finish import feature_doubts
@@ -97,7 +98,7 @@ def test_views_and_sounds_that_are_all_the_same_are_a_doubt() -> None:
     stored = made(Words(), views=ConstantViews())
     voxels, keyframes, sounds = stored.voxels, stored.keyframes, stored.sounds
     assert not list(feature_doubts(voxels, keyframes, sounds, stored.info.models))  # of two keyframes nothing is known
-    models = {**stored.info.models, "sounds": replace_id(stored.info.models["views"])}
+    models = {**stored.info.models, "sounds": structs.replace(stored.info.models["views"], id="fake/ears")}
     same = np.tile(np.float32([0.6, 0.8, 0.0]), (9, 1))
     alike = voxels, replace(keyframes, view=same, world_from_camera=WALK.world_from_camera), sounds
     alike = *alike[:2], replace(sounds, feature=same), models
@@ -106,13 +107,6 @@ def test_views_and_sounds_that_are_all_the_same_are_a_doubt() -> None:
     assert "sounds by fake/ears are the same in all 9 stretches" in sounds
     same[4, 0] = 0.5
     assert not list(feature_doubts(*alike))
-
-
-def replace_id(model: Any) -> Any:
-    """Return a model's entry as that of ears."""
-    from msgspec import structs
-
-    return structs.replace(model, id="fake/ears")
 
 
 def test_the_end_of_a_mapper_map_doubts_features_and_a_silent_microphone() -> None:

@@ -17,7 +17,6 @@ from avlmaps.maps.fusion.free_space import (
     clean,
     count_through,
     free_views,
-    seen_through,
     smear_reach,
 )
 from avlmaps.maps.fusion.sensor import KINECT, NONE, PERFECT, SensorModel
@@ -146,15 +145,6 @@ def test_what_moved_away_goes_and_the_wall_behind_it_stays():
 def test_one_frame_with_a_wrong_pose_removes_nothing():
     evidence = evidence_of([[0, 0, 15]])
     assert cleaned(evidence, [views_of([frame_of(3.0)])], PERFECT)[0].all()
-
-
-@given(st.integers(0, 50), st.integers(1, 50))
-def test_more_looks_through_never_bring_a_voxel_back_and_more_hits_never_remove_it(through, views):
-    def gone(t, v):
-        return bool(seen_through(np.array([t], np.int32), np.array([v], np.int32))[0])
-
-    assert gone(through + 1, views) or not gone(through, views)
-    assert gone(through, views) or not gone(through, views + 1)
 
 
 @given(seeds)

@@ -18,12 +18,7 @@ from avlmaps.core.poses import apply
 from avlmaps.maps.build import build_map
 from avlmaps.maps.corrected import Corrected, correct_map
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.free_space import (
-    count_through,
-    count_where_it_matters,
-    free_views,
-    seen_through,
-)
+from avlmaps.maps.fusion.free_space import count_through, count_where_it_matters, free_views, seen_through
 from avlmaps.maps.fusion.sensor import PERFECT
 from avlmaps.maps.fusion.submaps import MovedSubmaps, in_steps, submap_of
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable

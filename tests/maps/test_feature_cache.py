@@ -18,13 +18,7 @@ from safetensors.numpy import load_file
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map
-from avlmaps.perception.cache import (
-    CacheSettings,
-    FeatureStore,
-    cache_note,
-    cached,
-    with_cache,
-)
+from avlmaps.perception.cache import CacheSettings, FeatureStore, cache_note, cached, with_cache
 from avlmaps.perception.conformance import check
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models import ModelSettings, using_models

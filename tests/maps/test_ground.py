@@ -13,28 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.maps.gravity import (
-    USUAL_HEIGHT_M,
-    Expected,
-    FoundGround,
-    Sight,
-    find_ground,
-    ground_of_sights,
-    sight_of,
-)
+from avlmaps.maps.gravity import USUAL_HEIGHT_M, Expected, FoundGround, Sight, find_ground, ground_of_sights, sight_of
 from avlmaps.recordings.types import Frame
-from helpers.filmed_rooms import (
-    UP,
-    Look,
-    climb,
-    desk_walk,
-    film,
-    moved,
-    office,
-    room,
-    stairs,
-    table,
-)
+from helpers.filmed_rooms import UP, Look, climb, desk_walk, film, moved, office, room, stairs, table
 
 
 def errors_m(frames: Sequence[Frame], true_m: float | Sequence[float], found: FoundGround | None = None) -> np.ndarray:

@@ -177,13 +177,8 @@ class Brightness:
 def test_what_is_kept_of_a_keyframe_fits_together() -> None:
     recording = RoomWalk(frames=40)
     chosen = select_keyframes(recording, KeyframeSettings(translation_m=2.0, rotation_deg=90.0, thumbnail_width_px=64))
-    keyframes, state = perceive_keyframes(
-        recording,
-        chosen,
-        Encoders.named("colours"),
-        np.random.default_rng(0),
-        settings=KeyframeSettings(thumbnail_width_px=64),
-    )
+    rng, narrow = np.random.default_rng(0), KeyframeSettings(thumbnail_width_px=64)
+    keyframes, state = perceive_keyframes(recording, chosen, Encoders.named("colours"), rng, narrow)
     count, rows = len(chosen), int(keyframes.offsets[-1])
     assert 3 < len(keyframes) == count < 40
     np.testing.assert_array_equal(keyframes.stamp_s, recording.stamps_s[chosen])

@@ -229,7 +229,7 @@ def _closures(avlmap: AVLMap, poses: Float[np.ndarray, "k 4 4"]) -> tuple[Edges,
         alike = earlier[np.argsort(-(place[earlier] @ place[row]), kind="stable")[:CANDIDATES]]
         local = features_of(avlmap, row)
         for other in alike.tolist():
-            there = replace(every, keyframes=keyframes.take(np.array([other])))
+            there = replace(every, keyframes=take(keyframes, np.array([other])))
             chosen = LocateSettings(refine_focal=False)
             located = locate_features(there, local, place[row], avlmap.data.rig.rgb, rng, chosen)
             found = located.world_from_camera

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
-from avlmaps.core.columns import concat
+from avlmaps.core.columns import concat, take
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
@@ -400,7 +400,7 @@ def joined_keyframes(avlmap: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 
         place=np.asarray(place, np.float32).reshape(len(new), -1),
         points_world=apply(moved, np.asarray(new.points_world, np.float64)).astype(np.float32),
     )
-    return _concatenated(old.take(np.array(kept, np.int64)), turned)
+    return _concatenated(take(old, np.array(kept, np.int64)), turned)
 
 
 def _concatenated(one: Keyframes, other: Keyframes) -> Keyframes:

@@ -103,7 +103,7 @@ class NoiseFloor:
     def at(self, begin: int, count: int) -> Float32[np.ndarray, "count bands"]:
         """Return the background for frames ``begin`` to ``begin + count``, interpolated between blocks."""
         place, blocks = (np.arange(begin, begin + count) + 0.5) / _BLOCK_FRAMES - 0.5, np.arange(len(self.power))
-        bands = [np.interp(place, blocks, band) for band in np.log(self.power).T]
+        bands: list[np.ndarray] = [np.interp(place, blocks, band) for band in np.log(self.power).T]
         return np.exp(np.stack(bands, axis=1).astype(np.float32))
 
 

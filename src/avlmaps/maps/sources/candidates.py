@@ -219,8 +219,8 @@ def _graph(number: Int[np.ndarray, "nx ny"], step_m: float) -> Any:
         there = number[dx:, max(dy, 0) : number.shape[1] - max(-dy, 0)]
         both = (here >= 0) & (there >= 0)
         pairs.append((here[both], there[both], np.full(int(both.sum()), step_m * np.hypot(dx, dy))))
-    one, other, length = (np.concatenate(column) for column in zip(*pairs, strict=True))
-    return csr_matrix((length, (one, other)), shape=(int(number.max()) + 1,) * 2)
+    (one, other, length), size = (np.concatenate(column) for column in zip(*pairs, strict=True)), int(number.max()) + 1
+    return csr_matrix((length, (one, other)), shape=(size, size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
