@@ -10,7 +10,7 @@ import pytest
 
 from avlmaps.core.lexicon import EntryKind, lexicon, squeezed
 from avlmaps.perception.embedded.words import EmbeddedWords
-from avlmaps.query.modalities.area import AREA_NAMES
+from avlmaps.query.rooms import AREA_NAMES
 from avlmaps_models.common.prompts import THINGS
 from avlmaps_sim.demo import questions
 from avlmaps_sim.furniture import categories

@@ -34,16 +34,8 @@ def locating(
 
 def test_the_answer_has_the_keys_of_the_contract(heard: AVLMap) -> None:
     answer = heard.ask(Question.of([CHAIR, DOG]), top=1).to_dict()
-    assert list(answer) == [
-        "goals",
-        "found",
-        "probability",
-        "text",
-        "parts",
-        "elapsed_ms",
-        "frame",
-        "level_from_recording",
-    ]
+    keys = "goals found probability text parts elapsed_ms frame level_from_recording"
+    assert list(answer) == keys.split()
     (goal,) = answer["goals"]
     assert list(goal) == ["position", "score", "size", "parts", "probability"]
     assert set(goal["parts"]) == {"object", "sound"}
@@ -122,14 +114,11 @@ def test_clips_that_cannot_be_asked_with_are_refused(
     missing = tmp_path / "none.wav"
     with pytest.raises(QueryError, match=f"^The clip {missing} is not there; check the name\\.$"):
         heard.sound_clip(missing)
-    with pytest.raises(
-        QueryError, match=r"^The clip that was given is silent \(its loudest sample is 0\); ask with one"
-    ):
-        heard.sound_clip(Sound(np.zeros(1600, np.float32), 16000))
-    with pytest.raises(QueryError, match=r"^The clip that was given has no samples; ask with another one\.$"):
-        heard.sound_clip(Sound(np.zeros(0, np.float32), 16000))
-    with pytest.raises(QueryError, match=r"^The clip that was given holds NaN or infinity; ask with another one\.$"):
-        heard.sound_clip(Sound(np.full(10, np.nan, np.float32), 16000))
+    for length, value, said in (
+        (1600, 0.0, r"is silent \(its loudest sample is 0\)"), (0, 0.0, "no samples"), (10, np.nan, "NaN or infinity")
+    ):  # fmt: skip
+        with pytest.raises(QueryError, match=f"^The clip that was given .*{said}"):
+            heard.sound_clip(Sound(np.full(length, value, np.float32), 16000))
 
     def unreadable(path: Path) -> None:
         raise AudioError("it is text.")
@@ -229,7 +218,7 @@ def test_the_peak_of_a_picture_taken_far_from_any_voxel_is_that_of_its_place(
     pose = np.eye(4)
     pose[:3, 3] = [30.0, 20.0, 1.5]
     locating(monkeypatch, pose)
-    monkeypatch.setattr("avlmaps.query.avlmap.read_picture", lambda path: np.zeros((48, 64, 3), np.uint8))
+    monkeypatch.setattr("avlmaps.query.modalities.read_picture", lambda path: np.zeros((48, 64, 3), np.uint8))
     answer = heard.ask(Question.of([Part(Modality.IMAGE, "photo.png", is_file=True)]))
     assert (answer.goals[0].score, answer.parts[0].peak) == (1.0, 1.0)
 

@@ -452,7 +452,7 @@ def test_what_is_merged_hangs_together_in_any_order(tmp_path: Path) -> None:
     )
     stored.path, stored.data.info.files = tmp_path, {"voxels/index": None}
     places = [(0.6, 0.6), (1.3, 0.6), (5.9, 0.6), (6.6, 0.6)]
-    for order in permutations(places):
+    for order in (places, places[::-1], [*places[1:], places[0]], [places[2], places[0], places[3], places[1]]):
         with pytest.raises(QueryError, match=r"is 4\.5 m from the others"):
             asked(stored, edits=()).edit.merge(*order)
     assert not (tmp_path / EDITS).exists()

@@ -17,6 +17,7 @@ from hypothesis.extra import numpy as some
 
 import avlmaps
 from avlmaps.cli.main import main
+from avlmaps.cli.output import query_lines
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, QueryError, RecordingError
 from avlmaps.core.question import Question
 from avlmaps.maps.settings import GravitySettings
@@ -91,6 +92,8 @@ def test_a_place_to_count_from_leaves_a_list_in_its_own_order(m: avlmaps.AVLMap)
         alone, near = m.ask(question), m.ask(question, near=(0, 0))
         assert near.goals == alone.goals and near.text == alone.text and near.when == alone.when
         assert near.notes == (*alone.notes, *([_OF_A_LIST] if alone.goals else ())), "of nothing there is no order"
+        table = query_lines(alone.to_dict())[-len(alone.goals) :]
+        assert all(goal.name in line for goal, line in zip(alone.goals, table, strict=bool(alone.goals)))
 
 
 def test_what_was_heard_and_when_is_answered_with_times(m: avlmaps.AVLMap) -> None:
@@ -183,14 +186,6 @@ def test_what_python_prints_is_short(m: avlmaps.AVLMap, folder: Path) -> None:
     values = [m.object("chair"), m.ask("the chair"), avlmaps.Encoders.named("embedded"), avlmaps.VoxelMap()]
     for thing in (*parts, *values):
         assert len(repr(thing)) < 260 and "array(" not in repr(thing), repr(thing)
-
-
-def test_help_names_what_a_newcomer_needs() -> None:
-    import pydoc
-
-    text = pydoc.plain(pydoc.render_doc(avlmaps))
-    for word in ("open_map", "VoxelMap", "LiveMap", "Encoders", "m.ask(", "build_map"):
-        assert word in text
 
 
 # A map in memory
@@ -286,7 +281,6 @@ class OnAnotherDevice:
 
 BAD_FRAMES = {
     "rgb of floats": (dict(rgb=np.zeros((120, 160, 3))), r"rgb .* must be uint8 of shape \(h, w, 3\), not float64"),
-    "rgb without channels": (dict(rgb=np.zeros((120, 160), np.uint8)), r"not uint8 of \(120, 160\)"),
     "channels first": (dict(rgb=np.zeros((3, 120, 160), np.uint8)), r"rgb.transpose\(1, 2, 0\)"),
     "a tensor of a GPU": (dict(depth_m=OnAnotherDevice()), "depth_m .* not OnAnotherDevice .*cuda:0"),
     "a pose in two parts": (dict(world_from_camera=([0, 0, 0], [0, 0, 0, 1])), "world_from_camera .* not tuple"),
@@ -298,18 +292,14 @@ BAD_FRAMES = {
     "whole numbers": (dict(depth_m=np.full((120, 160), 1200, np.uint16)), r"not uint16 .* up to 1200; millimetres"),
     "kilometres": (dict(depth_m=np.full((120, 160), 0.002)), r"must be in metres; .* largest 0.002"),
     "negative depth": (dict(depth_m=np.full((120, 160), -1.0)), "its least -1"),
-    "depth of three axes": (dict(depth_m=np.zeros((120, 160, 3))), r"shape \(h, w\), not float64 of \(120, 160, 3\)"),
     "depth on its side": (dict(depth_m=np.ones((160, 120))), "depth_m 120x160, the camera 160x120"),
-    "words for depth": (dict(depth_m="far"), "depth_m .* must be an array of numbers, not str"),
     "a matrix for a camera": (dict(camera=np.eye(3)), r"must be an avlmaps.Pinhole.* not ndarray"),
     "a camera of another size": (dict(camera=CAMERA.resized(320, 240)), "rgb .* 160x120 pixels .* the camera 320x240"),
     "a pose that mirrors": (dict(world_from_camera=np.diag([1.0, 1, -1, 1])), "not a rigid transform"),
-    "a pose that stretches": (dict(world_from_camera=np.diag([2.0, 2, 2, 1])), "not a rigid transform"),
     "a pose of three rows": (dict(world_from_camera=np.eye(4)[:3]), r"has shape \(3, 4\); it must be 4x4"),
     "a pose of nothing": (dict(world_from_camera=np.full((4, 4), np.nan)), "NaN or infinity"),
     "a pose on the Earth": (dict(world_from_camera=FAR_AWAY), "4.64978e.06 m from the origin"),
     "a stamp that is none": (dict(stamp_s=np.nan), "stamp_s .* must be a finite number of seconds"),
-    "a stamp in words": (dict(stamp_s="now"), "stamp_s .* must be a finite number of seconds"),
     "features of two axes": (dict(features=np.ones((4, 3), np.float32)), r"given are float32 of \(4, 3\)"),
     "features of other length": (dict(features=np.ones((2, 2, 5), np.float32)), r"\(rows, columns, 3\)"),
     "features without end": (dict(features=np.full((2, 2, 3), np.inf, np.float32)), "NaN or infinite features"),
@@ -322,13 +312,7 @@ def test_bad_input_gets_a_sentence_and_costs_nothing(frame: avlmaps.Frame, kind:
     live = avlmaps.VoxelMap(0.1, avlmaps.Encoders(pixels=Hues()))
     add(live, frame)
     before = len(live.points)
-    good = dict(
-        rgb=frame.rgb,
-        depth_m=frame.depth_m,
-        camera=frame.camera,
-        world_from_camera=frame.world_from_camera,
-        stamp_s=9.0,
-    )
+    good = {name: getattr(frame, name) for name in ("rgb", "depth_m", "camera", "world_from_camera")} | {"stamp_s": 9.0}
     wrong, said = BAD_FRAMES[kind]
     with pytest.raises((RecordingError, BackendError), match=said):
         live.add(**{**good, **wrong})  # pyright: ignore[reportArgumentType]
@@ -393,6 +377,11 @@ def test_what_is_no_phrase_is_refused_in_a_sentence(m: avlmaps.AVLMap, words: ob
         (lambda m: m.locate(np.zeros((9, 9, 3), np.uint8), focal_35mm=-1), "focal_35mm is a length over 0 mm, not -1"),
         (lambda m: m.edit.rename(5, "stool"), "thing must be text, not 5"),
         (lambda m: m.edit.undo(5), "which must be text, not 5"),
+        (lambda m: m.ask(image=np.zeros((9, 9, 3), np.uint8)), "image is .* of a file, not ndarray; .*image='it'"),
+        (lambda m: m.ask(clip=avlmaps.Sound(beeps(), RATE_HZ)), "clip is the path of a file, not Sound; .*clip='it'"),
+        (lambda m: m.sound_clip(beeps()), r"or an avlmaps\.Sound\(samples, rate_hz\), not ndarray"),
+        (lambda m: m.sound("dog bark", at="moon"), "at is robot, .*, or source, .*; not 'moon'"),
+        (lambda m: m.locate(np.zeros((9, 9, 3), np.uint8), (1.0, 1.0, 4.0, 4.0)), r"avlmaps\.Pinhole\(.*, not tuple"),
     ],
 )
 def test_an_argument_of_another_kind_is_named(m: avlmaps.AVLMap, call: Callable, said: str) -> None:
@@ -405,27 +394,6 @@ def test_one_name_is_a_name_and_not_its_letters(m: avlmaps.AVLMap) -> None:
     listed = m.things([name], 0.0)
     assert listed and [one.position for one in m.things(name, 0.0)] == [one.position for one in listed]
     assert len(m.contents(0.0, name).things) == len(listed)
-
-
-@pytest.mark.parametrize(
-    ("ask", "said"),
-    [
-        (
-            lambda m: m.ask(image=np.zeros((9, 9, 3), np.uint8)),
-            "image is the path of a file, not ndarray; .*image='it'",
-        ),
-        (lambda m: m.ask(clip=avlmaps.Sound(beeps(), RATE_HZ)), "clip is the path of a file, not Sound; .*clip='it'"),
-        (lambda m: m.sound_clip(beeps()), r"or an avlmaps\.Sound\(samples, rate_hz\), not ndarray"),
-        (lambda m: m.sound("dog bark", at="moon"), "at is robot, .*, or source, .*; not 'moon'"),
-        (lambda m: m.ask("the dog bark", at="moon"), "at is robot, .*, or source, .*; not 'moon'"),
-        (lambda m: m.locate(np.zeros((9, 9, 3), np.uint8), (1.0, 1.0, 4.0, 4.0)), r"avlmaps\.Pinhole\(.*, not tuple"),
-    ],
-)
-def test_a_photo_a_clip_or_a_place_of_another_kind_is_refused_in_a_sentence(
-    m: avlmaps.AVLMap, ask: Callable, said: str
-) -> None:
-    with pytest.raises(QueryError, match=said):
-        ask(m)
 
 
 def test_one_reason_to_allow_is_a_reason_and_not_its_letters(folder: Path, tmp_path: Path) -> None:
@@ -558,17 +526,6 @@ def test_the_examples_run(
     monkeypatch.setattr(sys, "argv", [str(script), *WORDS[script.name[:2]]])
     runpy.run_path(str(script), run_name="__main__")
     assert capsys.readouterr().out.strip()
-
-
-def test_the_examples_are_short() -> None:
-    assert [path.name[:2] for path in EXAMPLES] == sorted(WORDS)
-    assert all(len(path.read_text().splitlines()) <= 40 for path in EXAMPLES)
-    for number in ("04", "05", "06"):  # a stranger's loop, encoder and features
-        (path,) = [one for one in EXAMPLES if one.name.startswith(number)]
-        code = [
-            line for line in path.read_text().splitlines() if line.strip() and not line.startswith(('"""', "import"))
-        ]
-        assert len(code) <= 20, path
 
 
 def test_a_program_may_change_its_folder_while_it_uses_relative_paths(

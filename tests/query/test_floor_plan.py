@@ -79,26 +79,6 @@ def test_a_picture_on_a_wall_belongs_to_the_room_it_hangs_in() -> None:
     assert left < 3.0 < right
 
 
-@given(st.integers(0, 2**32 - 1), st.floats(0.02, 0.9))
-def test_every_place_belongs_to_an_open_cell_that_no_other_is_clearly_nearer_than(seed: int, share: float) -> None:
-    rng = np.random.default_rng(seed)
-    free = rng.random((2, 12, 17)) < share
-    free[0, 5, 5] = True
-    plan = FloorPlan(two_rooms(), storeys_at(0.0, 2.5), np.zeros(2), ~free, free, np.zeros(0, np.int64))
-    i, j = np.indices(free.shape[1:]).reshape(2, -1)
-    for storey, height_m in enumerate((0.5, 3.0)):
-        points = np.c_[(np.c_[i, j] + 0.5) * CELL_M, np.full(len(i), height_m)]
-        found = plan.cells_of(points)
-        if not free[storey].any():
-            np.testing.assert_array_equal(found, storey * free[storey].size + np.arange(len(i)))
-            continue
-        assert free.reshape(-1)[found].all()
-        at = np.stack(np.unravel_index(found, free.shape)[1:], axis=1)
-        assert (found // free[storey].size == storey).all()
-        nearest = np.linalg.norm(np.c_[i, j][:, None] - np.argwhere(free[storey])[None], axis=2).min(axis=1)
-        assert (np.linalg.norm(at - np.c_[i, j], axis=1) <= 1.03 * nearest + 1e-9).all()
-
-
 def test_a_storey_knows_nothing_of_the_one_above() -> None:
     lower = np.argwhere(np.ones((40, 40, 1), bool))
     upper = lower + np.array([0, 0, 56])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from query_fakes import UP, asked, furnished_map, keyframes_at, sounds_of
+from query_fakes import asked, furnished_map, sounds_of
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Question, Role
@@ -13,8 +13,8 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.factors import NearAnchors, NearThings
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.area import modes
-from avlmaps.query.settings import AreaSettings, QuerySettings
+from avlmaps.query.rooms import modes
+from avlmaps.query.settings import QuerySettings
 from avlmaps.query.voxel_space import Space
 from avlmaps_sim.bench.harness.factors import VoxelHeat
 
@@ -39,19 +39,23 @@ def test_no_two_goals_share_an_instance() -> None:
     assert len({goal.position for goal in goals}) == len(goals) == 2
 
 
+def things(space: Space, mask: np.ndarray, instance: np.ndarray, confidence: np.ndarray) -> NearThings:
+    return NearThings(space, Part(Modality.OBJECT, "chair", Role.PRIMARY), 2.0, mask, instance, confidence, True)
+
+
+def heard(space: Space, places: np.ndarray, falloff_per_m: float = 0.2) -> NearAnchors:
+    part, count = Part(Modality.SOUND, "dog"), len(places)
+    return NearAnchors(space, part, falloff_per_m, places, np.ones(count), np.arange(count), True)
+
+
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_no_two_goals_lie_within_one_thing(seed: int, has_context: bool) -> None:
     rng = np.random.default_rng(seed)
     voxels = np.unique(rng.integers(0, 20, (150, 3)), axis=0).astype(np.int32)
     space = Space(GridSpec(0.05), voxels, np.array([0.0, 0.0, 1.0]))
-    thing = NearThings(
-        space, Part(Modality.OBJECT, "chair", Role.PRIMARY), 2.0, np.ones(len(voxels), bool),
-        np.unique((voxels[:, 0] // 5) * 4 + rng.integers(0, 2, len(voxels)), return_inverse=True)[1],
-        rng.uniform(0.1, 1.0, 8), True,
-    )  # fmt: skip
-    dog = NearAnchors(
-        space, Part(Modality.SOUND, "dog"), 0.2, rng.uniform(0, 1, (1, 3)), np.ones(1), np.zeros(1, int), True
-    )
+    instance = np.unique((voxels[:, 0] // 5) * 4 + rng.integers(0, 2, len(voxels)), return_inverse=True)[1]
+    thing = things(space, np.ones(len(voxels), bool), instance, rng.uniform(0.1, 1.0, 8))
+    dog = heard(space, rng.uniform(0, 1, (1, 3)))
     goals = (Heatmap.of(thing) * Heatmap.of(dog) if has_context else Heatmap.of(thing)).goals(top=10)
     assert goals
     places = np.array([goal.position for goal in goals])
@@ -86,13 +90,8 @@ def test_a_stray_voxel_at_the_edge_of_a_thing_is_not_the_goal() -> None:
     stray = np.array([[10 + k, 0, 0] for k in range(6)])  # a trail along the floor, towards the sound
     voxels = np.concatenate([block, stray]).astype(np.int32)
     space = Space(GridSpec(0.05), voxels, np.array([0.0, 0.0, 1.0]))
-    chair = NearThings(
-        space, Part(Modality.OBJECT, "chair", Role.PRIMARY), 2.0, np.ones(len(voxels), bool),
-        np.zeros(len(voxels), int), np.ones(1), True,
-    )  # fmt: skip
-    dog = NearAnchors(
-        space, Part(Modality.SOUND, "dog"), 0.2, np.array([[1.5, 0.0, 0.2]]), np.ones(1), np.zeros(1, int), True
-    )
+    chair = things(space, np.ones(len(voxels), bool), np.zeros(len(voxels), int), np.ones(1))
+    dog = heard(space, np.array([[1.5, 0.0, 0.2]]))
     goal = (Heatmap.of(chair) * Heatmap.of(dog)).goals()[0]
     assert goal.position[0] < 0.5 and goal.position[2] > 0.1
 
@@ -106,10 +105,7 @@ def test_a_goal_on_a_thing_is_one_of_its_own_voxels(seed) -> None:
     mask[0] = True
     instance = rng.integers(0, 3, mask.sum())
     instance[:1] = 2
-    thing = NearThings(space, Part(Modality.OBJECT, "x", Role.PRIMARY), 2.0, mask, instance, np.full(3, 0.7), True)
-    sound = NearAnchors(
-        space, Part(Modality.SOUND, "y"), 0.2, rng.uniform(0, 1.5, (2, 3)), np.ones(2), np.arange(2), True
-    )
+    thing, sound = things(space, mask, instance, np.full(3, 0.7)), heard(space, rng.uniform(0, 1.5, (2, 3)))
     for goal in (Heatmap.of(thing) * Heatmap.of(sound)).goals(top=5):
         assert np.linalg.norm(thing.anchors - goal.position, axis=1).min() < 1e-9
         assert goal.parts["object"] == pytest.approx(1.0)
@@ -120,13 +116,9 @@ def test_a_goal_is_on_the_thing_where_the_context_ends_beside_it(reach_m) -> Non
     thing, floor = np.array([[k, 0, 0] for k in range(4)]), np.array([[k, 0, 0] for k in range(4, 40)])
     space = Space(GridSpec(0.05), np.concatenate([thing, floor]).astype(np.int32), np.array([0.0, 0.0, 1.0]))
     mask = np.arange(len(space)) < len(thing)
-    chair = NearThings(
-        space, Part(Modality.OBJECT, "chair", Role.PRIMARY), 2.0, mask, np.zeros(4, np.int64), np.ones(1), True
-    )
+    chair = things(space, mask, np.zeros(4, np.int64), np.ones(1))
     place = np.array([[0.2 + reach_m, 0.0, 0.0]])  # its cone ends between the thing and the floor's warm part
-    sound = NearAnchors(
-        space, Part(Modality.SOUND, "dog"), 1.0 / reach_m, place, np.ones(1), np.zeros(1, np.int64), True
-    )
+    sound = heard(space, place, 1.0 / reach_m)
     heat = Heatmap.of(chair) * Heatmap.of(sound)
     for goal in heat.goals():
         assert goal.position[0] == pytest.approx(0.175)
@@ -141,7 +133,7 @@ def test_a_thing_is_as_far_in_a_region_as_its_voxels_are(seed) -> None:
     mask, region = rng.random(len(voxels)) < 0.3, rng.random(len(voxels)).astype(np.float32)
     instance = voxels[mask, 0] // 7  # three slabs
     confidence = rng.uniform(0.5, 1.0, 3)
-    thing = NearThings(space, Part(Modality.OBJECT, "x", Role.PRIMARY), 2.0, mask, instance, confidence, True)
+    thing = things(space, mask, instance, confidence)
 
     def goals(inside: np.ndarray) -> list[Goal]:
         area = VoxelHeat(space, Part(Modality.AREA, "y"), inside, regional=True)
@@ -286,19 +278,3 @@ def test_modes_lead_uphill_to_a_local_maximum(seed, count) -> None:
         near = np.linalg.norm(points - points[k], axis=1) <= 1.0
         assert score[near].max() <= peak + 1e-12 or score[k] < score[near].max()
     assert not count or group[np.argmax(score)] == 0
-
-
-def test_two_kitchens_are_two_goals() -> None:
-    from query_fakes import FakeViews
-
-    places = np.stack([np.linspace(0.5, 5.5, 11), np.full(11, 2.0), np.full(11, 1.4)], axis=1)
-    view = np.zeros((11, 2), np.float32)
-    view[:, 1] = 1.0
-    view[[1, 2, 8, 9]] = [1.0, 0.0]
-    from_cameras = QuerySettings(areas=AreaSettings(anchor="camera", extent="cones"))
-    m = asked(furnished_map(keyframes=keyframes_at(places, view), views=FakeViews()), settings=from_cameras)
-    goals = m.area("kitchen", primary=True).goals(top=2)
-    assert sorted(goal.position[0] for goal in goals) == pytest.approx([1.25, 4.75], abs=0.3)
-    assert all(goal.position[2] == pytest.approx(1.4) for goal in goals)
-    assert m.area("kitchen").found
-    assert np.allclose(UP, m.data.up_in_world)

@@ -118,16 +118,6 @@ def test_anchor_heat_is_the_equation_at_every_voxel(index, up, anchors_and_score
     np.testing.assert_allclose(heat[warm], own_cone, atol=1e-6)
 
 
-@given(voxel_sets(least=2), st.integers(0, 2**32 - 1), FALLOFFS)
-def test_object_heat_never_rises_with_distance(index, seed, falloff) -> None:
-    space = Space(GridSpec(SIZE_M), index, np.array([0.0, 0.0, 1.0]))
-    mask = np.zeros(len(index), bool)
-    mask[np.random.default_rng(seed).integers(len(index))] = True
-    distance = np.linalg.norm(space.centres - space.centres[mask], axis=1)
-    heat, _ = object_heat(space, mask, falloff)
-    assert np.all(np.diff(heat[np.argsort(distance)]) <= 1e-6)
-
-
 def test_primary_reaches_half_a_metre_and_context_five() -> None:
     line = np.stack([np.arange(120), np.zeros(120), np.zeros(120)], axis=1).astype(np.int32)
     space, settings = Space(GridSpec(SIZE_M), line, np.array([0.0, 0.0, 1.0])), HeatSettings()
@@ -137,14 +127,6 @@ def test_primary_reaches_half_a_metre_and_context_five() -> None:
     assert np.flatnonzero(primary > 1e-6).max() == 9  # 0.45 m; at 0.50 m it is nothing
     assert np.flatnonzero(context > 1e-6).max() == 99
     assert context[20] == pytest.approx(0.8)
-
-
-def test_anchor_heat_is_the_same_all_the_way_up() -> None:
-    up = np.array([0.0, -0.8, -0.6])
-    column = np.unique(np.round(np.arange(40)[:, None] * 5 * up).astype(np.int32), axis=0)
-    space = Space(GridSpec(SIZE_M), column, up)
-    heat, _ = anchor_heat(space, np.array([[0.7, 0.0, 0.0]]), np.array([1.0]), 0.2)
-    assert np.ptp(heat) < 0.02  # voxels round the line by half a voxel
 
 
 def factor(space: Space, anchors: np.ndarray, scores: np.ndarray, role: Role = Role.CONTEXT) -> NearAnchors:
@@ -172,13 +154,6 @@ def test_heat_at_a_point_is_the_equation_too(anchors_and_scores, points) -> None
     np.testing.assert_allclose(factor(space, anchors, scores).at(points), expected, atol=1e-9)
 
 
-def test_heatmaps_of_two_maps_do_not_multiply() -> None:
-    spaces = [Space(GridSpec(SIZE_M), np.zeros((1, 3), np.int32), np.array([0.0, 0.0, 1.0])) for _ in range(2)]
-    a, b = (Heatmap.of(factor(space, np.zeros((1, 3)), np.ones(1))) for space in spaces)
-    with pytest.raises(ValueError, match="two heatmaps of different maps cannot be multiplied"):
-        a * b
-
-
 def test_an_empty_map_has_no_heat_and_no_goals() -> None:
     space = Space(GridSpec(SIZE_M), np.zeros((0, 3), np.int32), np.array([0.0, 0.0, 1.0]))
     heat = Heatmap.of(factor(space, np.zeros((0, 3)), np.zeros(0)))
@@ -193,13 +168,6 @@ def test_normalised_scores_lie_in_0_1_and_keep_their_order(scores) -> None:
     assert np.all((stretched >= 0.0) & (stretched <= 1.0))
     assert np.all(np.diff(stretched[np.argsort(scores, kind="stable")]) >= 0.0)
     assert not len(scores) or stretched[np.argmax(scores)] == 1.0
-
-
-def test_one_score_and_equal_scores_become_one() -> None:
-    np.testing.assert_array_equal(stretch_scores(np.array([0.3])), [1.0])
-    np.testing.assert_array_equal(stretch_scores(np.array([-2.0, -2.0])), [1.0, 1.0])
-    np.testing.assert_array_equal(stretch_scores(np.array([0.0, 5.0])), [0.0, 1.0])
-    assert len(stretch_scores(np.zeros(0))) == 0
 
 
 @given(

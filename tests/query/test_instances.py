@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.query.instances import Instances, best_guesses
+from avlmaps.query.objects import Instances, best_guesses
 
 
 @st.composite

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.query.instances import joined_columns
+from avlmaps.query.objects import joined_columns
 
 CELL_M, JOIN_M, VOXEL_M = 0.1, 0.3, 0.05
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]

@@ -80,19 +80,6 @@ def test_a_matcher_is_given_the_scores_and_the_sizes_of_both_pictures(watching: 
         assert kept.score.dtype == np.float32 and len(kept.score) == len(kept.xy) > 100
 
 
-@pytest.mark.slow
-@pytest.mark.nightly
-def test_keypoints_without_scores_reach_a_matcher_without_any_and_with_the_size_of_the_picture(
-    watching: Watching,
-) -> None:
-    stored = stored_by(Scored(told=False), watching)
-    assert stored.keyframes.score.shape == (0,)
-    locate(stored, WALK.frame(4).rgb, None, np.random.default_rng(0))
-    for asked, kept in watching.given:
-        assert (asked.size, kept.size) == ((320, 240), (320, 240))
-        assert len(asked.score) == len(kept.score) == 0
-
-
 def test_a_map_of_pictures_with_and_without_scores_has_none() -> None:
     seen = [describe_keyframe(WALK.frame(i), encoders_of(Scored(told=i > 0), None)) for i in range(3)]
     assert concat(seen).score.shape == (0,)

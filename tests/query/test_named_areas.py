@@ -9,7 +9,7 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.pixels import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedViewEncoder
-from avlmaps.query.modalities.area import area_factor, area_scores
+from avlmaps.query.rooms import area_factor, area_scores
 from avlmaps.query.settings import AreaSettings, HeatSettings
 from avlmaps.query.voxel_space import Space
 

@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.pixels import features_of, orthonormal_codes
-from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
+from avlmaps.perception.protocols import ModelCard
 from avlmaps.query import words
 from avlmaps.query.factors import NearAnchors, NearThings
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.instances import FeatureVoxels
-from avlmaps.query.modalities.object import colour_in, object_factor
+from avlmaps.query.objects import FeatureVoxels, colour_in, object_factor
 from avlmaps.query.settings import HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import (
@@ -77,18 +76,22 @@ SPACE = Space(GridSpec(0.05), INDEX, np.array([0.0, 0.0, 1.0]))
 
 
 def ask(word: str, rgb: np.ndarray | None = None, role: Role = Role.PRIMARY, least_confidence: float = 0.0):
-    rivals = ClosestWords.of(FEATURE, ENCODER, ENCODER.vocabulary)
-    part = Part(Modality.OBJECT, word, role)
-    settings = ObjectSettings(least_confidence=least_confidence)
-    return object_factor(FeatureVoxels(SPACE, FEATURE, ENCODER, rivals, settings, rgb), part, HeatSettings())
+    return search(word, FEATURE, ObjectSettings(least_confidence=least_confidence), rgb, role)
+
+
+def search(word, feature, settings=None, rgb=None, role=Role.PRIMARY, rivals=None) -> NearThings:
+    rivals = rivals or ClosestWords.of(feature, ENCODER, ENCODER.vocabulary)
+    voxels = FeatureVoxels(SPACE, feature, ENCODER, rivals, settings or ObjectSettings(), rgb)
+    return object_factor(voxels, Part(Modality.OBJECT, word, role), HeatSettings())
+
+
+def features(seed: int, evenness: float, count: int = len(INDEX)) -> np.ndarray:
+    probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), count)
+    return features_of(probability, ENCODER.codes).astype(np.float16)
 
 
 def clumps(factor) -> set[int]:
     return {int(i) for i in np.flatnonzero(factor.mask) // 8}
-
-
-def test_the_fake_keeps_to_the_protocol() -> None:
-    assert isinstance(ENCODER, NamedPixelEncoder)
 
 
 def test_a_name_wins_where_it_is_the_likeliest() -> None:
@@ -155,12 +158,6 @@ def test_what_it_is_near_tells_that_an_unsure_thing_is_meant() -> None:
     assert best.score == pytest.approx(0.45, abs=0.03)
 
 
-def test_a_product_is_the_same_in_whatever_order_and_brackets() -> None:
-    chair, one, two = Heatmap.of(ask("chair", least_confidence=0.5)), near(3), near(1)
-    np.testing.assert_array_equal(((chair * one) * two).values, (one * (two * chair)).values)
-    np.testing.assert_array_equal((chair * one).values, np.prod([f.values for f in (chair * one).factors], axis=0))
-
-
 def test_what_says_where_it_is_counts_only_where_it_is_sure() -> None:
     chair = Heatmap.of(ask("chair", role=Role.CONTEXT, least_confidence=0.5))
     assert clumps((chair * near(3)).factors[0]) == {0}
@@ -200,20 +197,9 @@ def test_a_known_compound_that_holds_a_colour_word_is_no_colour() -> None:
 def test_the_best_guess_is_where_a_name_is_likeliest_of_what_it_may_be_at_all(p: float, expected: set[int]) -> None:
     probability = np.repeat([(0.0, 0.0, 1.0 - p, p, 0.0), (0, 1, 0, 0, 0), (1, 0, 0, 0, 0), (0, 1, 0, 0, 0)], 8, axis=0)
     feature = features_of(probability, ENCODER.codes).astype(np.float16)
-    rivals = ClosestWords.of(feature, ENCODER, ENCODER.vocabulary)
-    part = Part(Modality.OBJECT, "floor", Role.PRIMARY)
-    guess = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
+    guess = search("floor", feature)
     assert clumps(guess) == expected
     assert not guess.found
-
-
-def test_a_guess_among_weaker_voxels_can_be_turned_off() -> None:
-    probability = np.tile(np.array([0.0, 0.0, 0.95, 0.05, 0.0]), (32, 1))
-    feature = features_of(probability, ENCODER.codes).astype(np.float16)
-    rivals = ClosestWords.of(feature, ENCODER, ENCODER.vocabulary)
-    part = Part(Modality.OBJECT, "floor", Role.PRIMARY)
-    settings = ObjectSettings(guess_below=0.0)
-    assert not object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, settings), part, HeatSettings()).mask.any()
 
 
 @given(
@@ -226,16 +212,15 @@ def test_a_guess_among_weaker_voxels_can_be_turned_off() -> None:
 def test_voxels_with_little_of_the_word_need_no_comparison(
     word: str, evenness: float, share: float, rules_of_the_paper: bool, seed: int
 ) -> None:
-    probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), len(INDEX))
-    feature = features_of(probability, ENCODER.codes).astype(np.float16)
+    feature = features(seed, evenness)
     feature[::11] = 0.0  # voxels that no encoder has looked at
     none = dict.fromkeys(("least_confidence", "least_in_company", "guess_below"), 0.0) if rules_of_the_paper else {}
-    chosen, part = ObjectSettings(score_in_company=share, **none), Part(Modality.OBJECT, word, Role.PRIMARY)
+    chosen = ObjectSettings(score_in_company=share, **none)
     vocabulary = Vocabulary.encoded(ENCODER, NAMES)
     known = vocabulary.closest(feature)
 
     def found(rivals: Vocabulary) -> tuple[NearThings, NearThings]:
-        one = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, chosen), part, HeatSettings())
+        one = search(word, feature, chosen, rivals=rivals)
         return one, one.include_uncertain()
 
     with pytest.MonkeyPatch.context() as patch:
@@ -259,8 +244,7 @@ def test_voxels_with_little_of_the_word_need_no_comparison(
 def test_no_voxel_wins_that_its_closest_words_rule_out(
     word: str, alone: bool, evenness: float, share: float, seed: int
 ) -> None:
-    probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), 200)
-    feature = features_of(probability, ENCODER.codes).astype(np.float16)
+    feature = features(seed, evenness, 200)
     feature[::11] = 0.0
     known = ClosestWords.of(feature, ENCODER, NAMES)
     encoded = EncodedWord.of_name(ENCODER, word) if alone and word in NAMES else EncodedWord.of(ENCODER, word)
@@ -277,23 +261,13 @@ def test_no_voxel_wins_that_its_closest_words_rule_out(
         assert np.isin(wins, rows).all()
 
 
-def test_few_voxels_are_left_for_a_name_that_others_win() -> None:
-    known = ClosestWords.of(FEATURE, ENCODER, NAMES)
-    encoded = EncodedWord.of_name(ENCODER, NAMES[3])
-    rows = known.contenders(ENCODER, encoded, known.not_competing(ENCODER, encoded, 0.95), 1.0)
-    assert rows is not None
-    assert not len(rows)
-
-
 def test_weak_voxels_round_a_chair_leave_it_as_it_is_in_company() -> None:
     """Measured in a real kitchen: a chair of 0.70 had 0.40 near a sound, and was no longer found."""
     is_chair = (INDEX[:, 0] // 20 == 0) & (INDEX[:, 0] % 20 < 1)
     likely, weak, none = (0.7, 0.3, 0, 0, 0), (0.3, 0.7, 0, 0, 0), (0, 1, 0, 0, 0)
     probability = np.where(is_chair[:, None], likely, np.where((INDEX[:, 0] // 20 == 0)[:, None], weak, none))
     feature = features_of(probability.astype(np.float32), ENCODER.codes).astype(np.float16)
-    part = Part(Modality.OBJECT, "chair", Role.PRIMARY)
-    rivals = ClosestWords.of(feature, ENCODER, ENCODER.vocabulary)
-    alone = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
+    alone = search("chair", feature)
     joined = Heatmap.of(alone) * near(0)
     assert alone.found and joined.found
     np.testing.assert_array_equal(alone.mask, is_chair)
@@ -302,11 +276,7 @@ def test_weak_voxels_round_a_chair_leave_it_as_it_is_in_company() -> None:
 
 @given(st.sampled_from(sorted(MEANT)), st.sampled_from([0.1, 0.5, 5.0]), st.integers(0, 2**32 - 1))
 def test_what_is_found_alone_is_the_same_in_company(word: str, evenness: float, seed: int) -> None:
-    probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), len(INDEX))
-    feature = features_of(probability, ENCODER.codes).astype(np.float16)
-    part = Part(Modality.OBJECT, word, Role.PRIMARY)
-    rivals = ClosestWords.of(feature, ENCODER, NAMES)
-    alone = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
+    alone = search(word, features(seed, evenness))
     company = alone.include_uncertain()
     if not alone.found:
         return
@@ -324,13 +294,7 @@ def test_what_is_found_alone_is_the_same_in_company(word: str, evenness: float, 
 def test_no_condition_makes_a_thing_likelier_in_goals_and_pictures(
     word: str, evenness: float, seed: int, mark: int
 ) -> None:
-    probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), len(INDEX))
-    feature = features_of(probability, ENCODER.codes).astype(np.float16)
-    part = Part(Modality.OBJECT, word, Role.PRIMARY)
-    rivals = ClosestWords.of(feature, ENCODER, NAMES)
-    alone = Heatmap.of(
-        object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
-    )
+    alone = Heatmap.of(search(word, features(seed, evenness)))
     for several in (alone * near(mark), alone * near(mark) * near(mark), alone.include_uncertain() * near(mark)):
         assert all(goal.probability <= alone.probability + 1e-3 for goal in several.goals(10))
         assert several.shown.max(initial=0.0) <= alone.shown.max(initial=0.0) + 1e-3

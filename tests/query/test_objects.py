@@ -8,8 +8,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.query.instances import FeatureVoxels, margin_confidence
-from avlmaps.query.modalities.object import object_factor
+from avlmaps.query.objects import FeatureVoxels, margin_confidence, object_factor
 from avlmaps.query.settings import HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import ClosestWords, feature_scores, margins_of

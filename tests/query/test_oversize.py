@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.query import instances as oversize
+from avlmaps.query import objects as oversize
 
 VOXEL_M = 0.05
 

@@ -59,19 +59,7 @@ def test_a_wider_kind_means_all_that_it_takes_in() -> None:
     assert set(names("screens")) == {"tv", "monitor", "laptop"}
 
 
-@pytest.mark.parametrize(
-    "phrase",
-    [
-        "elephant",
-        "red elephant",
-        "blue zebra",
-        "sofa elephant",
-        "desk dragon",
-        "chair unicorn",
-        "labtop",
-        "kettel dragon",
-    ],
-)
+@pytest.mark.parametrize("phrase", ["elephant", "red elephant", "sofa elephant", "labtop", "kettel dragon"])
 def test_a_noun_that_nobody_knows_means_nothing(phrase: str) -> None:
     assert not ENCODER.name_weights(phrase).any()
     assert ENCODER.understood(phrase) == ""

@@ -14,7 +14,7 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.factors import NearThings
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.image import image_factor
+from avlmaps.query.modalities import image_factor
 from avlmaps.query.plots import HEAT_LABEL, TopDown, aside, draw_map, save
 from avlmaps.query.settings import HeatSettings
 from avlmaps.query.voxel_space import Space
@@ -30,10 +30,10 @@ def colours_in(path: Path) -> int:
 @pytest.mark.slow
 def test_a_product_has_a_panel_for_each_part_and_one_for_all(tmp_path: Path) -> None:
     m = furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK))
-    one = m.object("chair", primary=True).plot(tmp_path / "one.png")
-    three = (m.object("chair", primary=True) * m.sound("dog")).plot(tmp_path / "deep" / "three.png")
-    assert colours_in(one) > 50
-    assert cv2.imread(str(three)).shape[1] > 1.5 * cv2.imread(str(one)).shape[1]
+    heat = m.object("chair", primary=True) * m.sound("dog")
+    one, three = m.object("chair", primary=True).plot(), heat.plot()
+    assert isinstance(three, Figure) and len(three.axes) >= 3 and three.get_figwidth() > 1.5 * one.get_figwidth()
+    assert colours_in(heat.plot(tmp_path / "deep" / "three.png")) > 50
 
 
 @pytest.mark.nightly
@@ -69,13 +69,6 @@ def test_the_colour_from_above_is_that_of_the_highest_voxels_under_the_ceiling()
     values[0] = 0.7
     assert view.heat(values).max() == np.float32(0.7)
     assert view.extent == pytest.approx((-0.3, 0.5, -0.3, 0.5))
-
-
-def test_without_a_path_a_plot_is_a_figure_for_a_notebook() -> None:
-    m = furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK))
-    figure = (m.object("chair", primary=True) * m.sound("dog")).plot()
-    assert isinstance(figure, Figure)
-    assert len(figure.axes) >= 3
 
 
 def brightest(figure: Figure) -> float:
@@ -132,9 +125,7 @@ def test_names_of_things_are_drawn_over_the_map(tmp_path: Path) -> None:
 
     opened = furnished_map()
     plain = cv2.imread(str(save(draw_map(opened), tmp_path / "plain.png")))
-    again = cv2.imread(str(save(draw_map(opened), tmp_path / "again.png")))
     named = cv2.imread(str(save(draw_map(opened, opened.things(least_confidence=0.0)), tmp_path / "named.png")))
-    assert (plain == again).all()
     assert 100 < (plain != named).any(axis=2).sum() < 0.05 * plain.shape[0] * plain.shape[1]
 
 

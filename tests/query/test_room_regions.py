@@ -11,10 +11,9 @@ from query_fakes import UP
 from walled_rooms import storeys_at, two_rooms_index
 
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.floor_plan import FloorPlan
+from avlmaps.query.floor_plan import FloorPlan, Sights, StoreyGrid, contacts, dilated, turned, wall_heading
 from avlmaps.query.room_regions import NONE, RoomRegions, rooms_of_storey
 from avlmaps.query.rooms import RoomField
-from avlmaps.query.storey_grid import Sights, StoreyGrid, contacts, dilated, turned, wall_heading
 from avlmaps.query.voxel_space import Space
 
 CELL = 0.05

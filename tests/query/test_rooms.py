@@ -11,14 +11,14 @@ from walled_rooms import storeys_at, two_rooms, two_rooms_index
 
 from avlmaps.perception.protocols import ModelCard, RoomContents, read_room_contents
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.contents import own_names
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.lists import extreme_shares
 from avlmaps.query.places import describe_place
 from avlmaps.query.rooms import InRooms, NamedVoxels, RoomField, Rooms, voting_rows
 from avlmaps.query.selection import MapLists, Wanted, page_of_things
-from avlmaps.query.settings import AreaSettings, QuerySettings, RoomSettings, query_settings
-from avlmaps.query.whereabouts import own_names
+from avlmaps.query.settings import QuerySettings, RoomSettings, query_settings
 from avlmaps.view.labels import Labels
 from avlmaps.view.layout import Layout
 
@@ -64,14 +64,6 @@ def test_every_place_has_a_distribution_and_views_have_no_order(seed: int, door_
     np.testing.assert_allclose(again.share, field.share, atol=1e-4)
 
 
-@given(st.integers(0, 10_000))
-def test_kinds_have_no_order_either(seed: int) -> None:
-    share, places = views(seed)
-    rooms = rooms_of(places)
-    turned = rooms.field(KINDS[::-1], share[:, ::-1])
-    np.testing.assert_allclose(turned.share[:, ::-1], rooms.field(KINDS, share).share, atol=1e-5)
-
-
 def test_a_wall_keeps_a_view_in_its_room_and_an_open_plan_does_not() -> None:
     places, share = np.r_[LEFT, RIGHT], np.r_[KITCHEN, BEDROOM]
     beside = np.array([[2.8, 1.5, 1.2], [3.2, 1.5, 1.2]])
@@ -87,12 +79,6 @@ def test_a_lone_view_counts_once_and_views_that_agree_count_more() -> None:
     np.testing.assert_allclose(alone, KITCHEN[0], atol=0.06)  # walls reflect it
     several = rooms_of(np.repeat(LEFT, 4, axis=0)).field(KINDS, np.repeat(KITCHEN, 4, axis=0)).at(LEFT)[0]
     assert several[0] > alone[0] + 0.05
-
-
-def test_one_odd_view_is_outvoted() -> None:
-    places = np.repeat(LEFT, 5, axis=0)
-    share = np.r_[BEDROOM, np.repeat(KITCHEN, 4, axis=0)]
-    assert rooms_of(places).field(KINDS, share).at(LEFT)[0].argmax() == 0
 
 
 def test_far_from_all_views_any_kind_is_as_likely() -> None:
@@ -339,20 +325,6 @@ def test_the_papers_rules_know_no_walls_and_no_things() -> None:
         factor = m.area("bedroom").factors[0]
         assert type(factor) is NearAnchors
     np.testing.assert_array_equal(one.area("bedroom").factors[0].scores, other.area("bedroom").factors[0].scores)
-
-
-def test_cones_are_there_for_who_wants_them() -> None:
-    m = home(QuerySettings(areas=AreaSettings(extent="cones")))
-    assert type(m.area("kitchen").factors[0]) is NearAnchors
-
-
-def test_votes_of_things_are_counted_once_a_map() -> None:
-    m = home()
-    rooms = m.room_votes
-    assert rooms is not None and m.room_votes is rooms
-    m.area("kitchen")
-    first = rooms.thing_votes(KINDS)
-    assert rooms.thing_votes(KINDS) is first
 
 
 def test_an_encoder_that_was_tried_out_in_rooms_says_what_its_names_mean() -> None:

@@ -17,7 +17,7 @@ from avlmaps.maps.sources.candidates import Spread
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.answer import PartAnswer, absent_text, found_text
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.sound import SourceAnchors, source_factor
+from avlmaps.query.modalities import SourceAnchors, source_factor
 from avlmaps.query.settings import HeatSettings, SoundSettings
 from avlmaps.query.sound_sources import SourceMap
 from avlmaps.query.voxel_space import Space
@@ -101,10 +101,8 @@ def test_a_sound_that_is_not_located_yet_is_not_called_unheard() -> None:
 
 def test_a_plan_says_where_a_sound_comes_from_where_that_is_meant() -> None:
     said = [LearnedTranslator(Attachments(at=at)).program_for("go to where the smoke alarm is heard").plan for at in AT]
-    assert said == [
-        "I will go to where smoke alarm was heard.",
-        "I will go to where the sound of smoke alarm comes from.",
-    ]
+    ends = "smoke alarm was heard", "the sound of smoke alarm comes from"
+    assert said == [f"I will go to where {end}." for end in ends]
 
 
 class Asked(FakeMap):

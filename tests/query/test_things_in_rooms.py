@@ -9,7 +9,7 @@ from walled_rooms import storeys_at, two_rooms
 from avlmaps.core.arrays import Float
 from avlmaps.perception.protocols import RoomContents, read_room_contents
 from avlmaps.query.floor_plan import FloorPlan
-from avlmaps.query.instances import with_rooms
+from avlmaps.query.objects import with_rooms
 from avlmaps.query.rooms import RoomField, ThingsInRooms, commonness
 from avlmaps.query.settings import ObjectSettings, query_settings
 

@@ -30,7 +30,7 @@ from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, InstanceN
 from avlmaps.perception.encoders import profile
 from avlmaps.perception.models import model_settings, using_models
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.instances import FeatureVoxels, confident_instances
+from avlmaps.query.objects import FeatureVoxels, confident_instances
 from avlmaps.query.settings import ObjectSettings
 from avlmaps.query.words import ClosestWords, EncodedWord
 from avlmaps.recordings.open import open_recording

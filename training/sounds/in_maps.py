@@ -26,7 +26,7 @@ from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.embedded import logmel
 from avlmaps.perception.embedded.sounds import EmbeddedSounds
 from avlmaps.query.heatmap import Heatmap, product
-from avlmaps.query.modalities.sound import sound_factor
+from avlmaps.query.modalities import sound_factor
 from avlmaps.query.settings import HeatSettings, SoundSettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import AudioTrack, Sound, resample, write_flac

@@ -127,7 +127,7 @@ class Locate(InFrame, MapVerb):
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
         from avlmaps.core.camera import Pinhole, intrinsics_of
         from avlmaps.query.locate import focal_35mm_of
-        from avlmaps.query.modalities.image import read_picture
+        from avlmaps.query.modalities import read_picture
         from avlmaps.query.schema import locate_answer
 
         rgb = read_picture(self.image)

@@ -24,8 +24,8 @@ from avlmaps.navigate.file_access import Readable, offered_by
 from avlmaps.navigate.grounding import Heats
 from avlmaps.navigate.skills import LoggedMove, Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.contents import own_names
 from avlmaps.query.sound_sources import no_sources
-from avlmaps.query.whereabouts import own_names
 
 _MOST_PROGRAMS = 6
 _NEAR_M = 1.0  # within this distance a goal counts as reached where the paper judges

@@ -136,14 +136,14 @@ class Robot:
 
     def load_image(self, path: str) -> Picture:
         """Load a picture from a file, to ask where it was taken."""
-        from avlmaps.query.modalities.image import read_picture
+        from avlmaps.query.modalities import read_picture
 
         read_picture(self.seeker.readable.find(text_of(path, "load_image"), "picture"))
         return Picture(path)
 
     def load_sound(self, path: str) -> Clip:
         """Load a recorded sound from a file, to ask where one like it was heard."""
-        from avlmaps.query.modalities.sound import read_clip
+        from avlmaps.query.modalities import read_clip
 
         read_clip(self.seeker.readable.find(text_of(path, "load_sound"), "clip"))
         return Clip(path)

@@ -23,12 +23,12 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.wording import coordinates, option
 from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.answer import UNDERSTOOD_ONLY, Alternative, Answer, PartAnswer, absent_text, found_text, placed
+from avlmaps.query.contents import NOWHERE, own_names
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
 from avlmaps.query.goals import MOST_GOALS, Goal, alike
 from avlmaps.query.heatmap import Heatmap, product
-from avlmaps.query.modalities.image import Attachment, Photo, read_picture
+from avlmaps.query.modalities import Attachment, Photo, read_picture
 from avlmaps.query.places import distance_m, lies_between, place_given
-from avlmaps.query.whereabouts import NOWHERE, own_names
 
 if TYPE_CHECKING:
     from avlmaps.language.questions import AskedSentence
@@ -158,11 +158,7 @@ _Kind = Callable[[_Asking], Answer | None]
 
 
 def ask(avlmap: "AVLMap", asked: Asked) -> Answer:
-    """Answer a sentence or parts.
-
-    ``AskError``: the sentence does not speak of a file that was given, or intrinsics come without a photo.
-    ``QueryError``: the sentence is not understood, or a part of it cannot be used.
-    """
+    """Answer a sentence or parts. ``QueryError`` and ``AskError``: it is not understood, or does not fit together."""
     begin, place = time.perf_counter(), None if asked.near is None else place_given(asked.near)
     answer = _Asking(avlmap, asked if place is None else replace(asked, top=MOST_GOALS)).answer()
     if place is not None:
@@ -172,11 +168,8 @@ def ask(avlmap: "AVLMap", asked: Asked) -> Answer:
 
 
 def _nearest_first(avlmap: "AVLMap", answer: Answer, place: Float[np.ndarray, " n"], top: int) -> Answer:
-    """Return an answer whose goals are those that count as found, the nearest to a place first.
-
-    One that is less than half as likely as the best is left behind them, as when a robot goes to the nearest. Of what
-    is not found, the likeliest guess stays first.
-    """
+    # Of what counts as found, one that is less than half as likely as the best is left behind, as when a robot goes to
+    # the nearest. Of what is not found, the likeliest guess stays first.
     from avlmaps.language.questions import FROM_NOWHERE
 
     if any(goal.name for goal in answer.goals):
@@ -362,10 +355,7 @@ KINDS: tuple[_Kind, ...] = (_of_storeys, _of_both, _of_parts, _of_sources, _of_l
 
 
 def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
-    """Return the question where a query is the name of one thing and nothing else: read without loading the grammar.
-
-    Stairs are a thing and an area; the grammar decides which is meant.
-    """
+    """Return the question where a query is the name of one thing alone; stairs, also an area, need the grammar."""
     if asked.files or asked.primary not in (None, Modality.OBJECT):
         return None
     if not asked.sentence.strip():

@@ -17,29 +17,30 @@ from avlmaps.core.files import lasting_path, user_path
 from avlmaps.core.numbers import as_whole, checked
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
+from avlmaps.maps.store import map_data
+from avlmaps.maps.store.edits import Edit, read_edits
+from avlmaps.maps.store.folder import read
+from avlmaps.maps.store.map_data import MapData
 from avlmaps.perception.protocols import read_room_contents
+from avlmaps.query import contents, modalities
+from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch, Whereabouts, region_named
+from avlmaps.query.edits import Edited, means
 from avlmaps.query.findings import MapNames, MapRooms
 from avlmaps.query.heatmap import HeatCache, Heatmap
-from avlmaps.query.instances import Instances
-from avlmaps.query.modalities.image import Attachment, Photo, image_factor, read_picture, require_fitting
-from avlmaps.query.modalities.sound import read_clip, require_audible, sound_factor, sound_features, source_factor
+from avlmaps.query.modalities import Attachment, Photo
+from avlmaps.query.objects import Instances
 from avlmaps.query.settings import QuerySettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.whereabouts import Whereabouts, region_named
 from avlmaps.query.words import ClosestWords, is_open
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from avlmaps.maps.store.edits import Edit
-    from avlmaps.maps.store.map_data import MapData
     from avlmaps.maps.storeys import Storeys
     from avlmaps.perception.encoders import Encoders
     from avlmaps.query.answer import Answer
-    from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch
     from avlmaps.query.editor import Editor
-    from avlmaps.query.edits import Edited
     from avlmaps.query.locate import Located
     from avlmaps.query.room_regions import RoomRegions
     from avlmaps.query.rooms import RoomField, Rooms, ThingsInRooms
@@ -58,25 +59,20 @@ _INSIDE = ("as_edited_now", "forget_edits", "things_to_edit", "unedited_things",
 class AVLMap:
     """A map that can be queried. Heatmaps of one map multiply: ``m.object("chair", primary=True) * m.sound("dog")``.
 
-    Questions raise ``QueryError`` where a word is empty or not understood, and ``BackendError`` where the map was made
-    without the model that they need. ``data`` is the map as a value, ``path`` its folder, or a name of a map in memory.
+    ``QueryError``: a word is empty or not understood. ``BackendError``: the map was made without the model needed.
     """
 
     def __init__(
         self,
-        data: "MapData",
+        data: MapData,
         encoders: "Encoders | None" = None,
         *,
         path: Path | None = None,
         settings: QuerySettings | None = None,
-        edits: "Sequence[Edit] | None" = None,
+        edits: Sequence[Edit] | None = None,
         heats: HeatCache | None = None,
     ) -> None:
-        """Take a map.
-
-        ``encoders``: the models to ask with; by default those that it names. ``edits``: what people corrected; None for
-        those in the map's folder, none for what the encoders say alone.
-        """
+        """``encoders``: by default those that it names. ``edits``: None for those of the map's folder, () for none."""
         self.data, self.path = data, path or Path("a map in memory")
         self._encoders = encoders
         self.settings = settings or QuerySettings()
@@ -87,23 +83,17 @@ class AVLMap:
     @classmethod
     def open(cls, path: str | Path, settings: QuerySettings | None = None) -> "AVLMap":
         """Open a map's folder. ``MapError``: it is not a map, damaged, or of another schema or profile."""
-        from avlmaps.maps.store.folder import read
-
         path = lasting_path(path)
         return cls(read(path), path=path, settings=settings)
 
     @cached_property
     def encoders(self) -> "Encoders":
         """The models that it is asked with; those that it names need not be known here until they are used."""
-        from avlmaps.maps.store.map_data import encoders_of_map
-
-        return self._encoders or encoders_of_map(self.data.info)
+        return self._encoders or map_data.encoders_of_map(self.data.info)
 
     def require_model(self, kind: Kind) -> None:
         """Raise ``MapError`` unless its encoder of a kind is the one that made its features."""
-        from avlmaps.maps.store.map_data import require_model
-
-        require_model(self.data.info, self.encoders, kind, self.path)
+        map_data.require_model(self.data.info, self.encoders, kind, self.path)
 
     def has(self, kind: Kind) -> bool:
         """Return whether the map was made with a model of a kind: without one of pixels it names no things."""
@@ -139,11 +129,8 @@ class AVLMap:
     # What people corrected.
 
     @cached_property
-    def edited(self) -> "Edited":
+    def edited(self) -> Edited:
         """What people corrected, as it applies to this map."""
-        from avlmaps.maps.store.edits import read_edits
-        from avlmaps.query.edits import Edited
-
         return Edited(read_edits(self.path) if self._given_edits is None else self._given_edits, self)
 
     @property
@@ -196,11 +183,7 @@ class AVLMap:
 
     @checked(QueryError)
     def object(self, word: str, primary: bool = False, vocabulary: Sequence[str] | None = None) -> Heatmap:
-        """Return the heat of an object.
-
-        ``primary``: whether it is what is sought (reaches 0.5 m) rather than a mark near it (5 m). ``vocabulary``: what
-        the word competes with, instead of the encoder's own list.
-        """
+        """Return the heat of an object; ``vocabulary``: what its word competes with, instead of the encoder's list."""
         part, heat = Part(Modality.OBJECT, word, _role(primary)), self.settings.heat
         factor = self.edited.pinned(part, heat)
         if factor is None and self.edited.is_room(word):
@@ -212,7 +195,7 @@ class AVLMap:
     @checked(QueryError)
     def area(self, word: str, primary: bool = False) -> Heatmap:
         """Return the heat of an area, such as a kitchen; or of one room by its number, such as bathroom 2."""
-        from avlmaps.query.modalities.area import area_factor
+        from avlmaps.query.rooms import area_factor
 
         part = Part(Modality.AREA, word, _role(primary))
         encoder = self.encoders.views
@@ -235,22 +218,21 @@ class AVLMap:
 
     @checked(QueryError)
     def sound_clip(self, clip: str | Path | Sound, primary: bool = False, *, at: HeardAt | None = None) -> Heatmap:
-        """Return the heat of sounds of the same kind as a clip; see ``sound``.
-
-        ``QueryError``: the clip is missing, unreadable or silent, or the map does not know where sounds came from.
-        """
+        """Return the heat of sounds like a clip; see ``sound``. ``QueryError``: it is missing, unreadable or silent."""
         if not isinstance(clip, str | Path | Sound):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise QueryError(
                 f"A clip is the path of a file or an avlmaps.Sound(samples, rate_hz), not {type(clip).__name__}."
             )
-        name = "a clip" if isinstance(clip, Sound) else str(clip)
+        if isinstance(clip, Sound):
+            name, sound = "a clip", modalities.require_audible(clip, "that was given")
+        else:
+            name, sound = str(clip), modalities.read_clip(user_path(clip))
         part = Part(Modality.SOUND, name, _role(primary), is_file=True)
-        sound = require_audible(clip, "that was given") if isinstance(clip, Sound) else read_clip(user_path(clip))
         heard, scores = self.data.sounds, np.zeros(0)
         if len(heard):
             self.require_model(Kind.SOUNDS)
             encoder = self.encoders.sounds
-            scores = encoder.score_sounds(sound_features(heard), encoder.encode(sound))
+            scores = encoder.score_sounds(modalities.sound_features(heard), encoder.encode(sound))
         return self._sound_heat(part, scores, at)
 
     @checked(QueryError)
@@ -260,15 +242,15 @@ class AVLMap:
         if not len(heard):
             return np.zeros(0)
         self.require_model(Kind.SOUNDS)
-        return self.encoders.sounds.score_words(sound_features(heard), [text])[:, 0]
+        return self.encoders.sounds.score_words(modalities.sound_features(heard), [text])[:, 0]
 
     def _sound_heat(self, part: Part, scores: Float[np.ndarray, " sounds"], at: HeardAt | None) -> Heatmap:
         settings, heat = self.settings.sounds, self.settings.heat
         _require_place(at)
         if (at or settings.at) == "source" and len(scores):
-            factor = source_factor(self.space, self.source_map, scores, part, settings, heat)
+            factor = modalities.source_factor(self.space, self.source_map, scores, part, settings, heat)
         else:
-            factor = sound_factor(self.space, self.data.sounds, scores, part, settings, heat)
+            factor = modalities.sound_factor(self.space, self.data.sounds, scores, part, settings, heat)
         return Heatmap.of(factor, self.settings.found_at)
 
     @checked(QueryError)
@@ -286,7 +268,8 @@ class AVLMap:
         called = str(picture) if isinstance(picture, str | Path) else "a picture"
         part = Part(Modality.IMAGE, called, _role(primary), is_file=True)
         located = self._located(_photo(picture, intrinsics), intrinsics, _GUESS_FROM)
-        return Heatmap.of(image_factor(self.space, located, part, self.settings.heat), self.settings.found_at)
+        factor = modalities.image_factor(self.space, located, part, self.settings.heat)
+        return Heatmap.of(factor, self.settings.found_at)
 
     @checked(QueryError)
     def locate(
@@ -308,7 +291,7 @@ class AVLMap:
     def _located(self, photo: Photo, intrinsics: Pinhole | None, guess_references: int = 0) -> "Located":
         from avlmaps.query import locate
 
-        require_fitting(photo.rgb, intrinsics)
+        modalities.require_fitting(photo.rgb, intrinsics)
         for kind in (Kind.LOCAL, Kind.PLACE):  # an imported map has neither
             self.require_model(kind)
         rng = np.random.default_rng(self.settings.seed)
@@ -384,11 +367,7 @@ class AVLMap:
 
     @checked(QueryError)
     def instances(self, word: str, alone: bool = False) -> Instances:
-        """Return the instances of a word: connected voxels that it wins against the vocabulary.
-
-        With ``alone``, one of the encoder's names stands for itself, without the narrower ones that it takes in: then
-        an armchair is no "chair".
-        """
+        """Return the instances of a word; ``alone`` leaves out its narrower names: then an armchair is no "chair"."""
         return self.edited.instances(self._names.search(word, alone), word)
 
     def closest_words(self) -> ClosestWords:
@@ -403,18 +382,16 @@ class AVLMap:
         names: Sequence[str] | None = None,
         least_confidence: float = 0.5,
         structure: bool = False,
-        watch: "Watch" = lambda stage, done, total: None,
+        watch: Watch = lambda stage, done, total: None,
         *,
         at: str | int | None = None,
         room: str | None = None,
-    ) -> list["Thing"]:
+    ) -> list[Thing]:
         """Return the things of the map, most confident first; see ``contents.find_things``.
 
-        ``at``: those that were there on a day: a date, or the number of a visit from 1. What moved or went since is
-        where it was; ``rows`` holds what is left of it, ``heard`` what was heard from it on that day. ``room``: those
-        in a room by its name, or in all rooms of a kind.
-
-        ``QueryError``: there is no such room, or the map was not seen on such a day, or on one day alone.
+        ``at``: those that were there on a day: a date, or the number of a visit from 1; their ``rows`` hold what is
+        left of them. ``room``: those in a room by its name, or in all rooms of a kind. ``QueryError``: there is no such
+        room, or the map was not seen on such a day.
         """
         if room is not None:
             self.where.require(room)
@@ -441,14 +418,12 @@ class AVLMap:
         names: Sequence[str] | None = None,
         least_confidence: float = 0.5,
         structure: bool = False,
-        watch: "Watch" = lambda stage, done, total: None,
-    ) -> list["Thing"]:
+        watch: Watch = lambda stage, done, total: None,
+    ) -> list[Thing]:
         """Return ``things`` as the encoder sees them, without what people corrected."""
-        from avlmaps.query.contents import find_things
+        return contents.find_things(self, self._names.search, names, least_confidence, structure, watch)
 
-        return find_things(self, self._names.search, names, least_confidence, structure, watch)
-
-    def things_to_edit(self, name: str | None) -> "Sequence[Thing]":
+    def things_to_edit(self, name: str | None) -> Sequence[Thing]:
         """Return the things that an edit may be about, as the encoder sees them: of a name, or of its vocabulary."""
         if name not in self._to_edit:
             is_seen = self.has(Kind.PIXELS) and (name is None or self.sees(name))
@@ -458,32 +433,24 @@ class AVLMap:
         return self._to_edit[name]
 
     @checked(QueryError)
-    def sounds(self, most_names: int = 3) -> list["SoundEvent"]:
+    def sounds(self, most_names: int = 3) -> list[SoundEvent]:
         """Return the sounds of the map in the order of their onset; see ``contents.find_sounds``."""
-        from avlmaps.query.contents import find_sounds
-
-        return find_sounds(self, most_names)
+        return contents.find_sounds(self, most_names)
 
     @checked(QueryError)
-    def rooms(self, least_confidence: float = 0.0) -> list["Room"]:
+    def rooms(self, least_confidence: float = 0.0) -> list[Room]:
         """Return the rooms of the map, those with most views first; see ``contents.find_rooms``."""
-        from avlmaps.query.contents import find_rooms
-
-        return self.edited.listed_rooms(find_rooms(self, least_confidence))
+        return self.edited.listed_rooms(contents.find_rooms(self, least_confidence))
 
     @checked(QueryError)
     def contents(
         self, least_confidence: float = 0.5, names: Sequence[str] | None = None, structure: bool = False
-    ) -> "Contents":
-        """Return the things, sounds and rooms of the map; none of a kind that the map has no model for.
-
-        ``QueryError``: ``least_confidence`` lies outside [0, 1], or the pixel encoder does not know a name.
-        """
-        from avlmaps.query.contents import Contents, require_known
+    ) -> Contents:
+        """Return the things, sounds and rooms of the map; none of a kind that the map has no model for."""
         from avlmaps.query.sound_sources import with_heard
 
         sees = self.has(Kind.PIXELS)
-        require_known(self.knows, (names or ()) if sees else ())
+        contents.require_known(self.knows, (names or ()) if sees else ())
         things = self.things(names, least_confidence, structure) if sees else []
         things = with_heard(self, things, are_all=not names)
         rooms = self.rooms() if self.has(Kind.VIEWS) else []
@@ -501,8 +468,7 @@ class AVLMap:
     def changes(self, since: str | int = 1, *, first_seen: bool = False) -> "ChangesAnswer":
         """Return what is new, moved and gone after a day: a date, or the number of a visit from 1.
 
-        ``first_seen``: also what was seen first where nobody had looked before. ``QueryError``: the map was not seen on
-        such a day, or on one day alone.
+        ``first_seen``: also what was seen first where nobody had looked before. ``QueryError``: there is no such day.
         """
         from avlmaps.query.changes import Days, changes_answer
 
@@ -512,12 +478,8 @@ class AVLMap:
 
     @checked(QueryError)
     def last_seen(self, name: str) -> "LastSeenAnswer":
-        """Return where things of a name were last seen, those that are there still first, then the latest.
-
-        ``QueryError``: the map was seen on one day alone.
-        """
+        """Return where things of a name were last seen. ``QueryError``: the map was seen on one day alone."""
         from avlmaps.query.changes import Days, last_seen
-        from avlmaps.query.edits import means
 
         return last_seen(Days.of(self), name, means(name), self.where.name_of)
 
@@ -592,10 +554,7 @@ class AVLMap:
 
     @cached_property
     def room_field(self) -> "RoomField | None":
-        """How likely each place is each kind of room that the view encoder knows or a person named.
-
-        None without votes. ``BackendError``: there is no view encoder. ``MapError``: it is another than the map's.
-        """
+        """How likely each place is each kind of room that the encoder knows or a person named; None without votes."""
         seen = self._rooms.field
         return None if seen is None else self._settled(seen)
 
@@ -663,7 +622,7 @@ def _photo(picture: "str | Path | Photo | UInt8[np.ndarray, 'h w 3']", intrinsic
     from avlmaps.query.locate import focal_35mm_of
 
     path = user_path(picture)
-    return Photo(read_picture(path), None if intrinsics is not None else focal_35mm_of(path))
+    return Photo(modalities.read_picture(path), None if intrinsics is not None else focal_35mm_of(path))
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:
@@ -676,6 +635,6 @@ def _role(primary: bool) -> Role:
     return Role.PRIMARY if primary else Role.CONTEXT
 
 
-def with_findings(data: "MapData", encoders: "Encoders") -> "MapData":
+def with_findings(data: MapData, encoders: "Encoders") -> MapData:
     """Return a map with what encoders find in it by their names: the closest names of each voxel, things and rooms."""
     return replace(data, findings=AVLMap(data, encoders, edits=()).found())

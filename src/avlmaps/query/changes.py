@@ -85,10 +85,7 @@ class Days:
         return [number for number, stay in enumerate(self.life.stays) if stay.is_there(visit)]
 
     def changes(self, since: int = 0) -> "list[Change]":
-        """Return what changed after a visit, in the order of time.
-
-        What was seen first on a later day is ``new`` only where its place had been looked through before.
-        """
+        """Return what changed after a visit, in time; ``new`` is what stands where somebody had looked before."""
         found: list[Change] = []
         stays = self.life.stays
         for number, stay in enumerate(stays):
@@ -267,10 +264,7 @@ class Usual:
 
 
 def usual(days: Days, wanted: "Callable[[Stay], bool]") -> list[Usual]:
-    """Return things of some stays, each at its place, the most usual first.
-
-    Stays of one name within a metre are one thing that came and went. It was there on each day that saw one of them.
-    """
+    """Return things of some stays, the most usual first; of one name within a metre they are one thing."""
     groups: list[list[Stay]] = []
     for stay in sorted(days.life.stays, key=lambda one: (one.last, one.last_seen_s), reverse=True):
         if stay.is_person or not wanted(stay):

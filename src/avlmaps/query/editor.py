@@ -33,9 +33,8 @@ _NEEDS = {"rename": ("to",), "rename-room": ("name", "to"), "forbid": ("name",),
 class Editor:
     """Corrects a map in its folder, which another build of it keeps.
 
-    ``by`` says who made an edit, ``thing`` what a thing is called (None for what is at a place), ``at`` where it is,
-    for one of several, and ``to`` its name from now on. ``QueryError``: there is no such thing or room, or there are
-    several, or a name or place is none. ``MapError``: the map lies in memory alone, or cannot be written.
+    ``by`` made the edit, ``thing`` is its name (None for what is at a place), ``at`` where it is. ``QueryError``: there
+    is no such thing or room, or several, or a name or place is none. ``MapError``: the map cannot be written.
     """
 
     def __init__(self, avlmap: "AVLMap") -> None:
@@ -56,10 +55,7 @@ class Editor:
 
     @checked(QueryError)
     def merge(self, *things: Place, to: str = "", by: str = "") -> Edit:
-        """Make one thing of several that the map takes apart, by a place on each; its name is by default the first's.
-
-        ``QueryError``: fewer than two different things are meant, or they lie far apart.
-        """
+        """Make one thing of several, by a place on each. ``QueryError``: they are fewer than two, or far apart."""
         found = [self._thing(None, place) for place in things]
         if len({int(one.rows[0]) for one in found}) < 2:
             raise QueryError(f"{len(found)} place(s) mean fewer than two things; give a place on each that is merged.")
@@ -77,18 +73,10 @@ class Editor:
 
     @checked(QueryError)
     def split(
-        self,
-        thing: str | None,
-        *,
-        at: Place | None = None,
-        plane: Sequence[Place] = (),
-        box: Sequence[float] = (),
+        self, thing: str | None, *, at: Place | None = None, plane: Sequence[Place] = (), box: Sequence[float] = (),
         by: str = "",
-    ) -> Edit:
-        """Take a thing apart by its connected pieces, by an upright plane through two places, or by a box.
-
-        The box is x and y of two opposite corners, level frame, metres. ``QueryError``: the cut leaves the thing whole.
-        """
+    ) -> Edit:  # fmt: skip
+        """Take a thing apart by its connected pieces, a plane through two places, or a box (level frame, metres)."""
         found = self._thing(thing, at)
         if len(plane) not in (0, 2) or (plane and box):
             raise QueryError("A thing is split by a plane through two places, or by a box, or by neither.")
@@ -125,10 +113,7 @@ class Editor:
 
     @checked(QueryError)
     def pin(self, name: str, at: Place, *, by: str = "") -> Edit:
-        """Give a place a name of one's own: "my charging dock". The same name again moves it.
-
-        A place of two numbers is on the floor of the storey where the map's walk began. ``QueryError``: it is far away.
-        """
+        """Give a place a name of one's own; without a height it is on the floor where the walk began."""
         self._require_here(self._level(at)[None], "The place")
         spot = EditedSpot(middle=plain_point(self._in_space(place_given(at))))
         return self._add("pin", [spot.anchored(self._map.data.keyframes)], name=_own_name(name), by=by)
@@ -144,17 +129,9 @@ class Editor:
         return self._append(self._new("undo", of=wanted[0].id, by=by))
 
     def make(
-        self,
-        does: str,
-        *,
-        name: str = "",
-        to: str = "",
-        at: Place | None = None,
-        places: Sequence[Place] = (),
-        box: Sequence[float] = (),
-        room: str | None = None,
-        by: str = "",
-    ) -> Edit:
+        self, does: str, *, name: str = "", to: str = "", at: Place | None = None, places: Sequence[Place] = (),
+        box: Sequence[float] = (), room: str | None = None, by: str = "",
+    ) -> Edit:  # fmt: skip
         """Make an edit that a front names by a word; ``name`` is the thing or room, or the edit that is undone."""
         given = {"name": name, "to": to, "at": at}
         for need in _NEEDS.get(does, ()):

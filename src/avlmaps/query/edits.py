@@ -1,8 +1,4 @@
-"""What people corrected in a map, found in it as it is now and applied to every question, list, picture and path.
-
-A thing that was edited is a ``Claim``: voxels with a name, whatever the encoder sees there. A room's name is put into
-the field of kinds of room, from which rooms and areas follow.
-"""
+"""What people corrected in a map, found in it as it is now and applied to every question, list and path."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,8 +15,7 @@ from avlmaps.core.question import Part
 from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import Edit, EditedSpot, World, in_force
 from avlmaps.query.factors import NearAnchors, NearThings
-from avlmaps.query.instances import Instances
-from avlmaps.query.modalities.object import colour_in, colour_share
+from avlmaps.query.objects import Instances, colour_in, colour_share
 from avlmaps.query.settings import FOUND_AT, HeatSettings
 from avlmaps.query.voxel_space import linked
 
@@ -168,7 +163,7 @@ class Edited:
         return [Claim(edit.name or first.name, rows, sure, bool(edit.name) or first.is_named, edit)]
 
     def _pieces(self, rows: Rows, edit: Edit) -> list[Rows]:
-        from avlmaps.query.storey_grid import in_polygon
+        from avlmaps.query.floor_plan import in_polygon
 
         space, spot = self._map.space, edit.at[0]
         level = space.level(space.centres_of(rows))
@@ -455,7 +450,7 @@ class Edited:
         """Return who corrected what an answer is about, and when, in a sentence each."""
         if not self.edits:
             return ()
-        from avlmaps.query.modalities.area import same_place
+        from avlmaps.query.rooms import same_place
 
         space, names, rooms = self._map.space, set(map(plain_name, named)), list(map(plain_name, areas))
         points = np.asarray(places, np.float64).reshape(-1, 1, 3)

@@ -1,8 +1,4 @@
-"""A map for other programs: point clouds and meshes (PLY, GLB, PCD), occupancy grids (PGM, YAML) and tables (CSV).
-
-A file says in which frame its coordinates are, metres: the recording's, or the level one, which shares its origin and
-whose z is up. An occupancy grid is always level.
-"""
+"""A map for other programs: point clouds and meshes, occupancy grids and tables, which name their frame, metres."""
 
 import csv
 import io
@@ -90,17 +86,10 @@ def palette(count: int) -> UInt8[np.ndarray, "k 3"]:
 
 
 def write_ply(
-    path: Path,
-    space: "Space",
-    colors: UInt8[np.ndarray, "n 3"],
-    columns: dict[str, np.ndarray] | None = None,
+    path: Path, space: "Space", colors: UInt8[np.ndarray, "n 3"], columns: dict[str, np.ndarray] | None = None,
     frame: FrameName = FrameName.RECORDING,
-) -> Path:
-    """Write the voxels as a binary PLY point cloud; comments in its head name the frame, and turn it into the other.
-
-    ``colors``: RGB. ``columns``: more numbers for each voxel (``heat``, ``weight``), written as float32.
-    ``QueryError``: the file cannot be written.
-    """
+) -> Path:  # fmt: skip
+    """Write the voxels as a binary PLY point cloud, with ``columns`` as float32; its head names the frame."""
     points = space.level_centres() if frame is FrameName.LEVEL else space.centres
     fields = {name: ("<f4", "float", column) for name, column in zip("xyz", points.T, strict=True)}
     fields |= {name: ("u1", "uchar", column) for name, column in zip(("red", "green", "blue"), colors.T, strict=True)}
@@ -137,11 +126,7 @@ def voxel_mesh(
 def write_glb(
     path: Path, space: "Space", colors: UInt8[np.ndarray, "n 3"], frame: FrameName = FrameName.RECORDING
 ) -> Path:
-    """Write the voxels as blocks into a GLB file; its ``extras`` name the frame.
-
-    In the level frame its z is along the file's y, as viewers of GLB expect, and its y along −z. ``QueryError``: the
-    map is empty, or the file cannot be written.
-    """
+    """Write the voxels as blocks into a GLB file (level: its y up, as viewers expect); ``extras`` name the frame."""
     import trimesh
     from trimesh.exchange.gltf import export_glb  # pyright: ignore[reportUnknownVariableType]
 
@@ -159,11 +144,7 @@ def write_glb(
 
 
 def write_occupancy(path: Path, obstacles: "Obstacles") -> tuple[Path, Path]:
-    """Write a PGM picture and the YAML file that Nav2's ``map_server`` reads, and return both.
-
-    The grid is in the level frame: x to the right, y up, the first row of the picture at the largest y.
-    ``QueryError``: a file cannot be written.
-    """
+    """Write a PGM picture (level frame, first row at the largest y) and the YAML file of Nav2's ``map_server``."""
     from avlmaps.maps.obstacles import CellState
 
     gray = np.full(obstacles.states.shape, _UNKNOWN, np.uint8)
@@ -172,32 +153,22 @@ def write_occupancy(path: Path, obstacles: "Obstacles") -> tuple[Path, Path]:
     picture = np.ascontiguousarray(gray.T[::-1])
     x, y = (float(value) for value in obstacles.origin_m)
     rotation = [[round(float(value), 9) for value in row] for row in obstacles.level_from_world]
-    lines = [
-        f"image: {path.name}",
-        "mode: trinary",
-        f"resolution: {obstacles.cell_size_m:g}",
-        f"origin: [{x:.6f}, {y:.6f}, 0.0]",
-        "negate: 0",
-        "occupied_thresh: 0.65",
-        "free_thresh: 0.196",
-        f"# Level frame, z up; the floor lies at z = {obstacles.floor_m:.3f} m. level_from_recording: {rotation}",
-        "",
-    ]
+    text = (
+        f"image: {path.name}\nmode: trinary\nresolution: {obstacles.cell_size_m:g}\norigin: [{x:.6f}, {y:.6f}, 0.0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+        f"# Level frame, z up; the floor lies at z = {obstacles.floor_m:.3f} m. level_from_recording: {rotation}\n"
+    )
     if obstacles.storeys is not None:
-        lines.insert(-1, f"# Storey {obstacles.storey} of {len(obstacles.storeys)}, counted from 0, the lowest.")
+        text += f"# Storey {obstacles.storey} of {len(obstacles.storeys)}, counted from 0, the lowest.\n"
     described = path.with_suffix(".yaml")
     _write(path, f"P5\n{picture.shape[1]} {picture.shape[0]}\n255\n".encode("ascii") + picture.tobytes())
-    return path, _write(described, "\n".join(lines).encode("utf-8"))
+    return path, _write(described, text.encode("utf-8"))
 
 
 def write_table(
     path: Path, things: "Iterable[ListedThing]", sounds: "Iterable[SoundAnswer]", frame: str = FrameName.RECORDING
 ) -> Path:
-    """Write things and sounds as CSV, one row each, as an answer lists them, metres.
-
-    Sizes are along the axes of the level frame in either frame. Where rows have a storey, a room or a distance, these
-    are columns at the end. ``QueryError``: the file cannot be written.
-    """
+    """Write things and sounds as CSV, one row each, metres; storey, room and distance are columns at the end."""
     rows: list[dict[str, object]] = []
     for thing in things:
         numbers = (thing["confidence"], *thing["position"], *thing["size"])
@@ -264,21 +235,11 @@ def pcd_bytes(points: Float32[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3
     rows = np.zeros(len(points), np.dtype([("xyz", "<f4", 3), ("bgr0", "u1", 4)]))
     rows["xyz"] = points
     rows["bgr0"][:, :3] = colors[:, ::-1]
-    header = [
-        "# .PCD v0.7 - Point Cloud Data file format",
-        "VERSION 0.7",
-        "FIELDS x y z rgb",
-        "SIZE 4 4 4 4",
-        "TYPE F F F F",
-        "COUNT 1 1 1 1",
-        f"WIDTH {len(rows)}",
-        "HEIGHT 1",
-        "VIEWPOINT 0 0 0 1 0 0 0",
-        f"POINTS {len(rows)}",
-        "DATA binary",
-        "",
-    ]
-    return "\n".join(header).encode("ascii") + rows.tobytes()
+    header = (
+        "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\n"
+        f"COUNT 1 1 1 1\nWIDTH {len(rows)}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(rows)}\nDATA binary\n"
+    )
+    return header.encode("ascii") + rows.tobytes()
 
 
 def _npy(array: np.ndarray) -> bytes:

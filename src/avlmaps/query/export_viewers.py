@@ -1,7 +1,4 @@
-"""A map for viewers, over the time of its recording: Rerun (``.rrd``) and Foxglove (MCAP with its protobuf schemas).
-
-Each needs the extra of its name. What holds at any time is logged at the first instant.
-"""
+"""A map for viewers, over its recording's time: Rerun (``.rrd``) and Foxglove (MCAP), each with its extra."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -108,19 +105,14 @@ def layers_of(
         warm = heat, np.asarray(asked.values, np.float32)
     keyframes, rig = opened.data.keyframes, opened.data.rig
     pictures = tuple(keyframes.jpeg(row).tobytes() for row in range(len(keyframes)))
+    sounds = sorted(opened.sounds(), key=lambda one: one.onset_s)
     return Layers(
-        frame=frame,
-        points=placed(opened.points).astype(np.float32),
-        colors=np.ascontiguousarray(opened.colors),
-        voxel_size_m=float(space.grid.voxel_size_m),
-        things=tuple(boxes),
-        sounds=tuple(_heard(sound, placed) for sound in sorted(opened.sounds(), key=lambda one: one.onset_s)),
-        heat=warm,
-        stamp_s=np.array(keyframes.stamp_s, np.float64),
+        frame=frame, points=placed(opened.points).astype(np.float32), colors=np.ascontiguousarray(opened.colors),
+        voxel_size_m=float(space.grid.voxel_size_m), things=tuple(boxes), heat=warm, pictures=pictures,
+        sounds=tuple(_heard(sound, placed) for sound in sounds), stamp_s=np.array(keyframes.stamp_s, np.float64),
         frame_from_camera=turn @ keyframes.world_from_camera @ inverse(rig.rgb_from_depth),
         camera=_stored_camera(rig.rgb, pictures),
-        pictures=pictures,
-    )
+    )  # fmt: skip
 
 
 def _heard(sound: "SoundEvent", placed: Callable[[np.ndarray], np.ndarray]) -> ExportedSound:

@@ -246,10 +246,7 @@ def lead_of(factors: Sequence[Factor]) -> Factor:
 
 
 def stretch_scores(scores: Float[np.ndarray, " a"]) -> Float[np.ndarray, " a"]:
-    """Stretch scores to [0, 1] as the paper does, lowest to 0 and highest to 1; all become 1 where they are equal.
-
-    Only order survives: use it for scores that are not calibrated. ``ValueError``: a score is NaN or infinite.
-    """
+    """Stretch scores to [0, 1] as the paper does, all to 1 where equal. ``ValueError``: a score is NaN or infinite."""
     if not np.isfinite(scores).all():
         raise ValueError("a score is NaN or infinite")
     low, high = np.min(scores, initial=np.inf), np.max(scores, initial=-np.inf)
@@ -293,12 +290,9 @@ def object_heat(
 
 
 def anchor_heat(
-    space: Space,
-    anchors: Float[np.ndarray, "a 3"],
-    scores: Float[np.ndarray, " a"],
-    falloff_per_m: float,
+    space: Space, anchors: Float[np.ndarray, "a 3"], scores: Float[np.ndarray, " a"], falloff_per_m: float,
     among: Bool[np.ndarray, " n"] | None = None,
-) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:  # fmt: skip
     """Return max over anchors of s − ε·d_xy, floored at 0, for every voxel, and which anchor was highest (−1: none).
 
     ``anchors``: metres, world. ``scores``: s, in [0, 1]. ``among``: the voxels that are wanted; others have no heat.

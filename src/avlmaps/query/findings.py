@@ -1,7 +1,6 @@
 """What the encoders of a map see in it: the names closest to each voxel, things, rooms and their kinds.
 
-The end of a build stores them (``MapData.findings``), each with a key of the encoders and settings that found it; a map
-with others is looked through again.
+A build stores them (``MapData.findings``) with keys of its encoders and settings; for others they are found again.
 """
 
 import hashlib
@@ -20,8 +19,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder, read_room_contents
 from avlmaps.query.factors import NearThings
-from avlmaps.query.instances import FeatureVoxels, Instances, confident_instances
-from avlmaps.query.modalities.object import object_factor
+from avlmaps.query.objects import FeatureVoxels, Instances, confident_instances, object_factor
 from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary, competes_whole
 
 if TYPE_CHECKING:
@@ -93,8 +91,8 @@ def _regions_to_arrays(regions: "RoomRegions") -> dict[str, np.ndarray]:
 
 
 def _regions_from(stored: Mapping[str, np.ndarray], plan: "FloorPlan") -> "RoomRegions":
+    from avlmaps.query.floor_plan import StoreyGrid
     from avlmaps.query.room_regions import RoomRegions
-    from avlmaps.query.storey_grid import StoreyGrid
 
     storeys = range(len(plan.storeys))
     frames, cells, labels = ([stored[f"{n}.{name}"] for n in storeys] for name in ("frame", "cells", "label"))
@@ -209,8 +207,7 @@ class MapRooms:
         """The votes on the kind of room of each place; None of a map without keyframes, or of kilometres of extent."""
         from avlmaps.maps.storeys import one_storey
         from avlmaps.query.floor_plan import FloorPlan
-        from avlmaps.query.modalities.area import area_anchors
-        from avlmaps.query.rooms import Rooms
+        from avlmaps.query.rooms import Rooms, area_anchors
 
         settings, avlmap = self._settings, self._map
         if not len(avlmap.data.keyframes):
@@ -241,8 +238,7 @@ class MapRooms:
     @cached_property
     def field(self) -> "RoomField | None":
         """How likely each cell of the floor plan is each kind of room, as the view encoder sees it."""
-        from avlmaps.query.modalities.area import area_names, name_shares
-        from avlmaps.query.rooms import RoomField
+        from avlmaps.query.rooms import RoomField, area_names, name_shares
 
         votes = self.votes
         if votes is None:
@@ -288,8 +284,7 @@ class MapRooms:
     @cached_property
     def room_of_cells(self) -> Int[np.ndarray, " c"]:
         """The number of the room of each cell of the floor plan."""
-        from avlmaps.query.modalities.area import area_anchors
-        from avlmaps.query.rooms import rooms_of_cells
+        from avlmaps.query.rooms import area_anchors, rooms_of_cells
 
         assert self.regions is not None
         return rooms_of_cells(self.regions, area_anchors(self._map.data.keyframes, self._settings))

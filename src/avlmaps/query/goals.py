@@ -1,9 +1,8 @@
 """From heat to places: distinct things rather than single voxels, ranked, and how likely each is right.
 
-The instances of the lead (the primary factor) divide the heated voxels among themselves: each voxel belongs to the one
-that its lead heat comes from. A goal lies where the product is highest in an instance's share; on a thing it is the
-middle of the part that is nearly as hot, so that one stray voxel does not decide where the robot goes. In a region
-("the chair in the kitchen") an instance lies as far as the region holds it (``Factor.held``).
+The instances of the lead (the primary factor) divide the heated voxels by where their lead heat comes from. A goal lies
+where the product is highest in an instance's share; on a thing it is the middle of what is nearly as hot, so that one
+stray voxel does not decide where the robot goes.
 
 The probability that a goal is right, all parts together, is a product of what makes it so, each with its own odds:
 
@@ -208,11 +207,7 @@ def share_voxels(
     values: Callable[[], Float32[np.ndarray, " n"]],
     of_things: Callable[[], Float32[np.ndarray, " n"]],
 ) -> Shares:
-    """Divide the heated voxels among the instances of the lead.
-
-    ``values`` returns the product at every voxel, ``of_things`` that without regions; both are slow, and not called for
-    one object alone, whose heat is 1 on it, nor for the anchors of one sound, area or image.
-    """
+    """Divide the heated voxels among the lead's instances; ``values`` and ``of_things`` (without regions) are slow."""
     lead = lead_of(factors)
     if isinstance(lead, NearThings) and len(factors) == 1:
         rows = np.flatnonzero(lead.mask)
@@ -248,10 +243,7 @@ def _highest(instance: Int[np.ndarray, " m"], heat: Float[np.ndarray, " m"], cou
 
 
 def weigh_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[tuple[Goal, GoalEvidence]]:
-    """Return up to ``top`` goals, best first by heat times the confidence of the lead's instance, with the evidence.
-
-    A thing has one goal: an instance that lies within the extent of a better one is taken for a part of that.
-    """
+    """Return up to ``top`` goals with their evidence, best first; what lies within a better one is a part of it."""
     lead, is_named = lead_of(factors), all(factor.is_named for factor in factors)
     score = np.round(shares.peak * lead.confidence, 3)  # more digits would be noise; of equals the larger leads
     extent = np.bincount(lead.instance, minlength=len(score))

@@ -49,10 +49,7 @@ class Heat(ABC):
     def _terms(self) -> "tuple[tuple[float, Heat], ...]": ...
 
     def at(self, points_world: Any) -> Float[np.ndarray, "*m"]:
-        """Return the heat at one point or an array (..., 3) of them, metres, recording frame.
-
-        ``QueryError``: they are no points.
-        """
+        """Return the heat at points (..., 3), metres, recording frame. ``QueryError``: they are no points."""
         points = np.asarray(points_world)
         if points.dtype.kind not in "fiu" or points.ndim == 0 or points.shape[-1] != 3 or not np.isfinite(points).all():
             said = f"{points.dtype} of {points.shape}"
@@ -311,10 +308,7 @@ class Heatmap(Heat):
     @overload
     def plot(self, path: None = None, *, top: int = 3, ax: "Axes | None" = None) -> "Figure": ...
     def plot(self, path: str | Path | None = None, *, top: int = 3, ax: "Axes | None" = None) -> "Path | Figure":
-        """Draw the map from above, each factor's heat and the product, with the goals numbered.
-
-        Without a ``path`` the figure is returned. ``QueryError``: the picture cannot be written there.
-        """
+        """Draw the map from above, each factor's heat and the product, with the goals numbered, and return that."""
         from avlmaps.query.plots import draw_heat, draw_heat_into, save
 
         if ax is not None:

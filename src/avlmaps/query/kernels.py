@@ -1,7 +1,4 @@
-"""The compiled inner loops of queries. Each has a brute-force twin in the tests.
-
-Loops over voxels take a range of blocks, so that threads can share them (they release the interpreter's lock).
-"""
+"""The compiled inner loops of queries; threads share the blocks of voxels that they take."""
 
 import numpy as np
 from jaxtyping import Float64, Int, Int32, Int64
@@ -18,16 +15,9 @@ _WIDE_M = 1.6
 
 @njit(cache=True, nogil=True)
 def _cones_near(
-    x: Real,
-    y: Real,
-    radius: Real,
-    anchors: Float64[np.ndarray, "n 2"],
-    score: Float64[np.ndarray, " n"],
-    falloff_per_m: Real,
-    among: Int64[np.ndarray, " n"],
-    count: Whole,
-    near: Int64[np.ndarray, " n"],
-):
+    x: Real, y: Real, radius: Real, anchors: Float64[np.ndarray, "n 2"], score: Float64[np.ndarray, " n"],
+    falloff_per_m: Real, among: Int64[np.ndarray, " n"], count: Whole, near: Int64[np.ndarray, " n"],
+):  # fmt: skip
     # Writes which of ``count`` cones can be the highest somewhere within a circle, and returns how many. A cone whose
     # best in the circle stays below another's worst is not. Scores fall, so that both passes can stop early; squares
     # are compared to save roots.
@@ -55,16 +45,10 @@ def _cones_near(
 
 @njit(cache=True, nogil=True)
 def cone_heat(
-    points: Float64[np.ndarray, "m 2"],
-    starts: Int64[np.ndarray, " edges"],
-    anchors: Float64[np.ndarray, "n 2"],
-    score: Float64[np.ndarray, " n"],
-    falloff_per_m: Real,
-    out: Float64[np.ndarray, " m"],
-    winner: Int[np.ndarray, " m"],
-    first_block: Whole,
-    last_block: Whole,
-):
+    points: Float64[np.ndarray, "m 2"], starts: Int64[np.ndarray, " edges"], anchors: Float64[np.ndarray, "n 2"],
+    score: Float64[np.ndarray, " n"], falloff_per_m: Real, out: Float64[np.ndarray, " m"],
+    winner: Int[np.ndarray, " m"], first_block: Whole, last_block: Whole,
+):  # fmt: skip
     """Write max over anchors of s − ε·d, floored at 0, for horizontal points in blocks, and who won (−1: none).
 
     Anchors come in falling score. All cones are looked through for a wide circle about a block, and those that it
@@ -96,16 +80,10 @@ def cone_heat(
 
 @njit(cache=True, nogil=True)
 def _things_near(
-    box_low: Int64[np.ndarray, "3"],
-    box_high: Int64[np.ndarray, "3"],
-    low: Int64[np.ndarray, "t 3"],
-    high: Int64[np.ndarray, "t 3"],
-    first: Whole,
-    last: Whole,
-    limit: Whole,
-    near: Int64[np.ndarray, " t"],
+    box_low: Int64[np.ndarray, "3"], box_high: Int64[np.ndarray, "3"], low: Int64[np.ndarray, "t 3"],
+    high: Int64[np.ndarray, "t 3"], first: Whole, last: Whole, limit: Whole, near: Int64[np.ndarray, " t"],
     gaps: Int64[np.ndarray, " t"],
-):
+):  # fmt: skip
     # Writes which blocks of things can hold the nearest to some voxel of a box, the nearest block first, and returns
     # how many: those whose least distance from the box is within the smallest of all largest distances.
     bound, count = np.int64(limit), 0
@@ -129,20 +107,11 @@ def _things_near(
 
 @njit(cache=True, nogil=True)
 def nearest_squared(
-    voxels: Int32[np.ndarray, "3 n"],
-    starts: Int64[np.ndarray, " edges"],
-    low: Int64[np.ndarray, "b 3"],
-    high: Int64[np.ndarray, "b 3"],
-    things: Int32[np.ndarray, "3 m"],
-    thing_starts: Int64[np.ndarray, " ends"],
-    thing_low: Int64[np.ndarray, "t 3"],
-    thing_high: Int64[np.ndarray, "t 3"],
-    limit: Whole,
-    out: Int[np.ndarray, " n"],
-    nearest: Int[np.ndarray, " n"],
-    first: Whole,
-    last: Whole,
-):
+    voxels: Int32[np.ndarray, "3 n"], starts: Int64[np.ndarray, " edges"], low: Int64[np.ndarray, "b 3"],
+    high: Int64[np.ndarray, "b 3"], things: Int32[np.ndarray, "3 m"], thing_starts: Int64[np.ndarray, " ends"],
+    thing_low: Int64[np.ndarray, "t 3"], thing_high: Int64[np.ndarray, "t 3"], limit: Whole, out: Int[np.ndarray, " n"],
+    nearest: Int[np.ndarray, " n"], first: Whole, last: Whole,
+):  # fmt: skip
     """Write each voxel's squared distance, in voxels, to the nearest thing, and which it is; at most ``limit`` and −1.
 
     Voxels and things come in blocks: places ``starts[b]:starts[b + 1]`` of int32 indices (one row an axis, so that the

@@ -22,10 +22,10 @@ from avlmaps.maps.storeys import Storeys, said_storeys
 from avlmaps.query import changes
 from avlmaps.query.answer import Alternative, Answer, in_words, placed, sentence_of
 from avlmaps.query.changes import ChangeKind, Days
+from avlmaps.query.contents import NOWHERE, Whereabouts
 from avlmaps.query.edits import means
 from avlmaps.query.goals import MOST_GOALS, Goal
 from avlmaps.query.places import lies_between
-from avlmaps.query.whereabouts import NOWHERE, Whereabouts
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Stay

@@ -43,6 +43,9 @@ _OF_ONE_SCALE = 0.85
 # Another place fits as well where this share of the points agrees there, so far away; so many keyframes are looked at.
 _AS_WELL, _ELSEWHERE_M, _MOST_ALIKE = 0.6, 2.0, 40
 _SAME_SIDE = 0.25  # cosine: no descriptor bears a change of view by more than 75 degrees
+# So many keypoints of one keyframe are enough: the poses of a recording drift, so that keyframes farther off pull the
+# answer away (measured: 0.79 cm with five, 0.63 cm with one).
+_ENOUGH_INLIERS = 60
 _REFERENCES = 5  # keyframes that look alike are matched where the most alike one alone does not match enough
 # The keyframe nearest to the answer is matched again, alone; the pose is accepted if this many keypoints agree.
 _NEAREST_INLIERS = 40
@@ -95,9 +98,6 @@ _SEARCH: dict[FocalSource, _FocalSearch] = {
 class LocateSettings:
     """How a picture is located, and when it counts as located: by points that agree, never by likeness."""
 
-    enough_inliers: int = 60
-    """This many keypoints of one keyframe are enough. More keyframes would not help: the poses of a recording drift,
-    so that keyframes farther off pull the answer away (measured: 0.79 cm with five, 0.63 cm with one)."""
     min_inliers: int = 15
     """A pose needs this many keypoints that agree with it (each counted once). Pictures of another place reach 7."""
     guess_references: int = 0
@@ -173,13 +173,9 @@ class Located:
 
 
 def locate(
-    stored: LocatableMap,
-    rgb: UInt8[np.ndarray, "h w 3"],
-    camera: Pinhole | None,
-    rng: np.random.Generator,
-    settings: LocateSettings = LocateSettings(),
-    focal_35mm: float | None = None,
-) -> Located:
+    stored: LocatableMap, rgb: UInt8[np.ndarray, "h w 3"], camera: Pinhole | None, rng: np.random.Generator,
+    settings: LocateSettings = LocateSettings(), focal_35mm: float | None = None,
+) -> Located:  # fmt: skip
     """Find where a picture was taken.
 
     ``camera``: that took it; None where nobody knows: that of ``focal_35mm`` (mm for 35 mm film, from the picture's
@@ -197,14 +193,9 @@ def locate(
 
 
 def locate_features(
-    stored: LocatableMap,
-    local: LocalFeatures,
-    place: Float32[np.ndarray, " d"],
-    camera: Pinhole,
-    rng: np.random.Generator,
-    settings: LocateSettings = LocateSettings(),
-    source: FocalSource = "given",
-) -> Located:
+    stored: LocatableMap, local: LocalFeatures, place: Float32[np.ndarray, " d"], camera: Pinhole,
+    rng: np.random.Generator, settings: LocateSettings = LocateSettings(), source: FocalSource = "given",
+) -> Located:  # fmt: skip
     """Find where a picture was taken that has been through the encoders already; ``elapsed_ms`` stays 0."""
     if local.size == (0, 0):
         local = replace(local, size=(camera.width, camera.height))
@@ -235,7 +226,7 @@ class _Search:
         keyframes, settings, search = self.stored.keyframes, self.settings, _SEARCH[source]
         references = alike(keyframes, place, _REFERENCES)
         fit = self.fit(references[:1], camera, search)
-        if fit is None or fit.inliers < settings.enough_inliers:
+        if fit is None or fit.inliers < _ENOUGH_INLIERS:
             fit = self.fit(references, camera, search) or fit
         uncertainty = None if fit is None or source == "given" else fit.uncertainty
         unsure = uncertainty is not None and not uncertainty.place_m <= settings.max_place_error_m

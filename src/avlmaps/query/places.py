@@ -1,8 +1,4 @@
-"""Places: as people give them, what is at one, and answers in the frame that a person wants.
-
-A place is x,y,z in metres of the recording frame, or x,y of the level frame, whose z is up; both have one origin
-(docs/conventions.md). Sizes are along the level axes in either.
-"""
+"""Places: as people give them (x,y,z of the recording's frame or x,y of the level one), and what is at one."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -46,10 +42,7 @@ def distance_m(
     point: Sequence[float],
     place: Float[np.ndarray, " n"],
 ) -> float:
-    """Return how far a point lies from a place: in space, or level where the place has no height.
-
-    ``level`` turns points of the recording frame into the level one. ``point``: x, y, z, recording frame.
-    """
+    """Return how far a point (recording frame) lies from a place: in space, or level where that has no height."""
     here = np.array(point)
     return math.dist(here, place) if len(place) == 3 else math.dist(level(here)[:2], place)
 
@@ -122,10 +115,7 @@ def voxels_near(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: float
 
 
 def column_point(avlmap: "AVLMap", level_xy: Float[np.ndarray, "2"], radius_m: float) -> Float[np.ndarray, "3"] | None:
-    """Return the place on the highest voxel under head height of a column, recording frame; None for an empty column.
-
-    Who points at a floor plan means the thing that stands there, not the ceiling over it.
-    """
+    """Return the place on the highest voxel under head height of a column, recording frame; None if empty."""
     space = avlmap.space
     level = space.level(space.centres)
     rows = np.flatnonzero(np.square(level[:, :2] - level_xy).sum(axis=1) <= radius_m**2)
@@ -137,10 +127,7 @@ def column_point(avlmap: "AVLMap", level_xy: Float[np.ndarray, "2"], radius_m: f
 
 
 def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: float = 0.15) -> PlaceAnswer:
-    """Return the content of a map at a point (metres, recording frame) and within a radius.
-
-    ``QueryError``: a number is not finite, or the radius not in (0, 5] m.
-    """
+    """Return the content of a map at a point, metres, recording frame. ``QueryError``: it is no point, or too wide."""
     if not (np.isfinite(point).all() and np.abs(point).max(initial=0.0) <= FARTHEST_M):
         raise QueryError("The place is not a point in metres; give finite numbers, such as 1.5,2.0,0.8.")
     if not 0.0 < radius_m <= 5.0:
@@ -248,10 +235,7 @@ def last_seen(avlmap: "AVLMap", thing: str, top: int = 3) -> LastSeenAnswer:
 
 
 def answer_in(answer: Mapping[str, Any], frame: FrameName, level_from_recording: Float[np.ndarray, "4 4"]) -> Any:
-    """Return an answer of the command line with all its positions, poses and texts about them in a frame.
-
-    ``answer``: in the recording's frame, with ``position``, ``outline`` and ``world_from_camera`` at any depth.
-    """
+    """Return an answer of the recording's frame with all positions, poses and texts about them in a frame."""
     if frame is FrameName.RECORDING:
         return dict(answer)
     spoken: dict[str, str] = {}

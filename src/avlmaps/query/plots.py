@@ -90,12 +90,9 @@ def _ceiling_m(space: Space, level: Float[np.ndarray, "n 3"]) -> float:
 
 
 def _highest_colours(
-    space: Space,
-    cell: Int[np.ndarray, "n 2"],
-    height_m: Float[np.ndarray, " n"],
-    visible: Bool[np.ndarray, " n"],
+    space: Space, cell: Int[np.ndarray, "n 2"], height_m: Float[np.ndarray, " n"], visible: Bool[np.ndarray, " n"],
     shape: tuple[int, int],
-) -> tuple[UInt8[np.ndarray, "h w 3"], Bool[np.ndarray, "h w"]]:
+) -> tuple[UInt8[np.ndarray, "h w 3"], Bool[np.ndarray, "h w"]]:  # fmt: skip
     rows = np.flatnonzero(visible)
     column = cell[rows, 0] * shape[1] + cell[rows, 1]
     order = np.lexsort((-height_m[rows], column))
@@ -131,11 +128,7 @@ _DPI = 130
 def draw_heat(
     factors: Sequence[Factor], shown: Float32[np.ndarray, " n"], found: bool, goals: Sequence[Goal]
 ) -> "Figure":
-    """Draw a heatmap: a panel for each factor, and one for their product.
-
-    ``shown``: the product's heat times the confidence that the thing there is what was queried, as a goal's score is,
-    in [0, 1]. ``found``: whether all parts are in the map and come together.
-    """
+    """Draw a heatmap: a panel for each factor, and one for their product; ``shown``: its heat times the confidence."""
     space = factors[0].space
     view = TopDown.of(space)
     count = len(factors) + (len(factors) > 1)

@@ -12,10 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
-from avlmaps.query import storey_grid
-from avlmaps.query.floor_plan import CELL_M as PLAN_CELL_M
-from avlmaps.query.floor_plan import FloorPlan
-from avlmaps.query.storey_grid import Cells, Labels, Sights, StoreyGrid, contacts, dilated, distance, of_pieces, pieces
+from avlmaps.query import floor_plan
+from avlmaps.query.floor_plan import CELL_M, Cells, FloorPlan, Labels, Sights, StoreyGrid, contacts, distance, pieces
 from avlmaps.query.voxel_space import connected
 
 WIDEST_M = 2.2
@@ -52,28 +50,28 @@ Chosen = Bool[np.ndarray, " g"]
 def _without_leaves(wall: Cells, free: Cells, cell_m: float) -> Cells:
     # Leaves of doors and other pieces that are thin, short and seen from both sides are no walls.
     hidden = pieces(~(free | wall))
-    small = storey_grid.extents(hidden)[:, 2] * cell_m**2 <= _SHADOW_M2
+    small = floor_plan.extents(hidden)[:, 2] * cell_m**2 <= _SHADOW_M2
     wide = 2 * round(_SHADOW_M / cell_m / 2.0) + 1
-    shadows = small[hidden] & storey_grid.opened(hidden > 0, wide, wide)  # not what lies between the faces of a wall
-    seen = storey_grid.opened(free, 3, 3)  # depth that strays between the faces of a wall shows no side of it
+    shadows = small[hidden] & floor_plan.opened(hidden > 0, wide, wide)  # not what lies between the faces of a wall
+    seen = floor_plan.opened(free, 3, 3)  # depth that strays between the faces of a wall shows no side of it
     core = distance(~(seen | shadows), beyond=True) * cell_m > _LEAF_THICKNESS_M - 0.01
     thick = distance(~core, beyond=True) * cell_m <= _LEAF_THICKNESS_M + 0.02
     thin = wall & ~thick
     piece = pieces(thin, diagonally=True)
     out = wall & ~((_lengths(piece) <= _LEAF_M / cell_m)[piece] & thin)
     piece = pieces(out, diagonally=True)
-    return out & ~((_lengths(piece) <= _SCREEN_M / cell_m) & ~of_pieces(piece, thick))[piece]
+    return out & ~((_lengths(piece) <= _SCREEN_M / cell_m) & ~floor_plan.of_pieces(piece, thick))[piece]
 
 
 def _lengths(piece: Labels) -> Float[np.ndarray, " n"]:
-    rows, columns, _ = storey_grid.extents(piece).T
+    rows, columns, _ = floor_plan.extents(piece).T
     return np.hypot(rows, columns)
 
 
 def _posts(wall: Cells, cell_m: float) -> Cells:
     # What stands alone and is small: a lamp, a plant, a person, a pillar.
     piece = pieces(wall, diagonally=True)
-    return (storey_grid.extents(piece)[:, :2].max(axis=1) <= _POST_M / cell_m)[piece] & wall
+    return (floor_plan.extents(piece)[:, :2].max(axis=1) <= _POST_M / cell_m)[piece] & wall
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,7 +146,7 @@ def _gaps(wall: Cells, post: Cells, free: Cells, cell_m: float, widest_m: float 
     alone = _sums(_as_rows(post))
     long = ((end - start) * cell_m >= _LEAST_WALL_M - 1e-6) & (alone[row, end] == alone[row, start])
     beam = max(3, 2 * (round(_LEAST_WALL_M / cell_m) // 2) - 1)
-    ends_at = _sums(dilated(storey_grid.opened(wall & ~post, beam, 1), 3, 1))
+    ends_at = _sums(floor_plan.dilated(floor_plan.opened(wall & ~post, beam, 1), 3, 1))
     held = long | (ends_at[row, end] > ends_at[row, start])
     row, start, end, long = row[held], start[held], end[held], long[held]
     q = np.flatnonzero(row[1:] == row[:-1])
@@ -183,7 +181,7 @@ def _leads_somewhere(gaps: _Gaps, solid: Cells, free: Cells, cell_m: float) -> C
 
 
 def _as_rows(wall: Cells) -> Cells:
-    return storey_grid.bridged(dilated(wall, 3, 1), 5)
+    return floor_plan.bridged(floor_plan.dilated(wall, 3, 1), 5)
 
 
 def _runs(cells: Cells) -> tuple[Numbers, Numbers, Numbers]:
@@ -223,12 +221,12 @@ def rooms_of_storey(grid: StoreyGrid) -> StoreyRooms:
     inside = free & ~doorway
     half_m = np.where(inside, distance(~(wall | doorway)) * cell_m, 0.0).astype(np.float32)
     label = _parted(inside, half_m, cell_m)
-    label = storey_grid.grown(label, free | doorway, _GAP_M / cell_m)
+    label = floor_plan.grown(label, free | doorway, _GAP_M / cell_m)
     label = _without_nooks(label, half_m, grid.stood, cell_m)
     label = np.unique(np.append(label.reshape(-1), 0), return_inverse=True)[1][:-1].reshape(label.shape)
     wide = [pair for pair, cells in contacts(label).items() if cells * cell_m >= _LEAST_CONTACT_M - 1e-6]
     beside = np.array(wide, np.int64).reshape(-1, 2) - 1
-    whole = storey_grid.grown(label, np.ones_like(free), _TO_WALL_M / cell_m) - 1
+    whole = floor_plan.grown(label, np.ones_like(free), _TO_WALL_M / cell_m) - 1
     return StoreyRooms(whole, int(label.max(initial=0)), beside)
 
 
@@ -259,7 +257,7 @@ def _parted(inside: Cells, half_m: Float32[np.ndarray, "r c"], cell_m: float) ->
         number = np.zeros(len(fresh), np.int32)
         number[fresh] = len(peak) + np.arange(int(fresh.sum()))
         peak += [from_m + cell_m] * int(fresh.sum())
-        label = storey_grid.flooded(np.where(number[part] > 0, number[part], label), taken)
+        label = floor_plan.flooded(np.where(number[part] > 0, number[part], label), taken)
         root = np.arange(len(peak), dtype=np.int32)  # parts that were joined before have one label by now
         for one, other in contacts(label):
             pair = min(root[one], root[other]), max(root[one], root[other])
@@ -353,15 +351,12 @@ class RoomRegions:
     def shares_of(
         self, middle_world: Float[np.ndarray, "3"], corners_world: Float[np.ndarray, "k 3"]
     ) -> Float[np.ndarray, " r"]:
-        """Return the share of what each room or an area holds that both hold, in [0, 1].
-
-        The area has a middle, which is on its storey, and corners, metres.
-        """
+        """Return the share of what each room or an area (by its corners) holds that both hold, in [0, 1]."""
         storey = int(self.plan.storeys_of(middle_world[None])[0])
         grid, label = self.grids[storey], self.labels[storey]
         cells = grid.level_of(np.argwhere(np.ones(label.shape, bool)) + 0.5)
         corners = self.plan.space.level(corners_world)[:, :2]
-        inside = storey_grid.in_polygon(cells, corners).reshape(label.shape)
+        inside = floor_plan.in_polygon(cells, corners).reshape(label.shape)
         both, own = (np.bincount(label[of & (label >= 0)], minlength=len(self)) for of in (inside, label >= 0))
         return both / np.maximum(own + np.count_nonzero(inside) - both, 1)
 
@@ -369,7 +364,7 @@ class RoomRegions:
     def of_plan_cells(self) -> Int[np.ndarray, " c"]:
         """The room of each cell of the floor plan; ``NONE`` for cells in none."""
         storey, i, j = np.indices(self.plan.wall.shape).reshape(3, -1)
-        return self._of(self.plan.origin_m + (np.stack([i, j], axis=1) + 0.5) * PLAN_CELL_M, storey)
+        return self._of(self.plan.origin_m + (np.stack([i, j], axis=1) + 0.5) * CELL_M, storey)
 
     def _of(self, level_xy: Float[np.ndarray, "m 2"], storey: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         out = np.full(len(level_xy), NONE, np.int64)
@@ -382,7 +377,7 @@ class RoomRegions:
     @cached_property
     def _reaching(self) -> tuple[Labels, ...]:
         return tuple(
-            storey_grid.grown(label + 1, np.ones(label.shape, bool), _REACH_M / grid.cell_m) - 1
+            floor_plan.grown(label + 1, np.ones(label.shape, bool), _REACH_M / grid.cell_m) - 1
             for grid, label in zip(self.grids, self.labels, strict=True)
         )
 
@@ -402,7 +397,7 @@ class RoomRegions:
         storey, box = self._boxes[number]
         grid, part = self.grids[storey], self.labels[storey][box] == number
         low = np.array([one.start for one in box])
-        xy = grid.level_of(low + storey_grid.outline(part, _STRAIGHT_M / grid.cell_m, _MOST_CORNERS))
+        xy = grid.level_of(low + floor_plan.outline(part, _STRAIGHT_M / grid.cell_m, _MOST_CORNERS))
         ahead = np.roll(xy, -1, axis=0)
         if float(np.sum(xy[:, 0] * ahead[:, 1] - ahead[:, 0] * xy[:, 1])) < 0.0:
             xy = xy[::-1]

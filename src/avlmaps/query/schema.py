@@ -20,10 +20,7 @@ T = TypeVar("T")
 
 
 def row_of(value: object, schema: type[T], **given: Any) -> T:
-    """Return a value as a JSON object of a schema: its attributes by the schema's keys, or what is given for a key.
-
-    Tuples become lists. What is None or empty is left out where the schema does not require it.
-    """
+    """Return a value's attributes as a JSON object of a schema; None and "" only where it requires the key."""
     row: dict[str, Any] = {}
     optional: frozenset[str] = cast(Any, schema).__optional_keys__
     for key in cast(Any, schema).__annotations__:

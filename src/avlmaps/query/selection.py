@@ -116,10 +116,7 @@ class Selected:
 
 
 def page_of_things(lists: MapLists, wanted: Wanted) -> ThingsPage:
-    """Return a page of the things that are meant; where nothing but names is selected, all of them, without a count.
-
-    ``QueryError``: there is no such room, name, day or page, or no such thing to be near to.
-    """
+    """Return a page of the things that are meant; where nothing but names is selected, all, without a count."""
     if wanted.is_whole:
         return {"things": [ListedThing(**thing) for thing in lists.wanted(wanted)]}
     about = None
@@ -218,10 +215,7 @@ def beyond(lists: MapLists, room: str | None, about: NearAnswer | None) -> list[
 
 
 def map_answer(avlmap: AVLMap, note: Callable[[AvlmapsError], object] = lambda _: None) -> dict[str, Any]:
-    """Return the description of a map that ``avlmaps info`` prints: counts, models, sounds with names, rules.
-
-    ``note`` is given the error where the sounds' model is not here.
-    """
+    """Return what ``avlmaps info`` prints; ``note`` is given the error where the sounds' model is not here."""
     from avlmaps.maps.store.map_data import describe
     from avlmaps.query.settings import rules_of
 

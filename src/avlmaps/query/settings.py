@@ -1,8 +1,4 @@
-"""What can be chosen about a query, and the rules of the AVLMaps paper: each choice of ours that differs from it.
-
-``build_settings("paper")`` and ``query_settings("paper")`` are all that there is to it; the encoders are another choice
-(the profile). docs/paper-models.md lists the rules one by one, and what of the paper they leave out.
-"""
+"""What can be chosen about a query, and the paper's rules (docs/paper-models.md): where our choices differ."""
 
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -26,10 +22,8 @@ LEAST_PART = 0.2
 class HeatSettings:
     """How fast heat falls with distance (the paper's 0.1 and 0.01 a voxel of 5 cm)."""
 
-    primary_falloff_per_m: float = 2.0
-    """For what is sought: reaches 0.5 m."""
-    context_falloff_per_m: float = 0.2
-    """For what says where it is: reaches 5 m."""
+    primary_falloff_per_m: float = 2.0  # for what is sought: reaches 0.5 m
+    context_falloff_per_m: float = 0.2  # for what says where it is: reaches 5 m
 
     def falloff_per_m(self, role: Role) -> float:
         """Return ε for a role."""
@@ -42,40 +36,32 @@ class ObjectSettings:
 
     same_word_cosine: float = 0.95
     """A vocabulary word at least this close to the queried one names the same thing and does not compete with it."""
-    least_score: float = 0.5
-    """For an encoder that has no feature for "other": a voxel must score at least this."""
-    margin_yes: float = 0.1
-    """An instance that wins its voxels by this much on average is as likely right as wrong."""
+    least_score: float = 0.5  # for an encoder that has no feature for "other": a voxel must score at least this
+    margin_yes: float = 0.1  # an instance that wins its voxels by this much on average is as likely right as wrong
     margin_yes_logits: float = 1.0
     """The same for an encoder with a scale for its cosines: the margin times its ``logit_scale``."""
-    area_yes_m2: float = 0.01
-    """Surface below which an instance is probably noise; a mug shows about 0.02 m²."""
+    area_yes_m2: float = 0.01  # surface below which an instance is probably noise; a mug shows about 0.02 m²
     least_confidence: float = 0.3
     """Instances below this are noise (one or two voxels of 5 cm) and give no heat; 0 admits all, as the paper does."""
+    # The least where the query has context: then a weak instance there is likelier than a confident one elsewhere.
     least_in_company: float = 0.02
-    """The same where the query has context: then a weak instance there is likelier than a
-    confident one elsewhere."""
     score_in_company: float = 0.5
     """And there a voxel counts that scores at least this part of its best rival's score, for an encoder of names."""
-    least_score_in_company: float = 0.0
-    """And at least this, a score of its own."""
+    least_score_in_company: float = 0.0  # and at least this, a score of its own
     guess_below: float = 0.05
     """Where the best of these is less confident, weaker voxels give the guess, for an encoder of names."""
     score_for_guess: float = 0.2
     """Then a voxel counts that scores at least this part of its best rival's score, and ``least_for_guess``."""
-    least_for_guess: float = 0.1
-    """A score, √p: 0.1 is a probability of 1 %."""
+    least_for_guess: float = 0.1  # a score, √p: 0.1 is a probability of 1 %
     room_weight: float = 0.75
     """How much the kind of room that a thing stands in counts, for an encoder of names: the thing's log-odds rise by
     this times ln of how many times as common it is in such rooms. 0: not at all. It and the next were chosen on eight
     development homes."""
-    room_cost: float = 0.4
-    """Nats that the log-odds lose with that: most things stand where things of their name do."""
+    room_cost: float = 0.4  # nats that the log-odds lose with that: most things stand where things of their name do
     too_long: float = 1.5
     """An instance this many times as long as the largest thing of its name is cut where its voxels score least, and
     is less likely to be what it is called, for an encoder of names; 0: never."""
-    link_m: float = 0.1
-    """Voxels of an object no farther apart than this along every axis belong to one instance."""
+    link_m: float = 0.1  # voxels of an object no farther apart than this along every axis belong to one instance
     join_m: float = 0.3
     """Pieces over one another with no larger gap in height are one thing (the legs and the back of a chair)."""
 
@@ -93,13 +79,11 @@ class ObjectSettings:
 class RoomSettings:
     """From views and things to kinds of room. Chosen on six development homes."""
 
-    views_m: float = 0.8
-    """Standard deviation of how far a view's vote spreads from the middle of what it saw, metres."""
+    views_m: float = 0.8  # standard deviation of how far a view's vote spreads from the middle of what it saw, metres
     view_weight: float = 1.5
     """Exponent of the views' mean where two or more of them vote; an average is less confident than views that agree
     should be. A lone view counts once."""
-    things_m: float = 1.6
-    """Standard deviation of how far the vote of a thing spreads from it, metres."""
+    things_m: float = 1.6  # standard deviation of how far the vote of a thing spreads from it, metres
     thing_weight: float = 2.0
     """Weight of the things' votes, in nats a square metre of their surface; 0 lets views vote alone."""
     most_nats: float = 6.0
@@ -124,8 +108,7 @@ class AreaSettings:
     same_word_cosine: float = 0.95
     """Another name at least this close to the queried one names the same and does not compete with it. For an encoder
     with a scale it is measured from the middle of all names: its phrases lie in a cone, kitchen beside garage."""
-    link_m: float = 1.0
-    """Keyframes closer than this to a better one belong to its area."""
+    link_m: float = 1.0  # keyframes closer than this to a better one belong to its area
     rooms: RoomSettings = field(default_factory=RoomSettings)
     """Of ``rooms``: the weights of views and things, and how far they reach."""
 
@@ -152,18 +135,13 @@ class SoundSettings:
 class QuerySettings:
     """Everything about a query that can be chosen."""
 
-    heat: HeatSettings = field(default_factory=HeatSettings)
-    """How fast heat falls."""
-    objects: ObjectSettings = field(default_factory=ObjectSettings)
-    """From a word to instances."""
-    sounds: SoundSettings = field(default_factory=SoundSettings)
-    """From a sound's scores to heat."""
-    areas: AreaSettings = field(default_factory=AreaSettings)
-    """From views to heat."""
+    heat: HeatSettings = field(default_factory=HeatSettings)  # how fast heat falls
+    objects: ObjectSettings = field(default_factory=ObjectSettings)  # from a word to instances
+    sounds: SoundSettings = field(default_factory=SoundSettings)  # from a sound's scores to heat
+    areas: AreaSettings = field(default_factory=AreaSettings)  # from views to heat
     found_at: float = FOUND_AT
     """A query is found where its first goal is right with at least this probability, all parts together; in [0, 1]."""
-    seed: int = 0
-    """Seed of what is drawn at random when a picture is located."""
+    seed: int = 0  # seed of what is drawn at random when a picture is located
 
     def __post_init__(self) -> None:
         hold_numbers(self, QueryError)

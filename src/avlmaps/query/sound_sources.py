@@ -172,10 +172,7 @@ class SourceMap:
         return Joined(tuple(events), density, density.of_candidates(chosen, heard + expected))
 
     def sources(self, events: Sequence[int], kind: str, prior: bool = True) -> list[Joined]:
-        """Return the sources of sounds of one kind, the clearest first: each joins the best fitting one, or begins one.
-
-        ``prior``: whether things that usually make such a sound count.
-        """
+        """Return the sources of sounds of one kind, the clearest first: each joins one that it fits, or begins one."""
         base = np.asarray(self.evidence.prior, np.float64)
         found: list[Joined] = []
         for event in filter(self.is_located, events):
@@ -211,11 +208,7 @@ class SourceMap:
 def list_sources(
     avlmap: "AVLMap", names: Sequence[str] = (), prior: bool = True, *, least: float = 0.0
 ) -> list[SoundSource]:
-    """Return the sources of a map's sounds, or of those of some kinds, most confident first.
-
-    ``prior``: whether things that usually make such a sound count. ``least``: sources of a lower confidence are left
-    out, in [0, 1]. ``QueryError``: the map does not know where sounds came from.
-    """
+    """Return the sources of a map's sounds, or of some kinds, most confident first; ``prior``: of usual makers."""
     places = _Places(avlmap)
     listed = list_joined(avlmap, names, prior, least=least)
     found = [places.described(avlmap.source_map, one, kind, confidence) for kind, confidence, one in listed]
@@ -230,13 +223,9 @@ def source_of(avlmap: "AVLMap", number: int) -> SoundSource:
 
 
 def list_joined(
-    avlmap: "AVLMap",
-    names: Sequence[str] = (),
-    prior: bool = True,
-    *,
-    least: float = 0.0,
+    avlmap: "AVLMap", names: Sequence[str] = (), prior: bool = True, *, least: float = 0.0,
     counts: Callable[[int], bool] = lambda event: True,
-) -> Iterator[tuple[str, float, Joined]]:
+) -> Iterator[tuple[str, float, Joined]]:  # fmt: skip
     """Yield the sources of a map's sounds, each with its name and the confidence of it; see ``list_sources``."""
     known = avlmap.source_map
     for kind, scores in _by_kind(avlmap, names).items():
@@ -312,18 +301,10 @@ def things_that_may_be(known: SourceMap, joined: Joined, things: "Sequence[Thing
 
 
 def with_heard(
-    avlmap: "AVLMap",
-    things: Sequence[Thing],
-    *,
-    are_all: bool = True,
-    visit: int | None = None,
+    avlmap: "AVLMap", things: Sequence[Thing], *, are_all: bool = True, visit: int | None = None,
     every: Sequence[Thing] | None = None,
-) -> list[Thing]:
-    """Return things with the sounds that may have come from them; as they are where the map does not know that.
-
-    ``are_all``: whether these are all that it lists; else a sound may have come from the others as well, which are
-    those of ``every``, by default of the map's list. ``visit``: of a day, from 0, the sounds of that day alone.
-    """
+) -> list[Thing]:  # fmt: skip
+    """Return things with what may have come from them, not from others of ``every``, by default the map's list."""
     if not things or avlmap.data.sources is None:
         return list(things)
     rivals = [] if are_all else _others(avlmap.things() if every is None else every, things)

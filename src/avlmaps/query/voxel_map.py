@@ -36,10 +36,9 @@ IN_MEMORY = Path("the frames")  # as sentences name a map that has no folder
 class VoxelMap:
     """A map in memory: ``add`` frames, ``ask``, ``save``. It is the map that ``build_map`` makes of the same frames.
 
-    Up, the floor and the depth camera's error are found in the first 60 frames, which are fused then, or with the first
-    question; up and the floor again with a question after the walk has doubled, and in ``save``. The map of a longer
-    walk can hence differ a little from a build's. Sounds are found while they happen, and in ``save`` as a build finds
-    them. Threads may add and ask.
+    Up, the floor and the depth camera's error are found in the first 60 frames, or with the first question; up and the
+    floor again with a question after the walk has doubled, and in ``save``, so that the map of a longer walk can differ
+    a little from a build's. Threads may add and ask.
     """
 
     def __init__(
@@ -173,10 +172,7 @@ class VoxelMap:
         return self.map.voxel_index
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> AVLMap:
-        """Write the map into a folder, by custom ``NAME.avlmap``, and open it; frames can be added on.
-
-        ``MapError``: there is nothing to write, the folder is something else or a map, or it cannot be written.
-        """
+        """Write the map into a folder and open it; frames can be added on. ``MapError``: it cannot be written."""
         with self._lock:
             place = lasting_path(path)
             require_place(place, overwrite)

@@ -1,7 +1,4 @@
-"""The space that heatmaps live in: the map's voxels, their places, which are connected, and what is horizontal.
-
-The level frame is the recording's world turned by the smallest rotation that makes up its z axis, about its origin.
-"""
+"""The map's voxels, their places, which are connected, and the level frame: turned so that z is up."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -184,18 +181,12 @@ class Blocks:
 
 
 class Space:
-    """Where a map's voxels are: ``index`` (n, 3), sorted. All heatmaps of one map share it.
-
-    ``data``: the map, for its colours in pictures; None for a space without one.
-    """
+    """Where a map's voxels are: ``index`` (n, 3), sorted. All heatmaps of one map share it."""
 
     def __init__(
-        self,
-        grid: GridSpec,
-        index: Int[np.ndarray, "n 3"],
-        up_in_world: Float[np.ndarray, "3"],
+        self, grid: GridSpec, index: Int[np.ndarray, "n 3"], up_in_world: Float[np.ndarray, "3"],
         data: "MapData | None" = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.grid, self.index, self.data = grid, index, data
         self.level_from_world = rotation_to_level(np.asarray(up_in_world, np.float64))
 

@@ -149,10 +149,7 @@ _UNIT = 0.02  # by as much a length may differ from one, as in features of pixel
 
 
 def encoded_words(encoder: PixelEncoder | ViewEncoder, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-    """Return a row for each word, zero for one that the encoder does not know.
-
-    ``BackendError``: the encoder failed, or gave other than a row of unit length or zero for each word.
-    """
+    """Return a row for each word, zero for one that is not known. ``BackendError``: the encoder gave others."""
     what = f"encode_words of the encoder {encoder!r}"
     try:
         rows = np.atleast_1d(np.asarray(encoder.encode_words(list(words)), np.float32))
@@ -173,10 +170,7 @@ def encoded_words(encoder: PixelEncoder | ViewEncoder, words: Sequence[str]) -> 
 
 
 def is_a(other: str, wanted: str) -> bool:
-    """Return whether what one phrase names is what another wants: an office chair is a chair, and not the reverse.
-
-    A name that an encoder carries a special thing under is one with it: a bag competes with no backpack.
-    """
+    """Return whether what one phrase names is what another wants: an office chair is a chair, not the reverse."""
     known = lexicon()
     if known.is_a(other, wanted, EntryKind.THING):
         return True
@@ -307,11 +301,7 @@ class Vocabulary:
 
 @dataclass(frozen=True)
 class ClosestWords(Vocabulary):
-    """A vocabulary, and its two words closest to each voxel, computed once a map and vocabulary.
-
-    They make a query one pass over the features even if the word is in the vocabulary; of names they also say of most
-    voxels, without the features, that a word cannot win there.
-    """
+    """A vocabulary, and its two words closest to each voxel: with them a query is one pass over the features."""
 
     best: Float32[np.ndarray, " n"]  # highest score; −inf where there is no word at all
     best_word: Int[np.ndarray, " n"]  # whose that is, −1 for nobody
@@ -401,10 +391,7 @@ def margins_of(
     score: Float32[np.ndarray, " m"], feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"],
     rivals: ClosestWords, silent: Bool[np.ndarray, " v"], least_score: float,
 ) -> Float32[np.ndarray, " m"]:  # fmt: skip
-    """Return by how much a word with these scores beats its best rival at each of some voxels.
-
-    ``silent`` words do not compete; ``least_score`` is what the word must beat where ``other`` has no feature.
-    """
+    """Return by how much a word with these scores beats its best rival that is not silent, at some voxels."""
     floor = float(np.float32(-np.inf if rivals.has_other else least_score))
     closest = rivals.best, rivals.best_word, rivals.second, rivals.second_word
     out, unsure = margins(score, closest, silent, floor)
@@ -427,10 +414,7 @@ def scorer_of(
     feature: Float16[np.ndarray, "n d"], encoder: PixelEncoder, rivals: Vocabulary, encoded: EncodedWord,
     settings: ObjectSettings,
 ) -> Callable[[float], Scored]:  # fmt: skip
-    """Return a function that gives the voxels where a word scores at least a share of its best rival, maybe others.
-
-    For an encoder of any words they are all voxels; of names, voxels with little of the word are not compared.
-    """
+    """Return a function of the voxels where a word scores at least a share of its best rival, maybe others."""
     silent = rivals.not_competing(encoder, encoded, settings.same_word_cosine)
     known = rivals if isinstance(rivals, ClosestWords) else None
     named = encoder if isinstance(encoder, NamedPixelEncoder) and competes_whole(encoder, rivals.words) else None

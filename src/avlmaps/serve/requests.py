@@ -23,8 +23,7 @@ from avlmaps.core.question import MOST_CHARACTERS, HeardAt
 from avlmaps.core.words import did_you_mean
 from avlmaps.maps.store.edits import LONGEST_NAME
 from avlmaps.query.locate import focal_35mm_of
-from avlmaps.query.modalities.image import Attachment, Photo
-from avlmaps.query.modalities.sound import require_audible
+from avlmaps.query.modalities import Attachment, Photo, require_audible
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.containers import self_contained_suffix
 from avlmaps.recordings.images import check_whole, decode_picture, encoded_size

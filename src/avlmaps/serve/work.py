@@ -23,7 +23,7 @@ from avlmaps.navigate.paths import PathAnswer, PathFinder, goals_near
 from avlmaps.query import schema, selection
 from avlmaps.query.answer import Answer
 from avlmaps.query.editor import edit_text
-from avlmaps.query.modalities.image import Photo
+from avlmaps.query.modalities import Photo
 from avlmaps.query.places import PlaceAnswer, column_point, describe_place, last_seen, place_of
 from avlmaps.query.selection import MapLists, Wanted
 from avlmaps.query.words import unknown_note

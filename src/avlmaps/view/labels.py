@@ -61,7 +61,7 @@ def _outlines(cells: Bool[np.ndarray, "nx ny"], plan: "CandidateGrid") -> Iterat
     """Yield the corners of each piece of a region, level frame, the largest first."""
     from scipy.ndimage import label
 
-    from avlmaps.query.storey_grid import outline
+    from avlmaps.query.floor_plan import outline
 
     pieces, count = label(cells)
     sizes = np.bincount(pieces.ravel(), minlength=count + 1)[1:]

@@ -23,7 +23,7 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.registry import Kind, forget_loaded, load
 from avlmaps.perception.conformance import check, example_frame, example_sound
 from avlmaps.perception.models import ModelSettings, using_models
-from avlmaps.query.modalities.area import AREA_NAMES
+from avlmaps.query.rooms import AREA_NAMES
 from avlmaps_models.common.prompts import AREA_PROMPTS, THINGS, TIPS_PROMPTS, clean
 from avlmaps_models.common.sound_scores import OTHERS
 from avlmaps_models.foundation.clap import ClapSounds

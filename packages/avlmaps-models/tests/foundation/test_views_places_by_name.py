@@ -13,7 +13,7 @@ from avlmaps.core.registry import Kind, find, load
 from avlmaps.perception.conformance import example_frame
 from avlmaps.perception.encoders import profile
 from avlmaps.perception.protocols import LocalFeatures, PlaceEncoder, ViewEncoder
-from avlmaps.query.modalities.area import AREA_NAMES, area_scores, same_place
+from avlmaps.query.rooms import AREA_NAMES, area_scores, same_place
 from avlmaps.query.settings import AreaSettings
 
 

@@ -368,7 +368,7 @@ def _label(answer: "Answer", part: int) -> str:
 
 
 def _read(step: "Step", name: str) -> np.ndarray:
-    from avlmaps.query.modalities.image import read_picture
+    from avlmaps.query.modalities import read_picture
 
     path = next(Path(part.query) for part in step.ask.question.parts if part.query.endswith(name))
     return read_picture(path)

@@ -301,7 +301,7 @@ def _write_page(avlmap: "AVLMap", asks: "list[Ask]", out: Path) -> None:
 
 def _located(avlmap: "AVLMap", photo: "PhotoView", out: Path) -> tuple[float, float] | None:
     from avlmaps.core.poses import rotation_angle_rad
-    from avlmaps.query.modalities.image import read_picture
+    from avlmaps.query.modalities import read_picture
 
     pose, truth = avlmap.locate(read_picture(out / PHOTO)).world_from_camera, photo.world_from_camera
     if pose is None:

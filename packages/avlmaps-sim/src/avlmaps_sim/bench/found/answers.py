@@ -12,7 +12,7 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.core.registry import Kind
 from avlmaps.query.goals import GoalEvidence
 from avlmaps.query.heatmap import Heatmap, product
-from avlmaps.query.modalities.area import area_names
+from avlmaps.query.rooms import area_names
 from avlmaps_sim.bench.harness.evidence import Box, Evidence, shown_boxes
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps_sim.bench.indexing.runs import IndexingSettings, scene_tasks

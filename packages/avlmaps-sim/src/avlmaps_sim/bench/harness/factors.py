@@ -12,7 +12,7 @@ from avlmaps.perception.embedded import logmel
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.sound import sound_factor
+from avlmaps.query.modalities import sound_factor
 from avlmaps.query.settings import SoundSettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import AudioTrack, Sound, resample

@@ -21,7 +21,7 @@ from avlmaps.core.version import __version__
 from avlmaps.maps.grid import GridSpec, index_ends
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.modalities.image import read_picture
+from avlmaps.query.modalities import read_picture
 from avlmaps.query.settings import Rules, build_settings, query_settings
 from avlmaps.recordings.types import Recording
 from avlmaps_sim.bench.harness.evidence import Event, Evidence, Photo

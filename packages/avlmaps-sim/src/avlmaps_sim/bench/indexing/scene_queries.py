@@ -26,7 +26,7 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.perception.protocols import ViewEncoder
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.area import area_factor, area_scores
+from avlmaps.query.rooms import area_factor, area_scores
 from avlmaps.query.settings import PAPER_AREAS
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.types import Frame, Recording

@@ -14,7 +14,7 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.core.registry import Kind
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.image import Photo, read_picture
+from avlmaps.query.modalities import Photo, read_picture
 from avlmaps_sim.bench.harness.factors import (
     VoxelHeat,
     WeakHearing,

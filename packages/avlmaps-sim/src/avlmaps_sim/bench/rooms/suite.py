@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.query.floor_plan import dilated
 from avlmaps.query.room_regions import WIDEST_M
-from avlmaps.query.storey_grid import dilated
 from avlmaps.query.voxel_space import connected
 from avlmaps_sim.bench.harness.figures import (
     Table,

@@ -8,16 +8,22 @@ one instance of 1.7 m. Colours count where an encoder knows things: a "red cabin
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float16, Float32, Int, UInt8
+from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.question import Part
+from avlmaps.core.words import squeezed
+from avlmaps.perception.embedded.colours import COLOURS, ColourWords
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
-from avlmaps.query.settings import ObjectSettings
+from avlmaps.query.factors import NearThings
+from avlmaps.query.settings import FOUND_AT, HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space, boxes, connected, distinct, linked
-from avlmaps.query.words import EncodedWord, Scored, Vocabulary, is_open, scorer_of
+from avlmaps.query.words import EncodedWord, Scored, Vocabulary, is_open, scorer_of, unknown_note
 
 if TYPE_CHECKING:
     from avlmaps.query.rooms import ThingsInRooms
@@ -56,13 +62,9 @@ def less_likely(
 
 
 def cut_at_weak(
-    index: Int[np.ndarray, "a 3"],
-    points_level: Float[np.ndarray, "a 3"],
-    score: Float[np.ndarray, " a"],
-    instance: Int[np.ndarray, " a"],
-    longest: float,
-    reach: int,
-) -> tuple[Int[np.ndarray, " a"], Int[np.ndarray, " j"]]:
+    index: Int[np.ndarray, "a 3"], points_level: Float[np.ndarray, "a 3"], score: Float[np.ndarray, " a"],
+    instance: Int[np.ndarray, " a"], longest: float, reach: int,
+) -> tuple[Int[np.ndarray, " a"], Int[np.ndarray, " j"]]:  # fmt: skip
     """Cut instances that are longer than ``longest`` metres where their voxels score least.
 
     ``points_level``: their centres, metres, with z up. ``instance``: which each belongs to, 0 to the highest without
@@ -83,13 +85,9 @@ def cut_at_weak(
 
 
 def _pieces(
-    index: Int[np.ndarray, "a 3"],
-    points_level: Float[np.ndarray, "a 3"],
-    score: Float[np.ndarray, " a"],
-    rows: Int[np.ndarray, " m"],
-    longest: float,
-    reach: int,
-) -> Iterator[Int[np.ndarray, " p"]]:
+    index: Int[np.ndarray, "a 3"], points_level: Float[np.ndarray, "a 3"], score: Float[np.ndarray, " a"],
+    rows: Int[np.ndarray, " m"], longest: float, reach: int,
+) -> Iterator[Int[np.ndarray, " p"]]:  # fmt: skip
     def fits(some: Int[np.ndarray, " p"]) -> bool:
         return bool(np.ptp(points_level[some, :2], axis=0).max() <= longest)
 
@@ -217,24 +215,21 @@ def confident_instances(voxels: FeatureVoxels, word: EncodedWord) -> Instances:
 
 
 def segment(voxels: FeatureVoxels, word: EncodedWord, scored: Scored, confident: Instances | None = None) -> Instances:
-    """Return the instances that scored voxels make up; after ``confident`` ones, uncertain ones of the other voxels.
-
-    Weak voxels round a confident thing make it neither larger nor less likely.
-    """
+    """Return the instances that scored voxels make up; after ``confident`` ones, uncertain ones of the other voxels."""
     space, settings = voxels.space, voxels.settings
     if confident is None:
         least, counting = settings.least_confidence, scored.only(scored.margin > 0.0)
     else:
         least, counting = settings.least_in_company, _threshold_in_company(voxels, scored, confident.rows)
-    found = score(voxels, word, link(space, counting, settings.link_m))
+    found = _score(voxels, word, _link(space, counting, settings.link_m))
     found = found.only(found.confidence >= least)
-    joined = join(space, found, settings.link_m, settings.join_m)
+    joined = _join(space, found, settings.link_m, settings.join_m)
     if joined is not found:
-        found = score(voxels, word, joined)
+        found = _score(voxels, word, joined)
     longest_m = _longest_of(voxels, word)
-    pieces, length_m = cut(space, found, longest_m, settings.link_m)
+    pieces, length_m = _cut(space, found, longest_m, settings.link_m)
     if pieces is not found:
-        found = score(voxels, word, pieces, length_m)
+        found = _score(voxels, word, pieces, length_m)
         found = found.only(found.confidence >= least)
     return found if confident is None else confident.with_others(found)
 
@@ -249,17 +244,15 @@ def _threshold_in_company(voxels: FeatureVoxels, scored: Scored, taken: Int[np.n
     return scored.only(counts & ~np.isin(scored.rows, taken, assume_unique=True))
 
 
-def link(space: Space, counting: Scored, link_m: float) -> Instances:
-    """Return the connected components of voxels, not scored: no farther apart than ``link_m`` along every axis."""
+def _link(space: Space, counting: Scored, link_m: float) -> Instances:
     instance = linked(np.asarray(space.index)[counting.rows], _reach(space, link_m))
     unscored = np.zeros(int(instance.max(initial=-1)) + 1, np.float32)
     return Instances(counting.rows, instance, counting.margin, counting.score, unscored)
 
 
-def score(
+def _score(
     voxels: FeatureVoxels, word: EncodedWord, found: Instances, length_m: Float[np.ndarray, " i"] | None = None
 ) -> Instances:
-    """Return instances with the confidence that each matches the word: by looks, by length and by its room."""
     space, encoder, settings = voxels.space, voxels.encoder, voxels.settings
     if not isinstance(encoder, NamedPixelEncoder):
         fitted = fitting(settings, encoder)
@@ -286,19 +279,16 @@ def with_rooms(
     return confidence * odds / np.maximum(1.0 - confidence + confidence * odds, 1e-12)
 
 
-def join(space: Space, found: Instances, link_m: float, join_m: float) -> Instances:
-    """Join instances that lie over one another; return them unscored, or ``found`` itself where none do."""
+def _join(space: Space, found: Instances, link_m: float, join_m: float) -> Instances:
+    # Instances that lie over one another become one, unscored; where none do it is ``found`` itself.
     which = joined_columns(_points(space, found), found.instance, link_m, join_m)
     return found if len(found) == which.max(initial=-1) + 1 else found.relabelled(which[found.instance])
 
 
-def cut(
+def _cut(
     space: Space, found: Instances, longest_m: float, link_m: float
 ) -> tuple[Instances, Float[np.ndarray, " i"] | None]:
-    """Cut instances that are too long for a thing of their name; return them unscored, and how long each counts as.
-
-    Where none is cut they are ``found`` itself. A piece is as doubtful as what it was cut from.
-    """
+    # Also how long each counts as: a piece is as doubtful as what it was cut from. Where none is cut, ``found`` itself.
     if not (math.isfinite(longest_m) and len(found)):
         return found, None
     index, points = np.asarray(space.index)[found.rows], _points(space, found)
@@ -390,3 +380,183 @@ def _points(space: Space, found: Instances) -> Float[np.ndarray, "a 3"]:
 
 def _reach(space: Space, link_m: float) -> int:
     return max(1, round(link_m / space.grid.voxel_size_m))
+
+
+# An instance is of a colour where this share of its voxels is; handles, shade and edges are of others.
+FULL_SHARE = 0.4
+# Words that name no thing of their own: "something red".
+NOTHING = frozenset({"", "thing", "things", "something", "object", "objects", "anything", "stuff", "the", "a", "one"})
+
+
+@dataclass(frozen=True, slots=True)
+class ColourPhrase:
+    """The colour in a phrase, and the phrase without it."""
+
+    text: str
+    feature: Float32[np.ndarray, " d"]  # of the colour
+    thing: str  # the rest of the phrase, ``""`` where the query names only a colour
+
+
+_colour_words = cache(ColourWords)
+
+
+def colour_in(phrase: str) -> ColourPhrase | None:
+    """Return the colour in a phrase, None where there is none."""
+    words = _colour_words()
+    text = words.understood(phrase)
+    if not text:
+        return None
+    thing = words.without_colours(phrase)
+    return ColourPhrase(text, words.encode_words([phrase])[0], "" if set(thing.split()) <= NOTHING else thing)
+
+
+def _colour_margin(rgb: UInt8[np.ndarray, "n 3"], said: ColourPhrase) -> Float32[np.ndarray, " n"]:
+    # By how much each voxel's colour is closer to the queried one than to any other term.
+    words = _colour_words()
+    colour = words.encode_colours(rgb)
+    terms = words.encode_words(COLOURS)
+    own = terms @ said.feature >= 0.5
+    return (colour @ said.feature - np.where(own, -1.0, colour @ terms.T).max(axis=1)).astype(np.float32)
+
+
+def colour_share(
+    rgb: UInt8[np.ndarray, "n 3"], rows: Int[np.ndarray, " a"], instance: Int[np.ndarray, " a"], said: ColourPhrase
+) -> Float32[np.ndarray, " i"]:
+    """Return for each instance the share of its voxels in the queried colour: 1 from four in ten on."""
+    if not len(instance):
+        return np.zeros(0, np.float32)
+    hits = _colour_margin(np.asarray(rgb)[rows], said) > 0.0
+    share = np.bincount(instance, weights=hits) / np.maximum(np.bincount(instance), 1)
+    return np.minimum(share / FULL_SHARE, 1.0).astype(np.float32)
+
+
+def object_factor(
+    voxels: FeatureVoxels, part: Part, heat: HeatSettings, searched: Instances | None = None
+) -> NearThings:
+    """Return the heat of the object that a word names; if no confidence suffices, of the best guesses, not ``found``.
+
+    With the voxels' colours, an encoder that knows things but no colours is helped out with those. ``QueryError``: an
+    encoder of any words understands nothing of the word.
+    """
+    encoder = voxels.encoder
+    compound = " " in part.query.strip() and lexicon().find(part.query, EntryKind.THING) is not None  # a white board
+    by_colour = voxels.rgb is not None and isinstance(encoder, NamedPixelEncoder) and not compound
+    colour = colour_in(part.query) if by_colour else None
+    if colour is not None and voxels.rgb is not None and not colour.thing:
+        return _colour_factor(voxels, voxels.rgb, colour, part, heat)
+    word = EncodedWord.of(encoder, colour.thing if colour else part.query)
+    if len(word.rows):
+        return _Search(voxels, part, heat, word, colour, searched if colour is None else None).factor()
+    if isinstance(encoder, NamedPixelEncoder):
+        note = unknown_note(colour.thing if colour else part.query)
+        understood = f"{colour.text} {word.understood}" if colour and word.understood else word.understood
+        nothing = np.zeros(0, np.int64), np.zeros(0, np.float32), False, understood, note
+        mask = np.zeros(len(voxels.space), np.bool_)
+        return NearThings(voxels.space, part, heat.falloff_per_m(part.role), mask, *nothing)
+    known = ", ".join(encoder.vocabulary[:20]) or "nothing that it could list"
+    raise QueryError(
+        f"The pixel encoder {encoder.card.id} understands nothing of {part.query!r}; it knows: {known}."
+        + (f" ({encoder.card.note})" if encoder.card.note else "")
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    voxels: FeatureVoxels
+    part: Part
+    heat: HeatSettings
+    word: EncodedWord
+    colour: ColourPhrase | None  # what the part says of colours beside it; None for nothing
+    searched: Instances | None = None  # its confident instances, where they were found before
+
+    def factor(self) -> NearThings:
+        confident = self._coloured(self._confident)
+        if len(confident):
+            return self._factor(confident, lambda: self._factor(self._uncertain(self.voxels.settings)))
+        settings, voxel_size_m = self.voxels.settings, self.voxels.space.grid.voxel_size_m
+        uncertain = self._uncertain(settings)
+        guess = best_guesses(uncertain, voxel_size_m)
+        if isinstance(self.voxels.encoder, NamedPixelEncoder) and guess.best < settings.guess_below:
+            weaker = self._uncertain(settings.for_guess())
+            weaker_guess = best_guesses(weaker, voxel_size_m)
+            if len(weaker_guess):
+                uncertain, guess = weaker, weaker_guess
+        return self._factor(guess, lambda: self._factor(uncertain))
+
+    @cached_property
+    def _scored(self) -> Callable[[float], Scored]:
+        voxels = self.voxels
+        return scorer_of(voxels.feature, voxels.encoder, voxels.rivals, self.word, voxels.settings)
+
+    @cached_property
+    def _confident(self) -> Instances:
+        return segment(self.voxels, self.word, self._scored(1.0)) if self.searched is None else self.searched
+
+    def _uncertain(self, settings: ObjectSettings) -> Instances:
+        scored = self._scored(settings.share_in_company)
+        voxels = replace(self.voxels, settings=settings)
+        return self._coloured(segment(voxels, self.word, scored, self._confident))
+
+    def _coloured(self, found: Instances) -> Instances:
+        if self.colour is None or self.voxels.rgb is None:
+            return found
+        share = colour_share(self.voxels.rgb, found.rows, found.instance, self.colour)
+        return replace(found, confidence=found.confidence * share)
+
+    def _factor(self, found: Instances, with_uncertain: Callable[[], NearThings] | None = None) -> NearThings:
+        space, part, colour = self.voxels.space, self.part, self.colour
+        understood, thing = self.word.understood, colour.thing if colour else part.query
+        said = f"{colour.text} {understood}" if colour and understood else understood
+        is_named = not _is_colour_alone(understood, part.query)
+        note = "" if found.best >= FOUND_AT else _absence(part.query, len(space), found)
+        if understood and not _is_whole(understood, thing):
+            half = f"understood only {said!r} of {part.query!r}"
+            half += "" if is_named else ", and a colour alone is no thing: what has it is a guess"
+            note = half + ("; " + note if note else "")
+        is_found = found.best >= FOUND_AT and is_named
+        falloff, mask = self.heat.falloff_per_m(part.role), _mask(len(space), found)
+        return NearThings(
+            space, part, falloff, mask, found.instance, found.confidence, is_found, said, note, with_uncertain, is_named
+        )
+
+
+def _colour_factor(
+    voxels: FeatureVoxels, rgb: UInt8[np.ndarray, "n 3"], colour: ColourPhrase, part: Part, heat: HeatSettings
+) -> NearThings:
+    space, settings = voxels.space, voxels.settings
+    fit = _colour_margin(np.asarray(rgb), colour)
+    rows = np.flatnonzero(fit > 0.0)
+    found = _link(space, Scored(rows, fit[rows], np.ones(len(rows), np.float32)), settings.link_m)
+    confidence = margin_confidence(found.margin, found.instance, space.grid.voxel_size_m, settings)
+    found = replace(found, confidence=confidence).only(confidence >= settings.least_confidence)
+    note = "" if found.best >= FOUND_AT else f"nothing of some size is {colour.text}"
+    falloff, mask, is_found = heat.falloff_per_m(part.role), _mask(len(space), found), found.best >= FOUND_AT
+    return NearThings(space, part, falloff, mask, found.instance, found.confidence, is_found, colour.text, note)
+
+
+def _mask(count: int, found: Instances) -> np.ndarray:
+    mask = np.zeros(count, np.bool_)
+    mask[found.rows] = True
+    return mask
+
+
+def _is_colour_alone(understood: str, name: str) -> bool:
+    said, taken = colour_in(name), colour_in(understood) if understood else None
+    return said is not None and bool(said.thing) and taken is not None and not taken.thing
+
+
+def _is_whole(understood: str, name: str) -> bool:
+    if squeezed(understood) == squeezed(name):
+        return True
+    entry = lexicon().find(name, EntryKind.THING)
+    if entry is None or entry.is_compound(name):
+        return False
+    return all(lexicon().is_a(kind, entry.name, EntryKind.THING) for kind in understood.split(" or "))
+
+
+def _absence(word: str, voxels: int, found: Instances) -> str:
+    if not voxels:
+        return "the map holds no voxels"
+    if not len(found):
+        return f"nothing that the map shows is like {word!r}"
+    return f"what is most like {word!r} has a confidence of {found.best:.2f}, below {FOUND_AT:.2f}"

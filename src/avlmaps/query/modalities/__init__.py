@@ -1,1 +1,0 @@
-"""The four modalities of a query: object, sound, area and image, each a heatmap."""
