@@ -29,8 +29,15 @@ from avlmaps_sim.bench.harness.figures import (
     write_answer,
 )
 from avlmaps_sim.bench.harness.own_recording import OwnRecording, is_recording
-from avlmaps_sim.bench.harness.settings import TaskError, models_of, shipped_checksums, unheard_folder, unheard_rows
-from avlmaps_sim.bench.indexing.runs import PAPER_SIZES, IndexingSettings, _in_turn, run
+from avlmaps_sim.bench.harness.settings import (
+    TaskError,
+    in_turn,
+    models_of,
+    shipped_checksums,
+    unheard_folder,
+    unheard_rows,
+)
+from avlmaps_sim.bench.indexing.runs import PAPER_SIZES, IndexingSettings, run
 from avlmaps_sim.bench.indexing.scene_queries import cut_out, mixed, surface_regions
 from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
 from avlmaps_sim.bench.navigation.missions import NavigationSettings
@@ -122,12 +129,12 @@ def task(scene: str, number: int, kind: TaskKind = TaskKind.AREA) -> Task:
 @given(st.lists(st.integers(0, 9), min_size=1, max_size=6), st.integers(0, 30))
 def test_tasks_are_taken_from_the_scenes_in_turn_up_to_the_size(counts: list[int], size: int):
     made = [[task(str(scene), number) for number in range(count)] for scene, count in enumerate(counts)]
-    taken = _in_turn(made, TaskKind.AREA, {TaskKind.AREA: size})
+    taken = in_turn(made, size)
     own = [sum(one.scene == str(scene) for one in taken) for scene in range(len(counts))]
     assert len(taken) == min(size, sum(counts))
     for a, taken_a in enumerate(own):  # a scene gives fewer than another by two only where it has no more
         assert all(taken_a >= taken_b - 1 or taken_a == counts[a] for taken_b in own)
-    assert _in_turn(made, TaskKind.AREA, None) == [one for scene in made for one in scene]
+    assert in_turn(made, None) == [one for scene in made for one in scene]
 
 
 def test_the_sizes_are_the_papers():

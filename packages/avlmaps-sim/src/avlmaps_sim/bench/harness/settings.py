@@ -10,7 +10,7 @@ from functools import cache
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import msgspec
 
@@ -107,6 +107,9 @@ def shipped_checksums() -> dict[str, str]:
 Clips = Literal["unheard", "all"]
 
 
+T = TypeVar("T")
+
+
 class TaskError(AvlmapsError):
     """Tasks cannot be read, or do not fit the suite."""
 
@@ -183,6 +186,16 @@ class SceneSettings:
         """
         return models_of(self.profile, self.models)
 
+    def given(self, kind: type[T], schema_version: int) -> T | None:
+        """Return the tasks that are to be loaded. ``TaskError``: they cannot be, or were made with other sounds."""
+        if self.load is None:
+            return None
+        read: Any = load_versioned(self.load, kind, schema_version)
+        if (sounds := read.recorded.sounds) != self.recorded.sounds:
+            wanted = f"name the folder {sounds!r} with" if sounds else "leave out"
+            raise TaskError(f"The tasks {self.load} were made with other sounds; {wanted} {option('sounds')}.")
+        return read
+
     def checked(self) -> dict[str, str]:
         """Check everything that is given before anything is recorded; return the models' checksums by module.
 
@@ -194,9 +207,6 @@ class SceneSettings:
             if self.clips == "unheard":
                 unheard_rows(self.sounds)
         return weights
-
-
-T = TypeVar("T")
 
 
 def save_versioned(tasks: object, path: Path) -> None:
@@ -220,3 +230,9 @@ def load_versioned(path: Path, kind: type[T], schema_version: int) -> T:
             f"The tasks {path} are damaged ({fault}); save them again with {option('save-tasks')}."
         ) from fault
     raise TaskError(f"The tasks {path} are of schema {version}, this avlmaps reads {schema_version}; save them again.")
+
+
+def in_turn(made: Sequence[Sequence[T]], most: int | None) -> list[T]:
+    """Take up to ``most`` from scenes in turn (the first of each, then the second of each), in the order of scenes."""
+    turns = sorted((number, scene) for scene, own in enumerate(made) for number in range(len(own)))
+    return [made[scene][number] for scene, number in sorted((scene, number) for number, scene in turns[:most])]

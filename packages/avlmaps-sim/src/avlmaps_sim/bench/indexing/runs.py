@@ -15,22 +15,20 @@ from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.question import Role
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
-from avlmaps.core.wording import option
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps_sim.bench.harness.figures import wilson
-from avlmaps_sim.bench.harness.settings import SceneSettings, TaskError
+from avlmaps_sim.bench.harness.settings import SceneSettings, TaskError, in_turn, load_versioned, save_versioned
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps_sim.bench.indexing.scene_queries import QueriedScene
 from avlmaps_sim.bench.indexing.tasks import (
+    SCHEMA_VERSION,
     Task,
     TaskKind,
     TaskSet,
     area_tasks,
-    load_tasks,
     near_sound_tasks,
     photo_tasks,
-    save_tasks,
     sound_tasks,
 )
 from avlmaps_sim.mesh import Triple
@@ -300,7 +298,7 @@ def run(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Scene
     work.mkdir(parents=True, exist_ok=True)
     tasks = _tasks(settings, work, open_spec)
     if settings.save is not None:
-        save_tasks(tasks, settings.save)
+        save_versioned(tasks, settings.save)
     todo = [
         _Todo(job, open_spec, tasks=tuple(task for task in tasks.tasks if task.scene == job.spec))
         for job in scene_jobs(settings, tasks.recorded, tasks.scenes, work)
@@ -314,29 +312,24 @@ def _named(todo: _Todo) -> str:
 
 
 def _tasks(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Scene]) -> TaskSet:
-    if settings.load is not None:
-        given = load_tasks(settings.load)
-        if given.recorded.sounds != settings.recorded.sounds:
-            wanted = f"name the folder {given.recorded.sounds!r} with" if given.recorded.sounds else "leave out"
-            raise TaskError(f"The tasks {settings.load} were made with other sounds; {wanted} {option('sounds')}.")
+    if (given := settings.given(TaskSet, SCHEMA_VERSION)) is not None:
         return given
     jobs = scene_jobs(settings, settings.recorded, settings.scenes, work)
     todo = [_Todo(job, open_spec, settings.tasks_a_scene) for job in jobs]
     made = side_by_side(_made, todo, settings.jobs, "mapping", _named)
-    own = tuple(task for kind in TaskKind for task in _in_turn(made, kind, settings.sizes))
+    own = tuple(
+        task
+        for kind in TaskKind
+        for task in in_turn(
+            [[task for task in scene if task.kind is kind] for scene in made],
+            None if settings.sizes is None else settings.sizes[kind],
+        )
+    )
     if not own:
         raise TaskError(
             f"The {len(settings.scenes)} scenes yield no task; take larger ones, or more frames than {settings.frames}."
         )
     return TaskSet(settings.recorded, settings.scenes, own)
-
-
-def _in_turn(made: Sequence[Sequence[Task]], kind: TaskKind, sizes: Mapping[TaskKind, int] | None) -> list[Task]:
-    own = [[task for task in scene if task.kind is kind] for scene in made]
-    longest = max(map(len, own), default=0)
-    turns = [scene[number] for number in range(longest) for scene in own if number < len(scene)]
-    kept = {task.name for task in turns[: None if sizes is None else sizes[kind]]}
-    return [task for scene in own for task in scene if task.name in kept]
 
 
 def _made(todo: _Todo) -> list[Task]:
@@ -359,8 +352,8 @@ def scene_tasks(job: SceneJob, open_spec: Callable[[str], Scene], most: int) -> 
         for task in tasks:  # drawn now, while the scene is open
             if task.photo is not None:
                 place.photo_file(task.world_from_photo)
-        save_tasks(TaskSet(job.recorded, (job.spec,), tuple(tasks)), path)
-    return list(load_tasks(path).tasks)
+        save_versioned(TaskSet(job.recorded, (job.spec,), tuple(tasks)), path)
+    return list(load_versioned(path, TaskSet, SCHEMA_VERSION).tasks)
 
 
 def _run_scene(todo: _Todo) -> SceneOutcome:

@@ -7,13 +7,12 @@ sound at several places. The context does: the right one is near it, and every o
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
 from avlmaps_sim.bench.harness.evidence import Box, Evidence, Photo, alone_near, heard_places, shown_boxes
-from avlmaps_sim.bench.harness.settings import Recorded, load_versioned, save_versioned
+from avlmaps_sim.bench.harness.settings import Recorded
 from avlmaps_sim.mesh import Triple
 
 SCHEMA_VERSION = 2
@@ -106,16 +105,6 @@ class TaskSet:
     scenes: tuple[str, ...]
     tasks: tuple[Task, ...]
     schema_version: int = SCHEMA_VERSION
-
-
-def save_tasks(tasks: TaskSet, path: Path) -> None:
-    """Write tasks and their truth as JSON."""
-    save_versioned(tasks, path)
-
-
-def load_tasks(path: Path) -> TaskSet:
-    """Read tasks that ``save_tasks`` wrote. ``TaskError``: there are none, they are of another schema, or damaged."""
-    return load_versioned(path, TaskSet, SCHEMA_VERSION)
 
 
 APART_M = 1.0  # things in other areas are at least this far from the right things

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from hashlib import sha256
 from math import atan2, ceil, pi
-from pathlib import Path
 from typing import Literal
 
 import msgspec
@@ -15,7 +14,7 @@ from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps_sim.bench.harness.evidence import Box, room_distance_m
-from avlmaps_sim.bench.harness.settings import Recorded, SceneSettings, TaskError, load_versioned, save_versioned
+from avlmaps_sim.bench.harness.settings import Recorded, SceneSettings, TaskError
 from avlmaps_sim.mesh import Triple
 
 SUCCESS_M = 1.0  # the paper's
@@ -241,27 +240,6 @@ class MissionSet:
     missions: tuple[Mission, ...]
     asked: str = ""
     schema_version: int = SCHEMA_VERSION
-
-
-def save_missions(missions: MissionSet, path: Path) -> None:
-    """Write missions and their truth as JSON."""
-    save_versioned(missions, path)
-
-
-def load_missions(path: Path) -> MissionSet:
-    """Read missions that ``save_missions`` wrote.
-
-    ``TaskError``: there are none, they are of another schema, or damaged.
-    """
-    return load_versioned(path, MissionSet, SCHEMA_VERSION)
-
-
-def allocated(made: list[list[Mission]], total: int) -> list[Mission]:
-    """Take ``total`` missions from scenes in turn: the first of each, then the second of each, and so on."""
-    longest = max(map(len, made), default=0)
-    turns = [own[number] for number in range(longest) for own in made if number < len(own)]
-    kept = {mission.name for mission in turns[:total]}
-    return [mission for own in made for mission in own if mission.name in kept]
 
 
 def numbered(missions: list[Mission]) -> list[Mission]:

@@ -6,7 +6,6 @@ from functools import cached_property
 from hashlib import sha256
 from math import ceil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -14,14 +13,13 @@ from jaxtyping import Float
 from avlmaps.core.errors import BackendError
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.version import __version__
-from avlmaps.core.wording import option
 from avlmaps.language.translator import Translator
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.costmap import BASE, obstacles_for
 from avlmaps.navigate.driver import Driver, MapDriver
 from avlmaps_sim.bench.harness.factors import WeakHearing
 from avlmaps_sim.bench.harness.own_recording import is_recording
-from avlmaps_sim.bench.harness.settings import TaskError
+from avlmaps_sim.bench.harness.settings import TaskError, in_turn, load_versioned, save_versioned
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps_sim.bench.indexing.tasks import area_tasks, near_sound_tasks, photo_tasks
@@ -31,15 +29,13 @@ from avlmaps_sim.bench.navigation.episodes import Episode, Journal
 from avlmaps_sim.bench.navigation.evidence import Floor, Ground
 from avlmaps_sim.bench.navigation.map_variants import Configuration, KnownScene, configurations
 from avlmaps_sim.bench.navigation.missions import (
+    SCHEMA_VERSION,
     Mission,
     MissionSet,
     NavigationSettings,
     Series,
-    allocated,
     asked_for,
-    load_missions,
     numbered,
-    save_missions,
 )
 from avlmaps_sim.body import Building, SimulatedBody
 from avlmaps_sim.scene import Scene
@@ -218,7 +214,7 @@ def run(settings: NavigationSettings, out: Path, open_spec: OpenSpec = open_scen
         )
     missions = replace(missions, missions=kept)
     if settings.save is not None:
-        save_missions(missions, settings.save)
+        save_versioned(missions, settings.save)
     todo = [
         _Todo(
             job, settings, tuple(one for one in kept if one.scene == job.spec), _journal(settings, out, job), open_spec
@@ -251,11 +247,7 @@ def _count(todo: Sequence[_Todo]) -> int:
 
 
 def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> MissionSet:
-    if settings.load is not None:
-        given = load_missions(settings.load)
-        if given.recorded.sounds != settings.recorded.sounds:
-            wanted = f"name the folder {given.recorded.sounds!r} with" if given.recorded.sounds else "leave out"
-            raise TaskError(f"The missions {settings.load} were made with other sounds; {wanted} {option('sounds')}.")
+    if (given := settings.given(MissionSet, SCHEMA_VERSION)) is not None:
         return given
     asked = asked_for(
         settings.recorded, settings.scenes, settings.series, settings.sequences, settings.profile, settings.models,
@@ -263,22 +255,22 @@ def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> M
     )  # fmt: skip
     path = out / "navigation_missions.json"
     if path.exists():
-        before = load_missions(path)
+        before = load_versioned(path, MissionSet, SCHEMA_VERSION)
         if before.asked == asked:
             return before
     empty = MissionSet(settings.recorded, settings.scenes, BASE.radius_m, (), asked)
     todo = [_Todo(job, settings, (), _journal(settings, out, job), open_spec) for job in _jobs(settings, empty, out)]
     made = side_by_side(_made, todo, settings.jobs, "mapping", _named)
-    own = [mission for series in settings.series for mission in _shared_out(settings, series, made)]
+    own = [
+        mission
+        for series in settings.series
+        for mission in in_turn(
+            [[one for one in scene if one.series is series] for scene in made], settings.total(series)
+        )
+    ]
     missions = replace(empty, missions=tuple(own))
-    save_missions(missions, path)
+    save_versioned(missions, path)
     return missions
-
-
-def _shared_out(settings: NavigationSettings, series: Any, made: list[list[Mission]]) -> list[Mission]:
-    own = [[mission for mission in scene if mission.series is series] for scene in made]
-    total = settings.total(series)
-    return allocated(own, sum(map(len, own)) if total is None else total)
 
 
 def _made(todo: _Todo) -> list[Mission]:
