@@ -11,7 +11,7 @@ from build_fakes import SETTINGS, Walk, register_fakes, write_beeps
 import avlmaps.maps
 from avlmaps.maps.build import build_map
 
-MOST = 32
+MOST = 26
 ROOT = Path(avlmaps.maps.__file__).parent
 
 
