@@ -162,7 +162,7 @@ def test_samples_that_are_no_numbers_are_told_with_their_time(tmp_path: Path) ->
     samples = tone(1.0)
     samples[RATE_HZ // 2] = np.nan
     soundfile.write(tmp_path / "a.wav", samples, RATE_HZ, subtype="FLOAT")
-    sentence = "FILE holds samples that are not finite numbers, the first at 0.500 s; convert it again from its source."
+    sentence = "FILE holds samples that are not finite, the first at 0.500 s; convert it again."
     assert refusal(tmp_path / "a.wav") == sentence
 
 

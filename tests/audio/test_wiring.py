@@ -9,7 +9,7 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.correlation import SourceSettings, signs_along
 from avlmaps.maps.sources.wiring import Wiring, check_wiring
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.channels import ChannelSound, useless_channels, with_microphones, write_channels
+from avlmaps.recordings.channels import ChannelSound, level_faults, with_microphones, write_channels
 from avlmaps.recordings.microphones import Microphones, microphones_named
 from helpers.heard_in_the_open import curved_drive, heard_in_the_open
 
@@ -137,5 +137,5 @@ def test_a_copied_channel_is_named(square: tuple[ChannelSound, Trajectory], tmp_
     samples = square[0].samples.copy()
     samples[2] = 0.7 * samples[0]
     track = track_of(tmp_path, ChannelSound(samples, square[0].rate_hz), microphones_named("square4"), (0, 1, 2, 3))
-    (said,) = useless_channels(track)
+    (said,), _ = level_faults(track)
     assert "Channel 3" in said and "same sound as channel 1" in said

@@ -41,4 +41,4 @@ def test_a_broken_package_does_not_hide_the_other_backends(answer, run, monkeypa
 def test_a_track_of_one_sample_a_second_is_no_sound(built: Path, run, tmp_path: Path) -> None:
     soundfile.write(tmp_path / "slow.wav", np.zeros(20), 1)
     status, _, err = run("query", built, "--sound-clip", tmp_path / "slow.wav")
-    assert status == 1 and "has 1 samples a second, too few for sounds" in err
+    assert status == 1 and "has 1 samples a second" in err

@@ -10,12 +10,12 @@ import soundfile
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from recording_scenes import metres, pose_line, save_depth, save_rgb, shot
+from recording_scenes import metres, pose_line, save_rgb, shot
 
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.formats.avlmaps_layout import (
+from avlmaps.recordings.formats.layouts import (
     WORLD_FROM_HABITAT,
     base_from_camera,
     base_poses,
@@ -23,7 +23,6 @@ from avlmaps.recordings.formats.avlmaps_layout import (
     reference_map_from_world,
 )
 from avlmaps.recordings.open import open_recording
-from avlmaps_sim.mixing.add_sounds import write_recording
 
 
 def _base_pose(index: int) -> np.ndarray:
@@ -110,23 +109,6 @@ def test_the_camera_sees_ninety_degrees_unless_told_otherwise(tmp_path: Path):
     assert np.allclose(open_recording(path).world_from_camera[0], WORLD_FROM_HABITAT @ _base_pose(0))
 
 
-def test_depth_may_be_png_in_millimetres(tmp_path: Path):
-    path = _write(tmp_path / "scene_1")
-    for index in range(4):
-        (path / f"depth/{index:06d}.npy").unlink()
-        save_depth(path / f"depth/{index:06d}.png", shot(index).depth_mm)
-    assert np.array_equal(open_recording(path).frame(1).depth_m, metres(shot(1).depth_mm))
-
-
-def test_frames_without_a_partner_are_left_out_and_told(tmp_path: Path):
-    path = _write(tmp_path / "scene_1")
-    (path / "depth/000001.npy").unlink()
-    recording = open_recording(path)
-    assert [recording.name(i) for i in range(3)] == ["000000", "000002", "000003"]
-    assert "1 frame(s) lack one of colour, depth, line of poses and are left out." in recording.notices
-    assert np.allclose(recording.stamps_s, np.array([0, 2, 3]) / 25)
-
-
 def test_a_sound_sequence_opens_with_its_track_and_no_depth(tmp_path: Path):
     path = tmp_path / "audio_video/000003"
     for index in range(3):
@@ -160,12 +142,3 @@ def test_what_cannot_be_used_is_told_by_file(tmp_path: Path, file: str, content:
     (path / file).write_text(content)
     with pytest.raises(RecordingError, match=re.escape(sentence)):
         open_recording(path)
-
-
-def test_a_copy_keeps_the_depth_to_half_a_millimetre(tmp_path: Path):
-    path = _write(tmp_path / "scene_1")
-    fine = metres(shot(0).depth_mm) + np.float32(0.0003) * (shot(0).depth_mm > 0)
-    np.save(path / "depth/000000.npy", fine)
-    copy = open_recording(write_recording(open_recording(path), tmp_path / "copy"))
-    assert np.abs(copy.frame(0).depth_m - fine).max() <= 0.0005 + 1e-6
-    assert np.array_equal(copy.frame(1).rgb, shot(1).rgb)

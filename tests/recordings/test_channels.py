@@ -1,6 +1,7 @@
 """Recordings with several microphones: read as written, and each fault of geometry or channels is a sentence."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,7 +19,6 @@ from avlmaps.recordings.channels import (
     GrowingTrack,
     level_faults,
     read_channels,
-    useless_channels,
     with_microphones,
 )
 from avlmaps.recordings.microphones import Microphones, microphones_named
@@ -92,13 +92,6 @@ def test_channels_without_a_microphone_are_left_out_and_the_sound_is_kept(tmp_pa
             open_recording(first, microphones=array)
 
 
-def test_a_recording_of_one_microphone_says_nothing_of_microphones(tmp_path: Path) -> None:
-    folder = recorded(tmp_path / "rec", Sound(noise(1)[0], RATE_HZ), None)
-    assert "microphones" not in json.loads((folder / "recording.json").read_text())
-    track = open_recording(folder).audio
-    assert track is not None and track.microphones is None and track.channel is None
-
-
 def describe(folder: Path, **microphones: object) -> None:
     path = folder / "recording.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "microphones": microphones}))
@@ -143,7 +136,7 @@ def faults(folder: Path, samples: np.ndarray) -> list[str]:
     soundfile.write(folder / "track.wav", samples.T, RATE_HZ, subtype="FLOAT")
     track = AudioTrack.open(folder / "track.wav")
     track = with_microphones(track, Microphones(microphones_named("square4").position_m[: len(samples)]))
-    return [*useless_channels(track), *level_faults(track)[1]]
+    return [sentence for kind in level_faults(track) for sentence in kind]
 
 
 def test_faults_of_channels_are_named_and_a_sound_array_has_none(tmp_path: Path) -> None:
@@ -160,7 +153,7 @@ def test_faults_of_channels_are_named_and_a_sound_array_has_none(tmp_path: Path)
 def test_an_array_that_recorded_nothing_is_said_once(tmp_path: Path) -> None:
     soundfile.write(tmp_path / "track.wav", np.zeros((RATE_HZ, 4)), RATE_HZ)
     track = with_microphones(AudioTrack.open(tmp_path / "track.wav"), microphones_named("square4"))
-    (said,) = useless_channels(track, "the sound")
+    (said,), _ = level_faults(track, "the sound")
     assert said.startswith("the sound is silent throughout: every sample is 0. Check the microphones")
 
 
@@ -171,7 +164,8 @@ def test_tracks_of_any_length_and_rate_are_looked_at_for_faults(count: int, rate
         one = np.random.default_rng(count).normal(0.0, 0.1, count).astype(np.float32)
         growing.add(ChannelSound(np.stack([one, one]), rate_hz), start_s)
         assert growing.track is not None
-        (said,) = useless_channels(growing.track, "the sound")
+        track = replace(growing.track, microphones=microphones_named("stereo"))
+        (said,), _ = level_faults(track, "the sound")
     assert said.startswith("Channel 2 of the sound holds the same sound as channel 1")
 
 

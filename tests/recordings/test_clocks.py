@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
-from recording_scenes import CAMERA, pose_line, save_depth, shot, write_folder
+from recording_scenes import CAMERA, save_depth, shot, write_folder
 from test_rosbag import HEIGHT, RATE_HZ, START_S, WIDTH, BagMaker, world_from_body
 
 from avlmaps.core.errors import AudioError, RecordingError
@@ -23,7 +23,7 @@ from avlmaps.recordings.audio import Sound, write_flac
 from avlmaps.recordings.faults import noted
 from avlmaps.recordings.formats.ros_sound import GAP_S, Pcm, PictureClock, SoundTopic, extract_audio, silences
 from avlmaps.recordings.formats.rosbag import open_rosbag
-from avlmaps.recordings.images import DisplayTurn, VideoFrames, exif_turn
+from avlmaps.recordings.images import DisplayTurn, exif_turn
 from avlmaps.recordings.open import open_recording
 
 CHUNK_S = 0.1
@@ -301,11 +301,3 @@ def test_a_portrait_of_exif_is_turned_where_only_that_fits(tmp_path: Path) -> No
     rgb = open_recording(path).frame(2).rgb
     assert rgb.shape == (64, 48, 3)
     assert np.abs(rgb.astype(int) - np.rot90(shot(2).rgb, -1)).mean() < 12
-
-
-def test_a_video_without_a_turn_has_none(tmp_path: Path) -> None:
-    write_video(tmp_path / "a.mp4", [shot(0).rgb] * 2, delay_s=0.5)
-    video = VideoFrames(tmp_path / "a.mp4")
-    video.show()
-    assert not video.turn and not video.shown and (video.width, video.height) == (64, 48)
-    assert video.stamps_s.tolist() == pytest.approx([0.0, 0.1]) and pose_line(shot(0).world_from_camera)

@@ -24,8 +24,7 @@ from avlmaps.recordings.corrections import (
     opencv_from_axes,
     reread_poses,
 )
-from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.validate import validate
+from avlmaps.recordings.open import open_recording, validate
 from avlmaps_sim.mixing.add_sounds import write_recording
 
 QUATERNIONS = st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1)
@@ -148,16 +147,6 @@ def test_frames_without_a_later_pose_are_left_out(tmp_path: Path) -> None:
     assert read.frame(1).index == 1 and np.array_equal(read.frame(1).rgb, shots()[1].rgb)
     with pytest.raises(RecordingError, match=r"9 s late leave no frame"):
         open_recording(path, corrections=Corrections(pose_delay_s=9.0))
-
-
-def test_the_unit_of_depth(tmp_path: Path) -> None:
-    path = write_folder(tmp_path / "rec")
-    known = open_recording(path)
-    read = open_recording(path, corrections=Corrections(depth_unit_m=0.01))
-    assert np.allclose(read.frame(0).depth_m, 10.0 * known.frame(0).depth_m)
-    assert read.stored_depth_unit_m == pytest.approx(0.01)
-    again = open_recording(described(path, depth_units_per_m=2000.0), corrections=Corrections(depth_unit_m=0.01))
-    assert np.allclose(again.frame(0).depth_m, read.frame(0).depth_m)
 
 
 def test_intrinsics_of_a_picture_of_another_size(tmp_path: Path) -> None:

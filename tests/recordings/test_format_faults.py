@@ -91,11 +91,11 @@ def _calibration(change: Callable[[bytes], bytes]) -> Callable[[Path], Any]:
         ("replica", _text("traj.txt", ""), "traj.txt holds no usable pose"),
         ("scannet", _text("intrinsic/intrinsic_depth.txt", None), "intrinsic_depth.txt is missing"),
         ("rtabmap", _calibration(lambda blob: blob[:12] + struct.pack("<i", 1) + blob[16:]), "with a stereo camera"),
-        ("rtabmap", _calibration(lambda blob: blob * 2), "has several cameras a node, side by side"),
+        ("rtabmap", _calibration(lambda blob: blob * 2), "has several cameras in one picture"),
         ("rtabmap", _sql("DROP TABLE Node"), "without RTAB-Map's Node"),
         ("rtabmap", _sql("ALTER TABLE Data RENAME COLUMN calibration TO fx"), "RTAB-Map's calibration; give one"),
         ("rtabmap", _sql("UPDATE Data SET depth = NULL"), "none with colour, depth and calibration"),
-        ("rtabmap", lambda path: path.with_name(path.name + "-wal").write_bytes(b"x"), "were not written into"),
+        ("rtabmap", lambda path: path.with_name(path.name + "-wal").write_bytes(b"x"), "that are not in"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused_by_a_sentence(

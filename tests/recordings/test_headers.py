@@ -82,16 +82,6 @@ def test_lists_of_frames_are_read_as_people_write_them(tmp_path: Path, lines: li
     assert len(recording.frame(4).depth_m)
 
 
-def test_names_sort_as_people_count(tmp_path: Path) -> None:
-    path = write_folder(tmp_path / "walk", count=12)
-    for folder in ("rgb", "depth"):
-        for index in range(12):
-            (path / folder / f"{index:06d}.png").rename(path / folder / f"frame_{index + 1}.png")
-    recording = open_recording(path)
-    assert [recording.name(i) for i in range(12)] == [f"frame_{i + 1}" for i in range(12)]
-    assert np.allclose(recording.world_from_camera[10], shot(10).world_from_camera, atol=1e-9)
-
-
 @given(st.lists(st.integers(0, 10**9), unique=True, min_size=2), st.sampled_from(["{}.png", "f{}.jpg", "a_{}_b.png"]))
 def test_natural_order_is_that_of_the_numbers(numbers: list[int], pattern: str) -> None:
     names = [pattern.format(number) for number in numbers]

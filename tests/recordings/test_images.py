@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from recording_scenes import CAMERA, metres, save_depth, save_rgb, shot
+from recording_scenes import CAMERA, save_rgb, shot
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
@@ -16,23 +16,6 @@ from avlmaps.recordings.images import check_picture, check_whole, read_colour, r
 
 PNG = cv2.imencode(".png", shot(1).rgb)[1].tobytes()
 JPEG = cv2.imencode(".jpg", shot(1).rgb)[1].tobytes()
-
-
-def test_colour_is_red_green_blue(tmp_path: Path):
-    red = np.zeros((48, 64, 3), np.uint8)
-    red[..., 0] = 255
-    save_rgb(tmp_path / "red.png", red)
-    assert np.array_equal(read_colour(tmp_path / "red.png", CAMERA), red)
-
-
-def test_depth_in_millimetres_becomes_metres_and_what_was_not_measured_zero(tmp_path: Path):
-    raw = shot(0).depth_mm
-    raw[10, 10] = 65535
-    save_depth(tmp_path / "d.png", raw)
-    depth_m = read_depth(tmp_path / "d.png", CAMERA, 1000.0)
-    assert depth_m.dtype == np.float32
-    assert depth_m[10, 10] == 0.0 and depth_m[0, 0] == 0.0
-    assert np.allclose(depth_m[20:], metres(raw)[20:], atol=1e-6)
 
 
 def test_depth_in_metres_loses_nan_infinity_and_what_is_not_positive(tmp_path: Path):

@@ -176,14 +176,6 @@ def test_a_bag_opens_with_interpolated_poses_of_the_camera(tmp_path: Path, kind:
     assert recording.up_in_world == pytest.approx((0.0, 0.0, 1.0))
 
 
-def test_a_bag_names_the_topics_that_were_chosen(tmp_path: Path) -> None:
-    images = {"rgb": "/camera/color/image_raw", "depth": "/camera/depth/image_raw"}
-    by_tf = open_rosbag(write_bag(tmp_path / "a", "ros2", sound=True))
-    assert by_tf.topics == {**images, "pose": "/tf", "audio": "/audio/audio"}
-    by_odometry = open_rosbag(write_bag(tmp_path / "b", "ros2", "odometry"))
-    assert by_odometry.topics == {**images, "pose": "/odom"}
-
-
 def test_the_sound_of_a_bag_is_on_the_clock_of_its_frames(tmp_path: Path) -> None:
     recording = open_rosbag(write_bag(tmp_path, "ros2", sound=True))
     assert recording.audio is not None

@@ -30,16 +30,6 @@ def test_frames_with_lost_tracking_are_left_out_and_told(tmp_path: Path):
     assert np.array_equal(recording.frame(1).rgb, shot(2).rgb)
 
 
-def test_a_rounded_rotation_is_made_orthonormal(tmp_path: Path):
-    path = write_seven_scenes(tmp_path / "seq")
-    written = shot(1).world_from_camera.copy()
-    written[:3, :3] *= 1.0002
-    np.savetxt(path / "frame-000002.pose.txt", written)
-    rotation = open_recording(path).world_from_camera[1, :3, :3]
-    assert np.allclose(rotation.T @ rotation, np.eye(3), atol=1e-12)
-    assert np.allclose(rotation, shot(1).world_from_camera[:3, :3], atol=1e-6)
-
-
 def test_a_wild_rotation_is_refused_with_the_frames_name_and_file(tmp_path: Path):
     path = write_seven_scenes(tmp_path / "seq")
     (path / "frame-000000.pose.txt").write_text("nan " * 16)

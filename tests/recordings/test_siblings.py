@@ -13,11 +13,9 @@ from avlmaps.recordings.conformance import Truth, example_truth
 from avlmaps.recordings.formats.ros_transforms import _tree_of_file  # pyright: ignore[reportPrivateUsage]
 from avlmaps.recordings.open import open_recording
 from helpers.format_writers import (
-    icl_truth,
     numbers,
     quaternion,
     write_folder,
-    write_icl_nuim,
     write_nerfstudio,
     write_polycam,
     write_record3d_exr,
@@ -154,13 +152,3 @@ def test_the_header_of_a_file_of_poses_for_a_bag_is_followed(tmp_path: Path, ord
     tree = _tree_of_file(tmp_path / "poses.txt", "camera")
     found, known = tree.root_from("camera", TRUTH.stamps_s)
     assert known.all() and np.allclose(found, TRUTH.world_from_camera, atol=1e-9)
-
-
-def test_a_comment_that_names_the_columns_of_a_ground_truth_is_followed(tmp_path: Path) -> None:
-    path = write_icl_nuim(tmp_path / "scene", icl_truth())
-    right = open_recording(path).world_from_camera
-    file = path / "livingRoom0.gt.freiburg"
-    rows = [line.split() for line in file.read_text().splitlines()]
-    swapped = [" ".join([*row[:4], row[7], *row[4:7]]) for row in rows]
-    file.write_text("\n".join(["# timestamp tx ty tz qw qx qy qz", *swapped]))
-    assert np.allclose(open_recording(path).world_from_camera, right)

@@ -9,8 +9,7 @@ import soundfile
 from recording_scenes import save_depth, save_rgb, write_folder, write_seven_scenes
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.validate import validate
+from avlmaps.recordings.open import open_recording, validate
 
 
 def _replace_line(path: Path, number: int, text: str) -> None:

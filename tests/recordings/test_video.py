@@ -31,12 +31,6 @@ def write_video(path: Path) -> None:
         container.mux(stream.encode())
 
 
-def test_stamps_follow_the_rate(video: VideoFrames) -> None:
-    assert len(video) == COUNT
-    assert video.stamps_s == pytest.approx(np.arange(COUNT) / 25.0, abs=1e-3)
-    assert (video.width, video.height) == (64, 48)
-
-
 @given(order=st.lists(st.integers(0, COUNT - 1), min_size=1, max_size=6))
 def test_any_order_gives_the_frames_that_were_written(video: VideoFrames, order: list[int]) -> None:
     for index in order:

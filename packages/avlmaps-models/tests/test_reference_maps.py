@@ -14,7 +14,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.extras import install_command
 from avlmaps.maps.grid import GridSpec
-from avlmaps.recordings.formats.avlmaps_layout import WORLD_FROM_HABITAT, base_from_camera, reference_map_from_world
+from avlmaps.recordings.formats.layouts import WORLD_FROM_HABITAT, base_from_camera, reference_map_from_world
 from avlmaps_models.import_reference.convert import ImportSettings, import_reference_map
 from avlmaps_models.import_reference.places import Cubes, cubes_from_corner, cubes_from_first_base, voxels_filled
 from avlmaps_models.import_reference.scene import find_scene

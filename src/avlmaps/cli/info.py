@@ -77,8 +77,7 @@ def describe_path(
         return _describe_map(path, verify, plot)
     if plot is not None:
         raise UsageError(f"--plot draws a map, and {path} is a recording; build one first.")
-    from avlmaps.recordings.open import find_format, open_recording
-    from avlmaps.recordings.validate import validate
+    from avlmaps.recordings.open import find_format, open_recording, validate
 
     find_format(path, format)  # a place that holds no recording has no faults to list
     faults = [str(fault) for fault in validate(path, format, None if verify else DECODED_BY_INFO, more, **given)]

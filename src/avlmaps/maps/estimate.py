@@ -18,7 +18,7 @@ from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.sources.wiring import check_wiring
 from avlmaps.maps.store.manifest import GroundInfo, SensorInfo, UpInfo
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.channels import useless_channels
+from avlmaps.recordings.channels import level_faults
 from avlmaps.recordings.consistency.check import Finding, Grade, Reason, Verdict, check_recording
 from avlmaps.recordings.consistency.suspicions import examine_recording
 from avlmaps.recordings.layout import DESCRIPTION
@@ -52,7 +52,7 @@ def doubts_of(recording: Recording, allowed: Sequence[str]) -> tuple[str, ...]:
 def judge(recording: Recording, useless: Sequence[str] | None = None, *, closely: bool = False) -> Verdict:
     """Check a recording against itself, the up direction that was given against what it shows, and its microphones.
 
-    ``useless`` is what ``useless_channels`` says of its sound, where that was read before. ``closely`` looks for rare
+    ``useless`` is what ``level_faults`` says of its sound, where that was read before. ``closely`` looks for rare
     mistakes as well, and says what would not show.
     """
     verdict = examine_recording(recording) if closely else check_recording(recording)
@@ -74,7 +74,7 @@ def doubts_of_walk(walk: Trajectory, held: Recording) -> tuple[str, ...]:
 
 def doubts_of_channels(track: AudioTrack, walk: Trajectory, name: str) -> tuple[str, ...]:
     """Return what is doubtful about the channels of an array: their wiring, and those of no use."""
-    useless = useless_channels(track, name)
+    useless = level_faults(track, name)[0]
     return (*map(str, _of_microphones(track, walk, useless)), *useless)
 
 
@@ -85,12 +85,12 @@ def _array_of(recording: Recording) -> AudioTrack | None:
 
 def _useless(recording: Recording) -> list[str]:
     array = _array_of(recording)
-    return useless_channels(array) if array is not None else []
+    return level_faults(array)[0] if array is not None else []
 
 
 def _of_microphones(track: AudioTrack, walk: Trajectory, useless: Sequence[str] | None) -> list[Finding]:
     try:
-        if useless_channels(track) if useless is None else useless:
+        if level_faults(track)[0] if useless is None else useless:
             return []
         spans_s = [(heard.onset_s, heard.offset_s) for heard in segment(track)]
         found = check_wiring(track, walk, spans_s)

@@ -18,12 +18,7 @@ LOWEST_RATE_HZ = 1000
 
 @dataclass(frozen=True, slots=True)
 class Sound:
-    """A piece of sound.
-
-    Attributes:
-        samples: float32 mono in [-1, 1].
-        rate_hz: samples a second.
-    """
+    """A piece of sound: float32 mono in [-1, 1], and samples a second."""
 
     samples: Float[np.ndarray, " n"]
     rate_hz: int
@@ -40,16 +35,11 @@ class Sound:
 
     @property
     def duration_s(self) -> float:
-        """Length in seconds."""
         return len(self.samples) / self.rate_hz
 
 
 def require_rate(rate_hz: Any) -> int:
-    """Return how many samples a second has, as a number of Python.
-
-    Raises:
-        ValueError: it is no positive whole number.
-    """
+    """Return how many samples a second has, as a number of Python; ValueError where it is no positive whole number."""
     rate = as_whole(rate_hz)
     if rate is None or rate < 1:
         raise ValueError(f"rate_hz is {rate_hz!r}; it must be a positive whole number of samples a second")
@@ -60,17 +50,12 @@ def require_rate(rate_hz: Any) -> int:
 class AudioTrack:
     """An audio file, or the audio stream of a video, placed on a recording's clock.
 
-    WAV, FLAC and OGG are read by libsndfile, everything else (mp4, mkv, m4a, mp3) by FFmpeg; several channels
-    become one, their mean. Nothing is read before it is needed, so a track may be hours long.
+    Nothing is read before it is needed, so a track may be hours long. Several channels become one, their mean.
 
     Attributes:
-        path: the file.
-        rate_hz: samples a second.
-        duration_s: length in seconds.
         start_s: the recording's time at which its first sample sounds.
         channel: the one that is read; None for the mean of all.
-        microphones: where those of the channels are, None where that is not known (``channels.read_channels`` reads
-            them all).
+        microphones: where those of the channels are (``channels.read_channels`` reads them all).
         files: one for each channel, where they are not channels of one file.
         directions: what a device said of where its sounds came from, where there is one.
         label: what sentences call it, where its file is not one that a user knows.
@@ -88,46 +73,27 @@ class AudioTrack:
 
     @classmethod
     def open(cls, path: Path | str, start_s: float = 0.0, label: str = "") -> "AudioTrack":
-        """Find out what an audio file holds, without reading it whole.
-
-        Args:
-            path: a sound file, or a video with sound.
-            start_s: the recording's time at which its first sample sounds.
-            label: what sentences call it instead of its file.
-
-        Raises:
-            AudioError: there is no such file, it cannot be read, has no audio stream or no samples, or is truncated.
-        """
+        """Find out what a sound file, or a video with sound, holds, without reading it; AudioError: it is no sound."""
         from avlmaps.recordings import containers
 
         path = Path(path)
         rate_hz, count = containers.examine(path)
         if rate_hz < LOWEST_RATE_HZ:
-            raise AudioError(
-                f"{path} has {rate_hz} samples a second, too few for sounds; at least {LOWEST_RATE_HZ} are needed."
-            )
+            raise AudioError(f"{path} has {rate_hz} samples a second; sounds need at least {LOWEST_RATE_HZ}.")
         return cls(path, rate_hz, count / rate_hz, start_s, label=label)
 
     @property
     def name(self) -> str:
-        """What sentences call it."""
         return self.label or str(self.path)
 
     @property
     def end_s(self) -> float:
-        """The recording's time at which the track ends."""
         return self.start_s + self.duration_s
 
     def read(self, onset_s: float = 0.0, offset_s: float | None = None) -> Sound:
-        """Read a piece, with silence for what lies outside the track.
+        """Read a piece by the recording's time, to the end if None; what lies outside of the track is silent.
 
-        Args:
-            onset_s: where the piece begins, the recording's time.
-            offset_s: where it ends; the track's end if None.
-
-        Raises:
-            AudioError: the file cannot be read any more, or holds samples that are not finite numbers.
-            ValueError: the piece ends before it begins.
+        AudioError says that the file cannot be read any more, or holds samples that are not finite numbers.
         """
         begin = round((onset_s - self.start_s) * self.rate_hz)
         count = round(self.duration_s * self.rate_hz)
@@ -148,11 +114,7 @@ class AudioTrack:
         return _checked(piece, self.path, self.rate_hz, begin)
 
     def every_channel(self, begin: int, end: int) -> Float[np.ndarray, "n m"]:
-        """Return samples of all channels that hold microphones, as they are stored; fewer where the track ends before.
-
-        Raises:
-            AudioError: the file cannot be read.
-        """
+        """Return samples of all channels with microphones, as they are stored; fewer where the track ends before."""
         from avlmaps.recordings.containers import read_all_channels
 
         parts = [read_all_channels(path, begin, end, self.rate_hz) for path in self.files or (self.path,)]
@@ -161,11 +123,7 @@ class AudioTrack:
         return samples[:, self.microphones.channels] if self.microphones and self.microphones.channels else samples
 
     def blocks(self, seconds: float = 10.0) -> Iterator[Sound]:
-        """Go through the whole track in pieces of one length (the last may be shorter), one in memory at a time.
-
-        Raises:
-            AudioError: the file breaks off, or holds samples that are not finite numbers.
-        """
+        """Go through the whole track in pieces of one length (the last may be shorter), one in memory at a time."""
         from avlmaps.recordings import containers
 
         size = max(1, round(seconds * self.rate_hz))
@@ -178,11 +136,7 @@ class AudioTrack:
 
 
 def write_flac(path: Path, sound: Sound | Iterable[Sound]) -> None:
-    """Write a sound, or the blocks of a long one (of one rate), as 16-bit FLAC; see ``write_samples``.
-
-    Raises:
-        AudioError: there is not one block, or the disk is full.
-    """
+    """Write a sound, or the blocks of a long one (of one rate, AudioError without any), as 16-bit FLAC."""
     blocks = iter([sound] if isinstance(sound, Sound) else sound)
     first = next(blocks, None)
     if first is None:
@@ -200,10 +154,7 @@ def write_flac(path: Path, sound: Sound | Iterable[Sound]) -> None:
 def write_samples(path: Path, blocks: Iterable[Float[np.ndarray, "n m"]], rate_hz: int, channels: int) -> None:
     """Write samples of channels as 16-bit FLAC (up to 8), or WAV by the suffix; a kill leaves the old file or the new.
 
-    Samples beyond [-1, 1] are clipped.
-
-    Raises:
-        AudioError: the disk is full.
+    Samples beyond [-1, 1] are clipped. AudioError says that the disk is full.
     """
     import soundfile
 
@@ -225,10 +176,7 @@ def _checked(samples: Float[np.ndarray, " n"], path: Path, rate_hz: int, at: int
     finite = np.isfinite(samples)
     if not finite.all():
         where_s = (at + int(np.argmin(finite))) / rate_hz
-        raise AudioError(
-            f"{path} holds samples that are not finite numbers, the first at {where_s:.3f} s; convert it again from "
-            "its source."
-        )
+        raise AudioError(f"{path} holds samples that are not finite, the first at {where_s:.3f} s; convert it again.")
     peak = float(np.abs(samples).max(initial=0.0))
     if peak > 16.0:
         raise AudioError(f"{path} holds samples as large as {peak:.0f}; floating-point sound must lie in [-1, 1].")
@@ -257,11 +205,7 @@ _QUALITY = "HQ"
 
 
 def resample(sound: Sound, rate_hz: int) -> Sound:
-    """Return the sound at another rate, low-passed so that nothing folds; the same sound where the rate is right.
-
-    Gives what ``librosa.resample`` gives by default: no delay, and a length rounded up to a whole sample. It works
-    through a long sound in pieces, so that it needs no more memory than the sound and its answer.
-    """
+    """Return the sound at another rate as ``librosa.resample`` does: without delay, its length rounded up."""
     if sound.rate_hz == rate_hz:
         return sound
     length = -(-len(sound.samples) * rate_hz // sound.rate_hz)

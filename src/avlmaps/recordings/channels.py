@@ -24,12 +24,7 @@ _FULL_SCALE, _CLIPPED = 0.999, 1e-3
 
 @dataclass(frozen=True, slots=True)
 class ChannelSound:
-    """A piece of sound of several channels.
-
-    Attributes:
-        samples: (m, n) float32 in [-1, 1].
-        rate_hz: samples a second.
-    """
+    """A piece of sound of several channels: (m, n) float32 in [-1, 1], and samples a second."""
 
     samples: Float[np.ndarray, "m n"]
     rate_hz: int
@@ -41,33 +36,22 @@ class ChannelSound:
 
     @property
     def duration_s(self) -> float:
-        """Length in seconds."""
         return self.samples.shape[1] / self.rate_hz
 
     def channel(self, number: int) -> Sound:
-        """Return one channel."""
         return Sound(np.ascontiguousarray(self.samples[number]), self.rate_hz)
 
 
 def with_microphones(track: AudioTrack, microphones: Microphones, files: tuple[Path, ...] = ()) -> AudioTrack:
-    """Return a track that knows where its channels' microphones are.
+    """Return a track that knows where its channels' microphones are; of several files it is the first.
 
     As one channel it sounds as its first, or as the first that is not far quieter than others: devices give channels
-    of their own processing, or of nothing, beside those of the microphones.
-
-    Args:
-        track: the sound file, or the first of several.
-        microphones: one for each channel.
-        files: one for each channel, where they are not channels of one file.
-
-    Raises:
-        RecordingError: there are more or fewer channels than microphones.
-        AudioError: files of channels have another length or rate.
+    of their own processing, or of nothing, beside those of the microphones. RecordingError says that there are more or
+    fewer channels than microphones, AudioError that files of channels have another length or rate.
     """
     if files and len(files) != len(microphones):
         raise RecordingError(
-            f"The recording has {len(files)} files of channels, but {len(microphones)} microphone(s) are described; "
-            "give one position for each."
+            f"There are {len(files)} files of channels and {len(microphones)} microphone(s); give each file its place."
         )
     for path in files[1:]:
         other = AudioTrack.open(path, track.start_s)
@@ -91,16 +75,7 @@ def with_microphones(track: AudioTrack, microphones: Microphones, files: tuple[P
 
 
 def read_channels(track: AudioTrack, onset_s: float, offset_s: float) -> ChannelSound:
-    """Read a piece of every channel, with silence for what lies outside the track.
-
-    Args:
-        track: of one channel or several.
-        onset_s: where the piece begins, the recording's time.
-        offset_s: where it ends.
-
-    Raises:
-        AudioError: the file cannot be read, or holds samples that are not finite numbers.
-    """
+    """Read a piece of every channel, by the recording's time, with silence for what lies outside the track."""
     begin, end = (round((at_s - track.start_s) * track.rate_hz) for at_s in (onset_s, offset_s))
     count = round(track.duration_s * track.rate_hz)
     inside_begin, inside_end = min(max(begin, 0), count), min(max(end, 0), count)
@@ -119,25 +94,19 @@ def write_channels(path: Path, sound: ChannelSound) -> None:
 
 
 def level_faults(track: AudioTrack, name: str = "") -> tuple[list[str], list[str]]:
-    """Return what is silent about a track, and which of its channels are clipped: their loud sounds are like others.
+    """Return what is useless of a track, and which of its channels are clipped: their loud sounds are like others.
 
-    Looks at pieces spread over the track. One in which sounds and silence take turns was put together so.
+    Useless is silence; of an array, a channel that is dead or another's copy, since it shows no direction. Channels
+    that are exchanged show only along the drive (``avlmaps.maps.sources.wiring``). Looks at pieces spread over the
+    track; one in which sounds and silence take turns was put together so.
     """
     samples = _looked_at(track)
-    silent = _silent(samples, track, name)
-    return silent, [] if silent else _clipped(samples, track)
-
-
-def useless_channels(track: AudioTrack, name: str = "") -> list[str]:
-    """Return a sentence for each channel that is dead or another's copy, so that an array shows no direction.
-
-    Channels that are exchanged show only where they are compared with the geometry along the drive
-    (``avlmaps.maps.sources.wiring``).
-    """
-    samples = _looked_at(track)
-    if not np.ptp(samples) and (silent := _silent(samples, track, name)):
-        return [f"{silent[0]} Check the microphones, and which input was recorded."]
-    return [*_dead(samples, track, name), *_copied(samples, track, name)]
+    silent = _silent(samples, track, name) if track.microphones is None or not np.ptp(samples) else []
+    if silent:
+        check = " Check the microphones, and which input was recorded." if track.microphones is not None else ""
+        return [silent[0] + check], []
+    useless = [] if track.microphones is None else [*_dead(samples, track, name), *_copied(samples, track, name)]
+    return useless, _clipped(samples, track)
 
 
 def _looked_at(track: AudioTrack) -> Float[np.ndarray, "k m n"]:
@@ -154,13 +123,11 @@ def _named(track: AudioTrack, channel: int, name: str = "") -> str:
 
 
 def _number(track: AudioTrack, channel: int) -> int:
-    """Return the number of a microphone's channel in the track, counted from 1."""
     channels = track.microphones.channels if track.microphones else ()
     return 1 + (channels[channel] if channels else channel)
 
 
 def _silent(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str) -> list[str]:
-    """Find that no sample differs from the others, throughout or in one stretch of half of the track and more."""
     if samples.shape[2] < 2:
         return []
     still = np.ptp(samples, axis=2).max(axis=1) == 0.0
@@ -225,26 +192,20 @@ _SILENCE_S = 10
 
 @dataclass(frozen=True, slots=True)
 class RawTrack(AudioTrack):
-    """A track of float32 samples in a file without a head; more samples may follow those that it has.
+    """A track of float32 samples in a file without a head, from sample ``first`` on; more may follow those that it has.
 
     Of several channels, whose samples take turns in the file, it sounds as its first.
-
-    Attributes:
-        first: the sample of the file that is its first.
-        channels: how many.
     """
 
     first: int = 0
     channels: int = 1
 
     def blocks(self, seconds: float = 10.0) -> Iterator[Sound]:
-        """Go through the track in pieces; see ``AudioTrack.blocks``."""
         size, count = max(1, round(seconds * self.rate_hz)), round(self.duration_s * self.rate_hz)
         for at in range(0, count, size):
             yield Sound(self._samples(at, min(at + size, count)), self.rate_hz)
 
     def since(self, sample: int) -> "RawTrack":
-        """Return the track from one of its samples on."""
         left = round(self.duration_s * self.rate_hz) - sample
         return replace(
             self,
@@ -254,13 +215,11 @@ class RawTrack(AudioTrack):
         )
 
     def every_channel(self, begin: int, end: int) -> Float32[np.ndarray, "n m"]:
-        """Return samples of all channels; see ``AudioTrack.every_channel``."""
         offset = _BYTES * self.channels * (self.first + begin)
         samples = np.fromfile(self.path, np.float32, (end - begin) * self.channels, offset=offset)
         if len(samples) < (end - begin) * self.channels:
-            raise AudioError(
-                f"{self.path} lost its sound: {(end - begin) * self.channels - len(samples)} samples are missing."
-            )
+            lost = (end - begin) * self.channels - len(samples)
+            raise AudioError(f"{self.path} lost its sound: {lost} samples are missing.")
         return samples.reshape(-1, self.channels)
 
     def _samples(self, begin: int, end: int) -> np.ndarray:
@@ -278,31 +237,23 @@ class GrowingTrack:
     """
 
     def __init__(self, file: Path) -> None:
-        """Begin without sound; the samples will be in a file of this name."""
         self._file, self._rate_hz, self.channels, self._start_s, self._count = file, 0, 0, 0.0, 0
         self.gaps, self.gap_s, self.overlaps = 0, 0.0, 0
 
     @property
     def track(self) -> RawTrack | None:
-        """The track until now, None before its first sample."""
         if not self._count:
             return None
         return RawTrack(self._file, self._rate_hz, self._count / self._rate_hz, self._start_s, channels=self.channels)
 
     @property
     def end_s(self) -> float | None:
-        """When it ends until now, None before its first sample."""
         return None if not self._count else self._start_s + self._count / self._rate_hz
 
     def add(self, chunk: Any, stamp_s: Any = None) -> None:
-        """Take a piece of sound.
+        """Take a ``Sound`` or a ``ChannelSound``, and when its first sample sounds on the frames' clock.
 
-        Args:
-            chunk: a ``Sound``: mono samples and their rate; or a ``ChannelSound``, of one number of channels.
-            stamp_s: when its first sample sounds, on the clock of the frames; None where the one before ended.
-
-        Raises:
-            AudioError: it is no sound, has another rate or other channels, repeats what came, or is of another clock.
+        AudioError: it is no sound, has another rate or other channels, repeats what came, or is of another clock.
         """
         sound = _checked_piece(chunk, self._rate_hz, self.channels)
         at_s = None if stamp_s is None else as_number(stamp_s)
@@ -351,8 +302,7 @@ class GrowingTrack:
                     count += sound.samples.shape[1]
         except OSError as fault:
             raise AudioError(
-                f"{self._file} cannot be written ({fault.strerror or fault}), so that a piece of sound is lost; make "
-                "room for it."
+                f"{self._file} cannot be written ({fault.strerror or fault}), so that sound is lost; make room for it."
             ) from fault
         self._count += count
 

@@ -1,18 +1,13 @@
 """The promises of every reader of recordings, ours and others': call ``check`` and ``check_damage`` in a test.
 
-Write the example room in your format, and hold your reader to it::
-
     truth = example_truth()
     path = write_in_my_format(tmp_path / "walk", truth)
     check(lambda: open_my_format(path), truth)
     check_damage(path, open_my_format, scratch=tmp_path / "damaged")
 
-Each raises ``NonConformanceError`` with one sentence that says which promise is broken.
-
-A room that is all formula, seen by a camera on a short walk: what a format is tested against.
-
-The room is 6 x 4 x 2.6 m with three boxes, z up, metres. No two walls, boxes or corners look alike, so that a picture
-that is mirrored, shuffled or of other channels differs from the right one.
+Each raises ``NonConformanceError`` with one sentence that says which promise is broken. The truth is a walk through a
+room that is all formula, 6 x 4 x 2.6 m with three boxes, z up. No two walls, boxes or corners look alike, so that a
+picture that is mirrored, shuffled or of other channels differs from the right one.
 """
 
 import shutil
@@ -48,15 +43,7 @@ _PITCH_DOWN_RAD = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """A recording as it is in truth: what goes into a format's files, and has to come out of its reader.
-
-    Attributes:
-        rig: the cameras; depth and colour are seen from one place.
-        stamps_s: (n,) seconds from the first frame.
-        world_from_camera: (n, 4, 4); z up, x right, y down, z forward.
-        rgb: a colour picture a frame.
-        depth_m: a picture of z-depth a frame, metres; 0 where nothing was measured.
-    """
+    """What goes into a format's files, and has to come out of its reader; all pictures are seen from one place."""
 
     rig: Rig
     stamps_s: Float[np.ndarray, " n"]
@@ -71,14 +58,7 @@ class Truth:
 def example_truth(
     rgb: Pinhole | None = None, depth: Pinhole | None = None, frames: int = 6, rate_hz: float = 10.0
 ) -> Truth:
-    """Walk through the room.
-
-    Args:
-        rgb: the colour camera; by default one of 64x48.
-        depth: the depth camera at the same place; by default the colour camera.
-        frames: how many; the camera turns by 12 degrees and drives 6 cm from each to the next.
-        rate_hz: frames a second.
-    """
+    """Walk through the room, 12 degrees and 6 cm a frame; colour is 64x48 by default, and depth has colour's camera."""
     rgb = rgb or Pinhole(52.0, 53.0, 31.0, 25.0, 64, 48)
     rig = Rig(rgb, depth or rgb)
     stamps_s = np.arange(frames) / rate_hz
@@ -146,18 +126,8 @@ def check(
     """Hold a reader to the truth that was written in its format, and return the recording that it opened.
 
     The world may be another than the truth's (axes turned, origin moved): poses are compared up to one rigid motion,
-    and the up direction with them. A reader that does not know up says None.
-
-    Args:
-        open_it: opens the recording.
-        truth: what was written.
-        depth_error_m: largest error of a depth (the median of a picture's), metres.
-        least_measured: smallest share of the measured depths that must be there.
-        colour_error: largest mean error of a colour, of 255.
-        stamps: whether the format has a clock; without one, stamps only rise.
-
-    Raises:
-        NonConformanceError: it breaks a promise.
+    and the up direction with them. A reader that does not know up says None, and one without a clock has no ``stamps``
+    but rising ones. ``depth_error_m`` is of the median of a picture, ``colour_error`` of the mean, of 255.
     """
     recording = open_it()
     files = _listing(recording.path)
@@ -257,16 +227,9 @@ def _check_identity(recording: Recording, again: Recording) -> None:
 
 
 def check_damage(path: Path, open_it: Callable[[Path], Recording], scratch: Path, most_files: int = 12) -> None:
-    """Remove, cut and empty the files of a recording one by one; each time a plain sentence or fewer frames must come.
+    """Remove, cut and empty the files of a copy one by one; each time a plain sentence or fewer frames must come.
 
-    Args:
-        path: a recording, a file or a folder; it is copied, and stays as it is.
-        open_it: opens one.
-        scratch: a folder for the copies.
-        most_files: how many files are damaged at most: the first of each folder and suffix, then others.
-
-    Raises:
-        NonConformanceError: damage raises something else than an ``AvlmapsError``, or a sentence that names no file.
+    At most ``most_files`` are damaged: the first of each folder and suffix, then others.
     """
     for name in _victims(path, most_files):
         for done in ("removed", "cut to half", "emptied"):

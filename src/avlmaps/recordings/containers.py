@@ -40,8 +40,7 @@ def self_contained_suffix(content: bytes) -> str | None:
 def truncation_error(path: Path, found_s: float, promised_s: float) -> AudioError:
     """Return the error for a file that ends before it should."""
     return AudioError(
-        f"{path} is truncated: it should last {promised_s:.2f} s and breaks off at {found_s:.2f} s; copy or convert it "
-        "again."
+        f"{path} is truncated: of {promised_s:.2f} s it breaks off at {found_s:.2f} s; copy or convert it again."
     )
 
 
@@ -156,7 +155,6 @@ def _examine_plain(path: Path) -> tuple[int, int]:
 
 
 def _is_short_wav(path: Path) -> bool:
-    """Return whether a WAV promises more bytes than there are; libsndfile reads what is left of it without a word."""
     with path.open("rb") as file:
         head = file.read(12)
     promised = int.from_bytes(head[4:8], "little")
@@ -171,9 +169,7 @@ def _examine_video(path: Path) -> tuple[int, int]:
     try:
         with av.open(str(path)) as container:
             if not container.streams.audio:
-                raise NoAudioStreamError(
-                    f"{path} has no audio stream; give the sound as a file of its own ({option('audio')})."
-                )
+                raise NoAudioStreamError(f"{path} has no audio stream; give a file of its own ({option('audio')}).")
             audio = container.streams.audio[0]
             rate_hz = int(audio.codec_context.sample_rate)
             zero_s = (container.start_time or 0) / av.time_base
@@ -221,7 +217,7 @@ def _frames(path: Path, from_s: float) -> Iterator[tuple[float, Float32[np.ndarr
 def _placed(
     path: Path, begin: int, end: int, rate_hz: int, channel: int | None = None
 ) -> Iterator[Float32[np.ndarray, " _"]]:
-    """Yield the samples ``begin:end`` without holes: gaps between the container's stamps are filled with silence."""
+    # gaps between the container's stamps are filled with silence
     at, started = begin, False
     for time_s, every in _frames(path, begin / rate_hz):
         samples, index = _mono(every, channel), round(time_s * rate_hz)

@@ -1,11 +1,6 @@
 """What someone knows better than a recording's files: depth unit, intrinsics, poses, camera axes, pose clock, up.
 
-One value, `Corrections`, given by options, by keys of `recording.json` or by a reader, is applied in one place to a
-recording of any format. Nothing is corrected that was not named.
-
-Where the axes of a camera point: OpenCV's x right, y down, z forward, and the conventions of others.
-
-A convention is a name or three letters for its x, y and z axis: R or L (right, left), U or D (up, down), F or B
+A convention of axes is a name or three letters for x, y and z: R or L (right, left), U or D (up, down), F or B
 (forward, back), as seen by the camera. OpenCV is RDF, OpenGL and ARKit RUB, the bodies of ROS FLU. A picture that was
 turned by 90 degrees is a camera that was: DLF or URF.
 """
@@ -41,14 +36,7 @@ _DIRECTIONS = {
 
 
 def opencv_from_axes(name: str) -> Float[np.ndarray, "3 3"]:
-    """Return the rotation that takes a vector in these axes to OpenCV's.
-
-    Args:
-        name: ``opencv``, ``opengl``, ``ros``, or three letters such as ``RUB``.
-
-    Raises:
-        RecordingError: it is no name and no three axes, or the axes are left-handed.
-    """
+    """Return the rotation from these axes to OpenCV's; RecordingError where they are no right-handed axes."""
     letters = NAMED.get(name.lower(), name.upper())
     if len(letters) != 3 or not set(letters) <= set(_DIRECTIONS):
         raise RecordingError(
@@ -95,15 +83,7 @@ class PoseKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class GivenCamera:
-    """Intrinsics of one camera as someone gives them.
-
-    Attributes:
-        fx: focal length along the columns, pixels.
-        fy: focal length along the rows, pixels.
-        cx: column of the principal point, pixels.
-        cy: row of the principal point, pixels.
-        size: width and height of the picture that they belong to; None: the recording's own pictures.
-    """
+    """Intrinsics of one camera, pixels, and the size of the picture that they belong to; None: the recording's own."""
 
     fx: float
     fy: float
@@ -112,11 +92,7 @@ class GivenCamera:
     size: tuple[int, int] | None = None
 
     def camera(self, width: int, height: int) -> Pinhole:
-        """Return the camera of a recording's pictures.
-
-        Raises:
-            RecordingError: no camera has these numbers.
-        """
+        """Return the camera of a recording's pictures; RecordingError where no camera has these numbers."""
         try:
             return Pinhole(self.fx, self.fy, self.cx, self.cy, *(self.size or (width, height))).resized(width, height)
         except ValueError as error:
@@ -124,11 +100,7 @@ class GivenCamera:
 
     @staticmethod
     def parse(words: str) -> "GivenCamera":
-        """Read ``fx,fy,cx,cy`` or ``fx,fy,cx,cy@WIDTHxHEIGHT``.
-
-        Raises:
-            ValueError: it is something else.
-        """
+        """Read ``fx,fy,cx,cy`` or ``fx,fy,cx,cy@WIDTHxHEIGHT``; ValueError where it is something else."""
         numbers, _, size = words.partition("@")
         fx, fy, cx, cy = (float(number) for number in numbers.split(","))
         if not size:
@@ -145,8 +117,8 @@ class Corrections:
         depth_unit_m: metres of one unit of the depth as stored (0.001: millimetres; 1 for depth in floats).
         intrinsics: of colour and depth; one for both where depth is registered to colour.
         poses: how the poses are to be read; quaternions are put right before poses are inverted.
-        camera_axes: where the x, y and z axis of the poses' camera point (``camera_axes``).
-        pose_delay_s: a pose with stamp t + delay belongs to the picture with stamp t, seconds.
+        camera_axes: where the x, y and z axis of the poses' camera point.
+        pose_delay_s: a pose with stamp t + delay belongs to the picture with stamp t.
         up_in_world: direction against gravity in the poses' world.
     """
 
@@ -189,7 +161,6 @@ class Corrections:
         return replace(declared, **ours)
 
     def words(self, spelled: Callable[[str, str], str] = option) -> str:
-        """Return them as the options that give them, as the reader of a sentence spells options."""
         unit, delay = self.depth_unit_m, self.pose_delay_s
         rows = (
             ("depth-unit", "" if unit is None else f"{unit:g}"),
@@ -214,9 +185,7 @@ def corrected(recording: Recording, given: Corrections) -> Recording:
     """Return a recording as it is with what someone knows better, itself where that is nothing.
 
     What was corrected already stays so where ``given`` leaves it open: options win over keys of ``recording.json``.
-
-    Raises:
-        RecordingError: something does not fit it (one camera for two, a delay longer than the walk).
+    RecordingError says that something does not fit it (one camera for two, a delay longer than the walk).
     """
     if isinstance(recording, CorrectedRecording):
         again = CorrectedRecording(recording.whole, given.over(recording.given))
@@ -231,11 +200,6 @@ class CorrectedRecording(Subset):
     """A recording in place, with corrected unit, cameras, poses and up direction."""
 
     def __init__(self, whole: Recording, given: Corrections) -> None:
-        """Correct a recording as its reader understands it.
-
-        Raises:
-            RecordingError: something does not fit the recording.
-        """
         at, world_from_camera, self.lost = _delayed(whole, given.pose_delay_s)
         super().__init__(whole, at)
         self.given, self.topics = given, whole.topics
@@ -255,7 +219,6 @@ class CorrectedRecording(Subset):
             self.up_in_world = np.array(given.up_in_world) / np.linalg.norm(given.up_in_world)
 
     def frame(self, index: int) -> Frame:
-        """Read one frame."""
         frame = super().frame(index)
         depth_m = frame.depth_m if self._scale == 1.0 else frame.depth_m * np.float32(self._scale)
         pose = self.world_from_camera[index]
@@ -263,7 +226,6 @@ class CorrectedRecording(Subset):
 
     @cached_property
     def fingerprint(self) -> str:
-        """Of the recording and the corrections."""
         return hashlib.sha256(f"{self.whole.fingerprint} {self.given.words(flag)}".encode()).hexdigest()
 
 
@@ -290,11 +252,7 @@ def uncorrected(recording: Recording) -> Recording:
 
 
 def corrected_rig(rig: Rig, given: Sequence[GivenCamera], path: Path) -> Rig:
-    """Return the cameras with given intrinsics.
-
-    Raises:
-        RecordingError: one camera is given, and depth has another than colour.
-    """
+    """Return the cameras with given intrinsics; RecordingError where one is given for two."""
     if not given:
         return rig
     if len(given) == 1 and not rig.registered:

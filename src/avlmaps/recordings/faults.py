@@ -14,14 +14,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing wrong with a recording.
-
-    Attributes:
-        sentence: what, where and what to do; it names the file and the line.
-        file: the file, where there is one.
-        line: the line in it, counted from 1.
-        fatal: whether the recording cannot be opened because of it.
-    """
+    """One thing wrong with a recording: a sentence with file and line (from 1); a fatal one forbids to open it."""
 
     sentence: str
     file: Path | None = None
@@ -36,11 +29,7 @@ _listed: ContextVar[list[Fault] | None] = ContextVar("_listed", default=None)
 
 
 def report(sentence: str, file: Path | None = None, line: int | None = None, *, fatal: bool = True) -> None:
-    """Add a fault to the list of ``listed``; outside of it, stop at a fatal one and pass over any other.
-
-    Raises:
-        RecordingError: it is fatal, and no list is made.
-    """
+    """Add a fault to the list of ``listed``; without one, raise RecordingError if it is fatal, else pass over it."""
     found = _listed.get()
     if found is not None:
         found.append(Fault(sentence, file, line, fatal))
@@ -79,15 +68,7 @@ def listed() -> AbstractContextManager[list[Fault]]:
 
 @contextmanager
 def readable(path: Path, missing: str = "") -> Generator[None]:
-    """Say why a file cannot be read that is read within.
-
-    Args:
-        path: the file.
-        missing: what is to be done where there is none, the end of a sentence.
-
-    Raises:
-        RecordingError: it is missing or cannot be read.
-    """
+    """Raise RecordingError where a file cannot be read within; ``missing`` says what to do where there is none."""
     try:
         yield
     except OSError as error:

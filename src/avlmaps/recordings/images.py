@@ -54,17 +54,14 @@ class DisplayTurn:
         return self.transpose or self.flip_x or self.flip_y
 
     def applied(self, picture: np.ndarray) -> np.ndarray:
-        """Return a picture (rows, columns, ...) as it is shown."""
         shown = np.swapaxes(picture, 0, 1) if self.transpose else picture
         return np.ascontiguousarray(shown[:: -1 if self.flip_y else 1, :: -1 if self.flip_x else 1])
 
     def size(self, width: int, height: int) -> tuple[int, int]:
-        """Return (width, height) of a stored picture as it is shown."""
         return (height, width) if self.transpose else (width, height)
 
     @property
     def words(self) -> str:
-        """The turn in words."""
         if self.transpose ^ self.flip_x ^ self.flip_y:
             return "mirrored"
         if self.transpose:
@@ -140,10 +137,7 @@ def _unknown_kind(path: Path, content: bytes) -> str:
     if not content:
         return f"{path} is empty (0 bytes); copy it again or leave that frame out."
     if content[4:8] == b"ftyp" and content[8:12] in _HEIF_KINDS:
-        return (
-            f"{path} is a HEIC picture, which needs another package: pip install 'avlmaps[heic]', or convert all of "
-            "them to JPEG."
-        )
+        return f"{path} is a HEIC picture; pip install 'avlmaps[heic]', or convert all of them to JPEG."
     if content.startswith((_PNG[:4], _JPEG)):
         return f"{path} is truncated or damaged in its header ({len(content)} bytes); copy it again."
     known = ", ".join(suffix[1:] for suffix in COLOUR_SUFFIXES)
@@ -162,7 +156,7 @@ def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
             raise RecordingError(_unknown_kind(path, content))
     if size[0] < 1 or size[1] < 1 or size[0] * size[1] > MOST_PIXELS:
         raise RecordingError(
-            f"{path} says that it is {size[0]}x{size[1]}; pictures have 1 to {MOST_PIXELS:,} pixels, so copy it again."
+            f"{path} is {size[0]}x{size[1]}; pictures have 1 to {MOST_PIXELS:,} pixels; copy it again."
         )
     return size
 
@@ -216,7 +210,7 @@ def decode_colour(path: Path, content: bytes, camera: Pinhole) -> UInt8[np.ndarr
     bgr = _decoded(path, content, camera, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if bgr.shape[:2] != (camera.height, camera.width):
         bgr = exif_turn(content).applied(bgr)
-    _check_size(path, bgr.shape, camera)
+    check_size(path, bgr.shape, camera)
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
 
 
@@ -225,7 +219,7 @@ def read_mask(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w"]:
     import cv2
 
     mask = _decoded(path, read_bytes(path), camera, cv2.IMREAD_GRAYSCALE)
-    _check_size(path, mask.shape, camera)
+    check_size(path, mask.shape, camera)
     return mask
 
 
@@ -258,7 +252,7 @@ def _check_outside(path: Path, content: bytes, camera: Pinhole) -> None:
         check_whole(path, content)
     if (width, height) != (camera.width, camera.height) == (height, width):
         width, height = exif_turn(content).size(width, height)
-    _check_size(path, (height, width), camera)
+    check_size(path, (height, width), camera)
 
 
 def file_turn(path: Path) -> DisplayTurn:
@@ -288,7 +282,7 @@ def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.nd
     """
     if path.suffix == ".npy":
         stored = _read_npy(path)
-        _check_size(path, stored.shape, camera)
+        check_size(path, stored.shape, camera)
         return metres(stored if stored.dtype.kind == "f" else stored.astype(np.float32), 1.0)
     import cv2
 
@@ -296,7 +290,7 @@ def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.nd
     if str(raw.dtype) not in ("uint16", "float32") or raw.ndim != 2:
         kind = f"{raw.dtype.itemsize * 8}-bit with {raw.shape[2] if raw.ndim == 3 else 1} channel(s)"
         raise RecordingError(f"{path} is {kind}; depth must be a 16-bit PNG with one channel.")
-    _check_size(path, raw.shape, camera)
+    check_size(path, raw.shape, camera)
     return metres(raw, units_per_m)
 
 
@@ -324,7 +318,6 @@ def decode_rvl_depth(path: Path, content: bytes, head: int) -> UInt16[np.ndarray
 
 
 def _read_npy(path: Path) -> np.ndarray:
-    """Return the depth of an NPY file, (h, w), mapped into memory."""
     with readable(path, _RESTORE):
         checked_size(path, PICTURE_BYTES)
         try:
@@ -335,13 +328,13 @@ def _read_npy(path: Path) -> np.ndarray:
     shape = stored.shape[:2] if stored.ndim == 3 and stored.shape[2] == 1 else stored.shape
     if len(shape) != 2 or stored.dtype.kind not in "fiu":
         raise RecordingError(
-            f"{path} holds {stored.dtype} of {tuple(shape)}; depth must be numbers of (height, width): save it in that "
-            "shape."
+            f"{path} holds {stored.dtype} of {tuple(shape)}; depth must be numbers of (height, width)."
         )
     return stored.reshape(shape)
 
 
-def _check_size(path: Path, shape: tuple[int, ...], camera: Pinhole) -> None:
+def check_size(path: Path | str, shape: tuple[int, ...], camera: Pinhole) -> None:
+    """Refuse a picture (rows, columns, ...) of another size than the camera's."""
     if shape[:2] != (camera.height, camera.width):
         raise RecordingError(
             f"{path} is {shape[1]}x{shape[0]}, but the recording's camera is {camera.width}x{camera.height}; "
@@ -352,7 +345,7 @@ def _check_size(path: Path, shape: tuple[int, ...], camera: Pinhole) -> None:
 def check_picture(path: Path, camera: Pinhole) -> None:
     """Check a picture's wholeness and size without decoding it."""
     if path.suffix == ".npy":
-        _check_size(path, _read_npy(path).shape, camera)
+        check_size(path, _read_npy(path).shape, camera)
     else:
         content = read_bytes(path)
         check_whole(path, content)
@@ -362,8 +355,8 @@ def check_picture(path: Path, camera: Pinhole) -> None:
 def depth_in_colour(depth_m: Float32[np.ndarray, "hd wd"], rig: Rig) -> tuple[Pinhole, Float32[np.ndarray, "h w"]]:
     """Return the depth picture as the colour camera would see it, and that camera at the depth's resolution.
 
-    Where depth is registered to colour it is the depth picture itself. Otherwise every depth pixel is thrown into
-    the colour camera and the nearest wins. The picture is made no finer than the depth is, so that it has no holes.
+    Every depth pixel is thrown into the colour camera and the nearest wins; it has no more pixels than the depth, so
+    that there are no holes.
     """
     if rig.registered:
         return rig.rgb.resized(depth_m.shape[1], depth_m.shape[0]), depth_m
@@ -393,13 +386,9 @@ class VideoFrames:
     """The pictures of a video's first video stream. Opening reads the stamps (demuxing only), no picture.
 
     Attributes:
-        path: the file.
-        width: columns.
-        height: rows.
         stamps_s: (n,) seconds from the first frame, in the order they are shown.
-        start_s: when the first frame is shown on the file's clock, on which its sound begins at 0 or later, seconds.
+        start_s: when the first frame is shown on the file's clock, on which its sound begins at 0 or later.
         turn: how players turn the pictures; they come turned if ``shown`` is set, else as stored.
-        shown: whether they come as players show them.
     """
 
     def __init__(self, path: Path) -> None:
@@ -421,7 +410,6 @@ class VideoFrames:
         self._decoder: Any = None
 
     def show(self) -> None:
-        """Let the pictures come as players show them, not as they are stored."""
         if self.turn and not self.shown:
             self.shown = True
             self.width, self.height = self.turn.size(self.width, self.height)
@@ -443,9 +431,7 @@ class VideoFrames:
                         picture = frame.to_ndarray(format="rgb24")
                         return self._checked(self.turn.applied(picture) if self.shown else picture, index)
             except (FFmpegError, ValueError, MemoryError) as error:
-                raise RecordingError(
-                    f"Frame {index} of {self.path} cannot be decoded ({error}); is it damaged?"
-                ) from error
+                raise RecordingError(f"Frame {index} of {self.path} cannot be decoded ({error}).") from error
         raise RecordingError(f"{self.path} ends before frame {index} of {len(self)}; the file is cut short.")
 
     def _checked(self, picture: UInt8[np.ndarray, "h w 3"], index: int) -> UInt8[np.ndarray, "h w 3"]:

@@ -6,9 +6,8 @@ depth/            16-bit PNG of the same names; 0 and 65535 say that nothing was
 poses.csv         stamp_s,tx,ty,tz,qx,qy,qz,qw: poses of the depth camera, at their own rate
 frames.csv        name,stamp_s: when each picture was taken. It may be left out where poses.csv has one row for
                   each picture (in the order of the names), where rgb_rate_hz is given and names are numbers, or
-                  or where a video has stamps of its own; a video's frames are the depth pictures in the order of names
-audio.flac        or .wav, .ogg: the sound track, of one channel or of those that `microphones` places; without it that
-                  of the video
+                  where a video has stamps of its own; its frames are the depth pictures in the order of names
+audio.flac        or .wav, .ogg: the sound track, of one channel or of those that `microphones` places; else the video's
 directions.csv    stamp_s,azimuth_rad[,elevation_rad][,confidence]: what a device said of where sounds came from
 events.csv, semantic/, objects.json   truth, which mapping never reads
 """
@@ -53,12 +52,10 @@ class CameraNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     height: int
 
     def camera(self) -> Pinhole:
-        """Return it as the camera that the package works with."""
         return Pinhole(self.fx, self.fy, self.cx, self.cy, self.width, self.height)
 
     @staticmethod
     def of(camera: Pinhole) -> "CameraNumbers":
-        """Return the numbers of a camera."""
         fx, fy, cx, cy = (float(number) for number in (camera.fx, camera.fy, camera.cx, camera.cy))
         return CameraNumbers(fx, fy, cx, cy, int(camera.width), int(camera.height))
 
@@ -75,23 +72,15 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """The content of ``recording.json``.
 
     Attributes:
-        schema_version: of this format.
-        intrinsics: the cameras.
         depth_units_per_m: units of the depth pictures in a metre; 1000 says millimetres.
-        rgb_rate_hz: pictures a second.
-        pose_rate_hz: poses a second.
         world_from_camera: which way the camera's axes point; ``opencv`` says x right, y down, z forward.
         up_in_world: unit vector against gravity, or null where it is not known.
         audio_start_s: the recording's time at which the sound track begins.
         frames: how many pictures there are, as a check.
-        origin: what made the recording.
         poses: how poses.csv is to be read (``--poses``).
         camera_axes: where the axes of the poses' camera point (``--camera-axes``); OpenCV's if None.
         pose_delay_s: by how much the stamps of poses.csv are later than the pictures' (``--pose-delay``).
-        microphones: where those of the track's channels are; a recording without them does not have the key, so that
-            older readers open it.
         begins_s: what the clock said at time 0, seconds since 1970; stamps that are dates say it themselves.
-        base_height: where the robot's base is under the camera in the first frame.
     """
 
     schema_version: int
@@ -112,12 +101,10 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     base_height: BaseHeight | msgspec.UnsetType = msgspec.UNSET
 
     def corrections(self) -> Corrections:
-        """Return how the poses are to be read."""
         kinds = (self.poses,) if isinstance(self.poses, PoseKind) else self.poses
         return Corrections(poses=kinds, camera_axes=self.camera_axes, pose_delay_s=self.pose_delay_s)
 
     def rig(self) -> Rig:
-        """Return the cameras."""
         rgb = self.intrinsics.rgb.camera()
         depth = self.intrinsics.depth.camera() if self.intrinsics.depth else rgb
         if self.intrinsics.rgb_from_depth is None:

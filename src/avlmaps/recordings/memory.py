@@ -1,7 +1,4 @@
-"""A recording whose frames are in memory: a program's own loop, a test, the frames that a growing map still holds.
-
-A frame out of a program's arrays: what does not fit is refused in a sentence with what is wanted and what came.
-"""
+"""A recording whose frames are in memory, and a frame out of a program's arrays."""
 
 import hashlib
 from collections.abc import Sequence
@@ -24,14 +21,9 @@ from avlmaps.recordings.types import Frame, Recording
 
 
 class MemoryRecording(Recording):
-    """Frames in memory, in the order of time, all of one rig."""
+    """Frames in memory, in the order of time, all of one rig; RecordingError where they are not."""
 
     def __init__(self, frames: Sequence[Frame], up_in_world: Float[np.ndarray, "3"] | None = None) -> None:
-        """Take frames.
-
-        Raises:
-            RecordingError: there is none, their stamps do not rise, or they have several rigs.
-        """
         if not frames:
             raise RecordingError("A recording in memory needs at least one frame.")
         self.path, self.format = Path("memory"), "memory"
@@ -47,12 +39,10 @@ class MemoryRecording(Recording):
         self._frames = tuple(frames)
 
     def frame(self, index: int) -> Frame:
-        """Return one frame."""
         return self._frames[index]
 
     @cached_property
     def fingerprint(self) -> str:
-        """A hash of all frames."""
         digest = hashlib.sha256()
         for frame in self._frames:
             digest.update(frame_digest(frame))
@@ -81,19 +71,15 @@ def same_rig(one: Rig, other: Rig) -> bool:
 def next_of(frame: Frame, last_stamp_s: float | None, rig: Rig) -> Frame:
     """Return a frame that follows others, with their rig.
 
-    Raises:
-        RecordingError: it repeats the last frame, comes out of order, or is of another camera.
+    RecordingError: it repeats the last frame, comes out of order, or is of another camera.
     """
     if last_stamp_s is not None and not frame.stamp_s > last_stamp_s:
         what = "repeats the last frame" if frame.stamp_s == last_stamp_s else "is out of order"
-        raise RecordingError(
-            f"A frame at {frame.stamp_s:g} s {what} ({last_stamp_s:g} s); add frames in the order of time."
-        )
+        raise RecordingError(f"A frame at {frame.stamp_s:g} s {what} ({last_stamp_s:g} s); add frames in order.")
     if not same_rig(frame.rig, rig):
         raise RecordingError(
-            f"A frame at {frame.stamp_s:g} s has another camera than the frames before ({frame.rig.rgb} and depths of "
-            f"{frame.rig.depth.width}x{frame.rig.depth.height}, before {rig.rgb} and {rig.depth.width}x"
-            f"{rig.depth.height}); a map has one."
+            f"A frame at {frame.stamp_s:g} s has another camera than the frames before ({frame.rig.rgb} and depths by "
+            f"{frame.rig.depth}, before {rig.rgb} and {rig.depth}); a map has one."
         )
     return replace(frame, rig=rig)
 
@@ -107,19 +93,11 @@ _EXACT = 1e-12
 
 
 def given_frame(index: int, rgb: Any, depth_m: Any, camera: Any, world_from_camera: Any, stamp_s: Any) -> Frame:
-    """Return a frame of a program's arrays, which are copied.
+    """Return a frame of a program's arrays, which are copied; RecordingError where one of them does not fit.
 
-    Args:
-        index: its number, for errors.
-        rgb: colour picture, (h, w, 3) uint8.
-        depth_m: z-depth in metres, (hd, wd); 0, NaN or infinity where there is none. It covers the same view as the
-            picture, at any resolution, unless the camera is a rig.
-        camera: a ``Pinhole`` of the colour picture, or a ``Rig`` of both cameras.
-        world_from_camera: 4x4 pose of the depth camera; its rotation is made orthonormal within rounding.
-        stamp_s: seconds.
-
-    Raises:
-        RecordingError: one of them does not fit.
+    Depth is z-depth in metres (0, NaN or infinity where there is none) of the same view as the picture, at any
+    resolution, unless the camera is a rig. ``world_from_camera`` is 4x4, of the depth camera; its rotation is made
+    orthonormal within rounding. ``index`` is for errors.
     """
     name = f"frame {index}"
     colours, depths = _colours(name, rgb), _depths(name, depth_m)
@@ -180,10 +158,8 @@ def _depths(name: str, given: Any) -> Float[np.ndarray, "hd wd"]:
     least, middle, most = (float(seen.min()), float(np.median(seen)), float(seen.max())) if len(seen) else (1.0,) * 3
     if least < 0.0 or middle > FARTHEST_MIDDLE_M or most < _NEAREST_FARTHEST_M:
         unit = ", which looks like millimetres or centimetres" if middle > FARTHEST_MIDDLE_M else ""
-        raise RecordingError(
-            f"depth_m of {name} must be in metres; its median is {middle:,.4g}, its least {least:.4g} and its largest "
-            f"{most:,.4g}{unit}."
-        )
+        middles = f"its median is {middle:,.4g}, and all {least:.4g} to {most:,.4g}{unit}"
+        raise RecordingError(f"depth_m of {name} must be in metres; {middles}.")
     return depth
 
 
@@ -191,8 +167,7 @@ def _rig(name: str, camera: Any, rgb: np.ndarray, depth: np.ndarray) -> Rig:
     (height, width), (depth_height, depth_width) = rgb.shape[:2], depth.shape
     if not isinstance(camera, Pinhole | Rig):
         raise RecordingError(
-            f"camera of {name} must be an avlmaps.Pinhole(fx, fy, cx, cy, width, height) or an avlmaps.Rig, not "
-            f"{type(camera).__name__}."
+            f"camera of {name} must be an avlmaps.Pinhole or an avlmaps.Rig, not {type(camera).__name__}."
         )
     alike = abs(depth_width * height - depth_height * width) <= max(width, height, depth_width, depth_height)
     if isinstance(camera, Pinhole) and (camera.width, camera.height) == (width, height) and alike:

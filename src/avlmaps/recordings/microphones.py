@@ -39,14 +39,9 @@ LEVEL_CAMERA_FROM_ROBOT = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], 
 
 
 class MicrophoneNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
-    """Microphones as JSON has them.
+    """Microphones as JSON has them: those of ``Microphones``, and one sound file for each channel if they have some.
 
-    Attributes:
-        positions_m: one for each channel, in the robot's frame: x forward, y left, z up.
-        camera_from_robot: 4x4; by default the robot's frame has its origin at the camera, and the camera looks level.
-        files: one sound file for each channel, where they are not channels of one file.
-        delays_s: by how much each channel is late, seconds; none is if None.
-        channels: which channels of the track they are, counted from 1, where others hold no microphone.
+    ``channels`` count from 1. By default the robot's frame has its origin at the camera, which looks level.
     """
 
     positions_m: list[list[float]]
@@ -56,11 +51,6 @@ class MicrophoneNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True,
     channels: list[int] | None = None
 
     def microphones(self) -> "Microphones":
-        """Return them as the package works with them.
-
-        Raises:
-            RecordingError: the positions or the transform cannot be.
-        """
         for name in self.files or ():
             if not name or Path(name).name != name or "\0" in name:
                 raise RecordingError(f"microphones.files names {name!r}; name files that lie beside recording.json.")
@@ -77,7 +67,6 @@ class MicrophoneNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True,
 
     @staticmethod
     def of(microphones: "Microphones") -> "MicrophoneNumbers":
-        """Return the numbers of microphones."""
         level = np.array_equal(microphones.camera_from_robot, LEVEL_CAMERA_FROM_ROBOT)
         return MicrophoneNumbers(
             microphones.position_m.tolist(),
@@ -128,10 +117,7 @@ class Microphones:
             )
         if known and not (len(known) == len(self.channels) == len(place) and min(known) >= 0):
             numbers = ", ".join(str(channel + 1) for channel in self.channels)
-            raise RecordingError(
-                f"microphones.channels are {numbers}; name {len(place)} different ones, counted from 1, one for each "
-                "position."
-            )
+            raise RecordingError(f"microphones.channels are {numbers}; name {len(place)} different ones, from 1.")
         poses.orthonormalize(self.camera_from_robot, "the robot's frame in the camera, microphones.camera_from_robot,")
         for one, other in itertools.combinations(range(len(place)), 2):
             apart_m = float(np.linalg.norm(place[one] - place[other]))
@@ -146,11 +132,9 @@ class Microphones:
 
     @property
     def in_camera_m(self) -> Float[np.ndarray, "m 3"]:
-        """The places in the depth camera's frame, metres."""
         return poses.apply(self.camera_from_robot, self.position_m)
 
     def in_world_m(self, world_from_camera: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "n m 3"]:
-        """Return the places in the world at each of several poses of the camera, metres."""
         turned = np.einsum("nij,mj->nmi", world_from_camera[:, :3, :3], self.in_camera_m)
         return turned + world_from_camera[:, None, :3, 3]
 
@@ -184,11 +168,7 @@ PRESETS: dict[str, list[list[float]]] = {
 
 
 def microphones_named(words: str) -> Microphones:
-    """Return the array of a name, or of a JSON file with ``positions_m``, perhaps more of ``MicrophoneNumbers``.
-
-    Raises:
-        RecordingError: there is no such name and no such file, or what it holds cannot be.
-    """
+    """Return the array of a name, or of a JSON file with ``positions_m``; RecordingError where there is neither."""
     if words in PRESETS:
         return Microphones(np.array(PRESETS[words], np.float64))
     path = user_path(words)
@@ -201,31 +181,23 @@ def microphones_named(words: str) -> Microphones:
         ) from None
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise RecordingError(
-            f'{path} describes no microphones ({error}); write {{"positions_m": [[x, y, z], ...]}} in metres.'
+            f'{path} is no microphones ({error}); write {{"positions_m": [[x, y, z], ...]}}.'
         ) from None
 
 
 def given_microphones(given: Any) -> Microphones:
-    """Return the array that a program gave: itself, its name or a JSON file.
-
-    Raises:
-        RecordingError: it is none of them, or ``microphones_named`` refuses it.
-    """
+    """Return the array that a program gave: itself, its name or a JSON file; else RecordingError."""
     if isinstance(given, Microphones):
         return given
     if not isinstance(given, str | Path):
         raise RecordingError(
-            f"microphones are an avlmaps.Microphones, a name ({', '.join(PRESETS)}) or a JSON file; not {given!r}."
+            f"microphones are Microphones, a name ({', '.join(PRESETS)}) or a JSON file; not {given!r}."
         )
     return microphones_named(str(given))
 
 
 def write_microphones(path: Path, microphones: Microphones) -> None:
-    """Write an array as a JSON file that ``microphones_named`` reads; all or nothing.
-
-    Raises:
-        RecordingError: it cannot be written there.
-    """
+    """Write an array as a JSON file that ``microphones_named`` reads; all or nothing."""
     content = msgspec.json.format(msgspec.json.encode(MicrophoneNumbers.of(microphones)), indent=2) + b"\n"
     try:
         write_bytes_atomically(path, content)
@@ -276,7 +248,6 @@ class DirectionTrack:
         return len(self.stamp_s)
 
     def _fault(self) -> str:
-        """Return what is wrong, beginning in small letters, with the row from 1; or nothing."""
         stamp, azimuth, elevation, sure = self.stamp_s, self.azimuth_rad, self.elevation_rad, self.confidence
         degrees = "more than any angle in radians, so they look like degrees; multiply them by pi/180"
         checks = (
@@ -297,24 +268,15 @@ class DirectionTrack:
 
     @classmethod
     def joined(cls, parts: "Sequence[DirectionTrack]") -> "DirectionTrack":
-        """Return parts that follow one another as one track, with what the first knows of the device.
-
-        Raises:
-            RecordingError: their stamps do not rise.
-        """
+        """Return parts that follow one another as one track, with what the first knows of the device."""
         return concat(parts, known_rad=parts[0].known_rad)
 
     def between(self, onset_s: float, offset_s: float) -> "DirectionTrack":
-        """Return the part of a stretch of time."""
         rows = slice(*np.searchsorted(self.stamp_s, [onset_s, offset_s]).tolist())
         return take(replace(self, known_rad=None), rows)
 
     def require_beside(self, start_s: float, end_s: float, where: str) -> None:
-        """Refuse directions of another clock than the sound's.
-
-        Raises:
-            RecordingError: more than half of the stamps lie outside of the sound.
-        """
+        """Refuse directions of another clock than the sound's: more than half of the stamps lie outside of it."""
         inside = (self.stamp_s >= start_s - _OUTSIDE_S) & (self.stamp_s <= end_s + _OUTSIDE_S)
         if len(self) and inside.mean() < 0.5:
             raise RecordingError(
@@ -325,11 +287,7 @@ class DirectionTrack:
 
 
 def given_directions(stamp_s: Any, azimuth_rad: Any, elevation_rad: Any, confidence: Any) -> DirectionTrack:
-    """Return the directions that a program gave, of one moment or of some; None where something is not known.
-
-    Raises:
-        RecordingError: they are no numbers, of different length, or no directions.
-    """
+    """Return the directions that a program gave, of one moment or of some; RecordingError where they do not fit."""
     column: dict[str, np.ndarray] = {}
     for name, given in zip(COLUMNS, (stamp_s, azimuth_rad, elevation_rad, confidence), strict=True):
         if given is None and name in COLUMNS[2:]:
@@ -349,11 +307,7 @@ def given_directions(stamp_s: Any, azimuth_rad: Any, elevation_rad: Any, confide
 
 
 def read_directions(path: Path) -> DirectionTrack:
-    """Read ``directions.csv``: a line of column names, then numbers.
-
-    Raises:
-        RecordingError: it cannot be read, or a line is not as it should be; the sentence names the file and the row.
-    """
+    """Read ``directions.csv``: a line of column names, then numbers; RecordingError names the file and the row."""
     try:
         with readable(path):
             lines = read_regular(path, TABLE_BYTES).decode("utf-8-sig").splitlines()

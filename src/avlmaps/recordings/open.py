@@ -1,8 +1,7 @@
-"""Opening a recording of any known format in place, found by what the folder or file holds.
+"""Opening a recording of any known format in place, found by what it holds, and naming every fault of one.
 
-Other packages add theirs through the entry point group ``avlmaps.formats``; an entry's name is the format's name and
-its value ``package.module:FORMAT``, a ``Format``. A built-in format goes before another package's where both
-recognise a folder; ``--format NAME`` chooses.
+Other packages add theirs through the entry point group ``avlmaps.formats``; an entry's value is
+``package.module:FORMAT``, a ``Format``. A built-in format goes first where both recognise a folder.
 """
 
 import importlib
@@ -11,19 +10,24 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from functools import cache
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
-from avlmaps.core.errors import RecordingError
+import numpy as np
+
+from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.core.files import lasting_path, user_path
+from avlmaps.core.progress import progress
 from avlmaps.core.registry import entry_points
 from avlmaps.core.wording import option
 from avlmaps.core.words import did_you_mean, near_path
-from avlmaps.recordings import layout
+from avlmaps.recordings import images, layout
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.channels import with_microphones
-from avlmaps.recordings.corrections import Corrections, corrected
+from avlmaps.recordings.channels import level_faults, with_microphones
+from avlmaps.recordings.corrections import Corrections, corrected, uncorrected
+from avlmaps.recordings.faults import Fault, listed, report
+from avlmaps.recordings.formats.file_recording import FileRecording
 from avlmaps.recordings.microphones import microphones_named
 from avlmaps.recordings.types import Recording
 
@@ -42,8 +46,7 @@ class Format:
 
     Attributes:
         name: its name on the command line.
-        looks_for: what makes a folder or file this format, in words.
-        matches: the same as a quick test.
+        looks_for: what makes a folder or file this format, in words; ``matches`` is a quick test of it.
         opener: ``package.module:function`` (ours begin with a dot), or a key of the module's ``OPENERS``; called with
             the path; it says faults by ``faults.report``, so that all of them can be listed.
         has_topics: whether the opener takes topics by name, and several files of one recording.
@@ -56,7 +59,6 @@ class Format:
     has_topics: bool = False
 
     def open(self, path: Path, topics: Mapping[str, str] | None = None, more: Sequence[Path] = ()) -> Recording:
-        """Open a recording with this format's opener."""
         module, _, function = self.opener.partition(":")
         found = importlib.import_module(module, _HERE)
         opener = getattr(found, function, None) or found.OPENERS[function]
@@ -76,7 +78,7 @@ class Format:
 
 
 def settle_sound(recording: Recording) -> None:
-    """Hold a recording's sound track against its frames, and add what is worth knowing of it to the notices."""
+    """Hold a recording's sound track against its frames, and note what is worth knowing of it."""
     track = recording.audio
     if track is None:
         return
@@ -113,7 +115,6 @@ def _is_folder(path: Path) -> bool:
 
 
 def _by(target: str) -> Callable[[Path], Any]:
-    """Return a test that is a function of a reader's module, which is loaded when it is first asked."""
     module, _, function = target.partition(":")
     return lambda path: getattr(importlib.import_module(f".{module}", _HERE), function)(path)
 
@@ -136,7 +137,7 @@ FORMATS: tuple[Format, ...] = (
     Format("tum", "rgb.txt, depth.txt and groundtruth.txt", holds("rgb.txt", "depth.txt"), ".listed:open_tum"),
     Format("replica", "traj.txt and results/", holds("traj.txt", "results"), ".layouts:replica"),
     Format("scannet", "color/, depth/, pose/ and intrinsic/", holds("color", "depth", "pose"), ".layouts:scannet"),
-    Format("avlmaps", "poses.txt, rgb/ (and depth/)", holds("poses.txt", "rgb"), ".avlmaps_layout:open_avlmaps"),
+    Format("avlmaps", "poses.txt, rgb/ (and depth/)", holds("poses.txt", "rgb"), ".layouts:open_avlmaps"),
     Format("rosbag", "a .bag, .mcap or .db3 file, or a folder of them", _is_rosbag, ".rosbag:open_rosbag", True),
     Format("record3d", "a .r3d file, or its export", _by("scans:is_record3d"), ".scans:open_record3d"),
     Format(
@@ -187,8 +188,7 @@ def _brought(name: str, target: str) -> Format:
             raise TypeError("it is no Format of that name")
     except Exception as fault:  # an import runs another's code
         raise RecordingError(
-            f"The recording format {name!r} cannot be loaded from {target} ({fault}); fix or remove the package that "
-            "brings it."
+            f"The format {name!r} cannot be loaded from {target} ({fault}); fix or remove its package."
         ) from fault
     return brought
 
@@ -268,18 +268,10 @@ def open_recording(
 ) -> Recording:
     """Open a recording in place: nothing is copied, and no picture is read before it is needed.
 
-    Args:
-        path: a folder or a file; of a bag that was split, all of its files.
-        format: one of the names in ``FORMATS``, or ``auto`` to find out.
-        audio: another sound track, beginning with the recording; it takes the place of the recording's own.
-        topics: of a ROS bag, by what they are for (``rgb``, ``depth``, ``pose``, ``audio``); the others are found.
-        corrections: what someone knows better than the files; a notice repeats it.
-        microphones: where those of the track's channels are, instead of the recording's own: a JSON file, or a name
-            (``microphones.PRESETS``); a notice repeats it.
-
-    Raises:
-        RecordingError: there is nothing there, it is of no known format, or it cannot be used.
-        AudioError: the sound track cannot be used.
+    Of a bag that was split ``path`` is all of its files. ``audio`` is another sound track that begins with the
+    recording, ``topics`` are of a ROS bag, by what they are for (``rgb``, ``depth``, ``pose``, ``audio``; the others
+    are found), and ``microphones`` a JSON file or a name (``microphones.PRESETS``). RecordingError says that there is
+    nothing, of no known format, or of no use; AudioError is of the sound.
     """
     given = [path] if isinstance(path, str | Path) else path
     paths = list(given) if isinstance(given, Iterable) else []  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -307,18 +299,13 @@ def open_recording(
 
 
 def find_format(path: Path, name: str = "auto") -> Format:
-    """Return the format of that name, or the one that a folder or file is of.
-
-    Raises:
-        RecordingError: there is nothing there, no such format, or the content is of none of them.
-    """
+    """Return the format of that name, or the one that a folder or file is of; RecordingError where there is none."""
     known = {f.name: f for f in FORMATS}
     if name != "auto" and name not in known:  # other packages need not be searched for what is built in
         known = {f.name: f for f in formats()}
     if name != "auto" and name not in known:
         raise RecordingError(
-            f"There is no recording format called {name!r}; known are: auto, "
-            f"{', '.join(known)}{did_you_mean(name, known)}"
+            f"There is no format called {name!r}; known: auto, {', '.join(known)}{did_you_mean(name, known)}"
         )
     try:
         if not path.exists():
@@ -350,9 +337,7 @@ def _unknown(path: Path) -> str:
     if path.is_file():
         return f"{path} is a file of no known format; known are: {looked_for}."
     if (path / _MAP).is_file():
-        return (
-            f"{path} is a map, not a recording; ask it with `avlmaps query`, or give the recording it was built from."
-        )
+        return f"{path} is a map, not a recording; ask it with `avlmaps query`, or give its recording."
     with os.scandir(path) as entries:
         folders = sorted(Path(e.path) for e in islice(entries, LOOKED_AT) if e.is_dir())
     below = [folder.name for folder in folders[:50] if _recognised(folder)]
@@ -360,3 +345,87 @@ def _unknown(path: Path) -> str:
         some = ", ".join(below[:5]) + (" ..." if len(below) > 5 else "")
         return f"{path} holds recordings but is none itself; open one of them: {some}."
     return f"{path} is of no known format; looked for: {looked_for}."
+
+
+# The last frame may be taken a little after the sound track's end: encoders cut to whole blocks.
+_MAX_AUDIO_LACK_S = 0.5
+
+
+def validate(
+    path: Path | str, format: str = "auto", max_decoded: int | None = None, more: Sequence[Path] = (), **given: Any
+) -> list[Fault]:
+    """Return every fault of a recording; an empty list says that there is none.
+
+    Texts, poses, stamps and the sound track are checked wholly, and so are the outsides of all pictures.
+    ``max_decoded`` pictures, spread evenly (all if None), are decoded as well, to find depth that is zero everywhere.
+    ``more`` are further files of a bag, ``given`` further arguments of ``open_recording``.
+    """
+    with listed() as faults:
+        try:
+            recording = uncorrected(open_recording([user_path(path), *more], format, **given))
+            _check_audio(recording)
+            _check_pictures(recording, max_decoded)
+        except AvlmapsError as error:
+            report(str(error))
+    first = {fault.sentence: fault for fault in reversed(faults)}
+    return list(reversed(first.values()))
+
+
+def _check_audio(recording: Recording) -> None:
+    if recording.audio is None or len(recording) == 0:
+        return
+    lack_s = float(recording.stamps_s[-1]) - recording.audio.end_s
+    if lack_s > _MAX_AUDIO_LACK_S:
+        sentence = (
+            f"{recording.audio.name} ends at {recording.audio.end_s:.2f} s, but the frames continue to "
+            f"{recording.stamps_s[-1]:.2f} s; the sound of the last {lack_s:.2f} s is missing."
+        )
+        report(sentence, recording.audio.path, fatal=False)
+    try:
+        for _ in recording.audio.blocks(60.0):
+            pass
+        if recording.audio.microphones is not None:
+            for sentence in chain.from_iterable(level_faults(recording.audio)):
+                report(sentence, recording.audio.path, fatal=False)
+    except AvlmapsError as error:
+        report(str(error), recording.audio.path, fatal=False)
+
+
+def _check_pictures(recording: Recording, max_decoded: int | None) -> None:
+    count = len(recording)
+    some = count if max_decoded is None else min(max_decoded, count)
+    decoded = set(np.linspace(0, count - 1, some).round().astype(int).tolist())
+    for index in progress(range(count), "checking", total=count):
+        if index in decoded or not isinstance(recording, FileRecording):
+            _check_frame(recording, index)
+        else:
+            _check_files(recording, index)
+
+
+def _check_files(recording: FileRecording, index: int) -> bool:
+    fine, pictures = True, [(recording.colour_file(index), recording.rig.rgb)]
+    if len(recording.shots.depth):
+        pictures.append((recording.path / recording.shots.depth[index], recording.rig.depth))
+    for file, camera in pictures:
+        if file is None:
+            continue
+        try:
+            images.check_picture(file, camera)
+        except RecordingError as error:
+            fine = False
+            report(str(error), file, fatal=False)
+    return not fine
+
+
+def _check_frame(recording: Recording, index: int) -> None:
+    try:
+        depth_m = recording.frame(index).depth_m
+    except RecordingError as error:
+        if isinstance(recording, FileRecording) and _check_files(recording, index):
+            return
+        report(str(error), recording.colour_file(index), fatal=False)
+        return
+    if not (depth_m > 0.0).any() and not (isinstance(recording, FileRecording) and not len(recording.shots.depth)):
+        file = recording.depth_file(index)
+        where = file or f"{recording.path}, frame {recording.name(index)}"
+        report(f"{where}: the depth is zero everywhere, so this frame adds nothing to a map.", file, fatal=False)

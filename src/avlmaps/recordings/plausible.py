@@ -71,10 +71,7 @@ def repeat_fault(stamps_s: Float[np.ndarray, " n"], what: str) -> str:
 def pace_fault(stamps_s: Float[np.ndarray, " n"], what: str, expected_s: float | None = None) -> str:
     """Return a sentence where stamps are dates in another unit, or follow at an even pace too slow for a walk.
 
-    Args:
-        stamps_s: rising.
-        what: what they are of, in the plural (``frames``).
-        expected_s: the interval that the recording itself promises, where it does.
+    Stamps rise; ``what`` says of what, in the plural, and ``expected_s`` the interval that the recording promises.
     """
     if (fault := date_fault(stamps_s, what)) or len(stamps_s) < 3:
         return fault
@@ -97,13 +94,7 @@ def pace_fault(stamps_s: Float[np.ndarray, " n"], what: str, expected_s: float |
 
 @dataclass(frozen=True, slots=True)
 class Plausible:
-    """The findings about the poses of a walk.
-
-    Attributes:
-        index: frames that are used, rising.
-        notices: a sentence for each thing that was left out or is odd.
-        fault: why the recording cannot be used, or nothing.
-    """
+    """The frames of a walk that are used, rising; what is odd; why the recording cannot be used, or nothing."""
 
     index: Int[np.ndarray, " k"]
     notices: tuple[str, ...] = ()
@@ -138,8 +129,7 @@ def plausible_walk(
         first: list[int] = strays[:_SHOWN].tolist()
         shown = ", ".join(names[i] for i in first) + (" ..." if len(strays) > _SHOWN else "")
         notices.append(
-            f"{len(strays)} frame(s) are up to {away_m.max():,.0f} m from the others, too far to be reached in time; "
-            f"{strays_are}: {shown}."
+            f"{len(strays)} frame(s) are {away_m.max():,.0f} m away, too far to be reached; {strays_are}: {shown}."
         )
     rows: list[int] = kept.tolist()
     return Plausible(kept, (*notices, *shifts), fault or _extent_fault(positions_m[kept], [names[i] for i in rows]))
@@ -168,7 +158,6 @@ def _reachable(
     edges: Int[np.ndarray, " e"],
     names: Sequence[str],
 ) -> tuple[Int[np.ndarray, " k"], list[str], str]:
-    """Return the frames that belong together, notices of shifts between them, and a fault or nothing."""
     stretches = [np.arange(int(a), int(b)) for a, b in pairwise(edges)]
     longest = int(np.argmax(np.diff(edges)))
     kept, shifts, fault = [stretches[longest]], list[str](), ""

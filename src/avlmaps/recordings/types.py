@@ -30,20 +30,13 @@ _LEAST_BUDGET_BYTES, LARGEST_BUDGET_BYTES = 4096, 1 << 24
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """The up direction, and where the floor is under a camera.
-
-    Attributes:
-        up_in_world: unit vector.
-        camera_m: (k,) rising heights of cameras along up.
-        floor_m: (k,) height along up of the floor under each of them.
-    """
+    """The up direction (unit vector), and the floor's height along it under cameras of rising heights."""
 
     up_in_world: Float[np.ndarray, "3"]
     camera_m: Float[np.ndarray, " k"]
     floor_m: Float[np.ndarray, " k"]
 
     def camera_height_m(self, world_from_camera: Float[np.ndarray, "4 4"]) -> float:
-        """Return how high over the floor a camera is."""
         height = float(world_from_camera[:3, 3] @ self.up_in_world)
         nearest = int(np.argmin(np.abs(self.camera_m - height)))
         return height - float(self.floor_m[nearest])
@@ -51,12 +44,7 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class BaseHeight:
-    """Where a robot's base is under its camera.
-
-    Attributes:
-        below_camera_m: from the base up to the depth camera, metres.
-        on_floor: whether the base lies on the floor (ROS ``base_footprint``) or somewhere above it (``base_link``).
-    """
+    """How far a robot's base is below its depth camera, metres; on the floor it is ROS's ``base_footprint``."""
 
     below_camera_m: float
     on_floor: bool
@@ -68,13 +56,11 @@ class Frame:
 
     Attributes:
         index: position in the recording, from 0.
-        name: what the recording calls it (``000012``); error sentences use it.
+        name: what the recording calls it (``000012``).
         stamp_s: seconds from the recording's start.
-        rgb: colour picture.
         depth_m: z-depth in metres; 0 where there is none (never NaN).
         world_from_camera: 4x4 pose of the depth camera.
-        rig: the two cameras.
-        ground: the up direction and where the floor is, once that is known (a build finds it out first).
+        ground: the up direction and where the floor is, once a build knows it.
     """
 
     index: int
@@ -97,7 +83,6 @@ class Frame:
             )
 
     def copy(self) -> "Frame":
-        """Return the frame with arrays of its own: an encoder may write into what it is given."""
         own = self.rgb.copy(), self.depth_m.copy(), self.world_from_camera.copy()
         return replace(self, rgb=own[0], depth_m=own[1], world_from_camera=own[2])
 
@@ -112,29 +97,26 @@ class Frame:
 
     @property
     def valid(self) -> Bool[np.ndarray, "hd wd"]:
-        """Where there is a depth."""
         return self.depth_m > 0.0
 
 
 class Recording(ABC):
     """Frames in the order of time, with poses, and perhaps an audio track. Readers subclass it.
 
-    Opening one reads the poses and the list of names, never a picture; ``frame(i)`` reads one frame. Frames
-    without a usable pose are not among them; ``notices`` reports them.
+    Opening one reads the poses and the list of names, never a picture. Frames without a usable pose are not among them.
 
     Attributes:
         path: the folder or file.
         format: the format's name on the command line, such as ``7scenes``.
         rig: the cameras (of every frame).
         stamps_s: (n,) float64, strictly rising, seconds from the start of the recording.
-        world_from_camera: (n, 4, 4) float64, orthonormal. The world's z axis need not be up: see ``up_in_world``.
+        world_from_camera: (n, 4, 4) float64, orthonormal. The world's z axis need not be up.
         up_in_world: unit vector, or None where the recording does not know the up direction.
         audio: the sound track on the frames' clock, or None.
         notices: one sentence for each thing worth knowing (gaps, clock jumps, frames left out).
-        topics: of a bag, which topic was chosen for what (rgb, depth, pose, audio); empty for others.
-        base_height: where the robot's base is under the camera in the first frame, None where that is not known.
-        trajectory: the poses at their own rate on the frames' clock, where the reader interpolated them; None where
-            each frame has its own.
+        topics: of a bag, which topic was chosen for what (rgb, depth, pose, audio).
+        base_height: where the robot's base is under the camera in the first frame.
+        trajectory: the poses at their own rate on the frames' clock, where the frames' were interpolated from them.
         begins_s: what the clock of its files said at time 0, seconds: since 1970 where their stamps are dates.
         posed: share of the frames that are used: with a pose, on one clock; the others are left out.
         stored_depth_unit_m: metres of one unit of the depth as it is stored; 1 where that is floats in metres.
@@ -167,11 +149,7 @@ class Recording(ABC):
 
     @abstractmethod
     def frame(self, index: int) -> Frame:
-        """Read one frame.
-
-        Raises:
-            RecordingError: its pictures are missing, truncated or of another size; the sentence names the file.
-        """
+        """Read one frame; RecordingError names the file that is missing, truncated or of another size."""
 
     def file_groups(self) -> list[tuple[Path, Sequence[str]]]:
         """Return the files that it is read from, but for its sound: folders, and the names in or below each."""
@@ -181,11 +159,7 @@ class Recording(ABC):
 
     @cached_property
     def fingerprint(self) -> str:
-        """A hex SHA-256 that changes when the recording does.
-
-        It covers poses, stamps, cameras and every file's name and content. Where a copy lies and when its files were
-        written makes no difference.
-        """
+        """A hex SHA-256 of poses, stamps, cameras and every file's name and content; a copy has the same."""
         digest, up = hashlib.sha256(), np.zeros(3) if self.up_in_world is None else self.up_in_world
         digest.update(f"{self.format} {_numbers(self.rig)} {self.depth_units_per_m}".encode())
         for numbers in (up, self.stamps_s, self.world_from_camera):
@@ -198,10 +172,7 @@ class Recording(ABC):
         return digest.hexdigest()
 
     def change_stamp(self) -> str:
-        """Return a word that changes when a file of the recording is written; in a copy it is another.
-
-        A build takes it at its beginning and its end, so that a recording that changes meanwhile makes no map.
-        """
+        """Return a word that changes when a file of the recording is written, so that no map is made of two states."""
         digest = hashlib.sha256()
         for folder, names in self._every_file():
             for name in names:
@@ -218,7 +189,6 @@ class Recording(ABC):
         return [*self.file_groups(), *((file.parent, [file.name]) for file in sound)]
 
     def name(self, index: int) -> str:
-        """Return the recording's name of a frame, without reading it."""
         return f"{index:06d}"
 
     def colour_file(self, index: int) -> Path | None:
@@ -242,13 +212,11 @@ class Recording(ABC):
         return f"{name}: {len(self)} frames of {size}, {self.duration_s:.1f} s, format {self.format}{sound})"
 
     def frames(self, start: int = 0, stop: int | None = None, step: int = 1) -> Iterator[Frame]:
-        """Read frames one at a time."""
         for index in range(start, len(self) if stop is None else min(stop, len(self)), step):
             yield self.frame(index)
 
     @property
     def duration_s(self) -> float:
-        """From the first frame to the last; 0 for fewer than two."""
         return float(self.stamps_s[-1] - self.stamps_s[0]) if len(self) > 1 else 0.0
 
 
@@ -280,11 +248,6 @@ class Subset(Recording):
     """Chosen frames of another recording, in place; stamps, poses, names and the sound track stay what they are."""
 
     def __init__(self, whole: Recording, indices: Sequence[int] | range | Int[np.ndarray, " n"]) -> None:
-        """Choose frames by strictly rising numbers.
-
-        Raises:
-            ValueError: they do not rise, or are not all in the recording.
-        """
         chosen = np.asarray(indices, np.int64).reshape(-1)
         if len(chosen) and (chosen[0] < 0 or chosen[-1] >= len(whole) or (np.diff(chosen) <= 0).any()):
             raise ValueError(f"indices must rise strictly within 0 ... {len(whole) - 1}")
@@ -296,26 +259,20 @@ class Subset(Recording):
         self.world_from_camera = whole.world_from_camera[chosen]
 
     def frame(self, index: int) -> Frame:
-        """Read one frame; its ``index`` is the one in the subset."""
         return replace(self.whole.frame(int(self.indices[index])), index=index)
 
     def name(self, index: int) -> str:
-        """Return the whole recording's name of the frame."""
         return self.whole.name(int(self.indices[index]))
 
     def colour_file(self, index: int) -> Path | None:
-        """Return the frame's colour file in the whole recording."""
         return self.whole.colour_file(int(self.indices[index]))
 
     def depth_file(self, index: int) -> Path | None:
-        """Return the frame's depth file in the whole recording."""
         return self.whole.depth_file(int(self.indices[index]))
 
     def change_stamp(self) -> str:
-        """Of the whole recording."""
         return self.whole.change_stamp()
 
     @cached_property
     def fingerprint(self) -> str:
-        """Of the whole recording's and the choice."""
         return hashlib.sha256(self.whole.fingerprint.encode() + self.indices.astype("<i8").tobytes()).hexdigest()

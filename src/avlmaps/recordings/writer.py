@@ -35,23 +35,13 @@ _FLAC_CHANNELS = 8
 class RecordingWriter:
     """Writes a recording; use it in a ``with`` block. What an error or a kill leaves behind is refused by readers.
 
-    Example:
-        with RecordingWriter(Path("walk"), rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
-            for frame in frames:
-                writer.add(frame)
-            writer.set_audio(sound)
-
     Attributes:
         path: the folder to make; it must not exist, be empty, or hold an unfinished recording.
-        rig: the cameras of every frame.
-        up_in_world: unit vector against gravity, or None where it is not known.
-        colour: the files that colour is written to: ``png`` preserves every bit, ``jpg`` takes a tenth of the space.
+        colour: ``png`` preserves every bit, ``jpg`` takes a tenth of the space.
         depth_units_per_m: units of the depth files in a metre; 1000 says millimetres.
         origin: what makes the recording, for its description.
         begins_s: what the clock said at time 0, seconds since 1970; 0 where nobody knows.
-        trajectory: the poses at their own rate, on the frames' clock, in place of the frames' own, which a reader
-            interpolates from them; None where each frame has its own.
-        base_height: where the robot's base is under the camera, None where that is not known.
+        trajectory: the poses at their own rate, from which a reader interpolates the frames'.
     """
 
     path: Path
@@ -97,13 +87,10 @@ class RecordingWriter:
             self._finish()
 
     def add(self, frame: Frame) -> None:
-        """Write one frame: its pictures, its stamp and its pose.
+        """Write one frame; depth is rounded to the format's unit, 0 beyond its range (65.534 m for millimetres).
 
-        Depth is rounded to the format's unit; what is beyond its range (65.534 m for millimetres) is left out.
-
-        Raises:
-            RecordingError: the depth is not in metres, the pose is no rigid motion, the name was used before, the stamp
-                is not after the last, or the disk is full.
+        RecordingError: the depth is not in metres, the pose is no rigid motion, the name was used before, the stamp is
+        not after the last, or the disk is full.
         """
         if not same_rig(frame.rig, self.rig):
             raise RecordingError(f"Frame {frame.name} was taken by another camera than the recording's first frame.")
@@ -128,19 +115,9 @@ class RecordingWriter:
         depth: Path,
         link: bool = True,
     ) -> None:
-        """Take over a frame's files as they are, without decoding them.
+        """Take over a frame's PNG or JPEG, and its 16-bit PNG of depth in this recording's units, undecoded.
 
-        Args:
-            name: the frame's name in this recording.
-            stamp_s: seconds from the recording's start.
-            world_from_camera: pose of the depth camera.
-            colour: a PNG or JPEG file.
-            depth: a 16-bit PNG file in this recording's units.
-            link: whether a hard link will do where the file system can; it takes no space, and nothing in this
-                package ever writes into an existing picture.
-
-        Raises:
-            RecordingError: as ``add``, or a file is missing.
+        With ``link`` a hard link will do: nothing in this package writes into a picture. Errors as of ``add``.
         """
         self._announce(name, stamp_s, world_from_camera)
         take_file(colour, self.path / "rgb" / f"{name}{colour.suffix.lower()}", link)
@@ -148,24 +125,15 @@ class RecordingWriter:
         self._log(name, stamp_s, world_from_camera)
 
     def set_audio(self, audio: Any, start_s: float = 0.0, microphones: Microphones | None = None) -> None:
-        """Give the recording its sound track.
+        """Give the recording its sound track; an ``AudioTrack`` says its start and its microphones itself.
 
         A FLAC, WAV or OGG file is copied as it is; samples, and the sound of a video, are written as FLAC.
-
-        Args:
-            audio: the track: a path, a ``Sound``, a ``ChannelSound`` or an ``AudioTrack``.
-            start_s: the recording's time at which it begins; a track that is open says so itself.
-            microphones: where those of its channels are; a track that is open says so itself.
-
-        Raises:
-            RecordingError: the file is of a kind that cannot be copied.
-            AudioError: the track cannot be read, or is none.
+        RecordingError says that a file cannot be copied, AudioError that the track cannot be read, or is none.
         """
         audio = user_path(audio) if isinstance(audio, str | Path) else audio
         if not isinstance(audio, Path | Sound | ChannelSound | AudioTrack):
             raise AudioError(
-                "A sound track is the path of a file, an avlmaps.Sound(samples, rate_hz) or a ChannelSound, not "
-                f"{type(audio).__name__}."
+                f"A sound track is a path, an avlmaps.Sound or an avlmaps.ChannelSound, not {type(audio).__name__}."
             )
         for old in self.path.glob("audio.*"):
             old.unlink()
@@ -190,7 +158,6 @@ class RecordingWriter:
             write_flac(self.path / "audio.flac", audio.blocks() if isinstance(audio, AudioTrack) else audio)
 
     def set_directions(self, directions: DirectionTrack) -> None:
-        """Write what a device said of where the sounds of the track came from."""
         write_directions(self.path / DIRECTIONS, directions)
 
     def _take_channels(self, files: tuple[Path, ...]) -> None:
@@ -203,7 +170,7 @@ class RecordingWriter:
     def _require_possible(self) -> None:
         if not isinstance(self.rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise RecordingError(
-                f"rig must be an avlmaps.Rig, not {type(self.rig).__name__}; of one camera Rig(camera, camera)."
+                f"rig must be an avlmaps.Rig, not {type(self.rig).__name__}, such as Rig(camera, camera)."
             )
         if self.colour not in ("png", "jpg"):
             raise RecordingError(f"colour is {self.colour!r}; it must be png or jpg.")
@@ -280,7 +247,6 @@ def _pose_lines(stamps_s: Float[np.ndarray, " n"], world_from_camera: Float[np.n
 
 
 def _make_empty(path: Path) -> None:
-    """Make the folder, or take away what an unfinished recording left in it; never anything else."""
     if path.is_dir() and (path / layout.UNFINISHED).exists() and not (path / layout.DESCRIPTION).exists():
         for folder in ("rgb", "depth"):
             shutil.rmtree(path / folder, ignore_errors=True)

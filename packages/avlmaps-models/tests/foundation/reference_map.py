@@ -17,7 +17,7 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.formats.avlmaps_layout import WORLD_FROM_HABITAT, base_from_camera
+from avlmaps.recordings.formats.layouts import WORLD_FROM_HABITAT, base_from_camera
 from avlmaps.recordings.types import Frame
 from helpers.raycast import ROOM, View, render
 from helpers.room import Room

@@ -37,7 +37,7 @@ from avlmaps.core.registry import Backend, Kind
 from avlmaps.maps.build import BuildSettings, build_map
 from avlmaps.perception.encoders import Encoders, register_profile
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.recordings.formats.avlmaps_layout import base_poses
+from avlmaps.recordings.formats.layouts import base_poses
 from avlmaps_models.import_reference.convert import ImportSettings, import_reference_map
 
 SETTINGS = ImportSettings(cell_size_m=CELL_M)

@@ -46,7 +46,6 @@ class Sample:
 
     Attributes:
         index: (f,) numbers of the frames in the recording.
-        stamps_s: (f,) when.
         world_from_camera: (f, 4, 4) poses as they are read.
         depth_m: (f, h, w) z-depth, 0 where there is none.
         grey: (f, hc, wc) brightness, 0 to 255.
@@ -72,7 +71,6 @@ class Sample:
         return len(self.index)
 
     def only(self, chosen: Bool[np.ndarray, " p"] | Int[np.ndarray, " k"]) -> "Sample":
-        """Return these pictures with some of the pairs."""
         return replace(self, pairs=self.pairs[chosen], follows=self.follows[chosen])
 
 
@@ -159,7 +157,6 @@ def _spread(n: int) -> list[int]:
 
 
 def _apart(pose: Float[np.ndarray, "n 4 4"]) -> list[tuple[int, int]]:
-    """Return pairs whose cameras look nearly one way from places apart: there the scale of positions shows."""
     rows = np.unique(np.linspace(0, len(pose) - 1, min(len(pose), 150)).round().astype(int))
     few = pose[rows]
     away_m = np.linalg.norm(few[:, None, :3, 3] - few[None, :, :3, 3], axis=-1)
@@ -219,11 +216,9 @@ class Surfaces:
     """What is needed of each depth picture, computed once.
 
     Attributes:
-        near_m: (f, h, w) least depth of the 3x3 pixels around, 0 where one of them has none.
+        near_m: (f, h, w) least depth of the 3x3 pixels around, 0 where too few of them have one.
         far_m: (f, h, w) greatest depth there.
-        row: (f, m) pixels on smooth surface.
-        column: (f, m) theirs.
-        there: (f, m) whether there is such a pixel.
+        row: (f, m) pixels on smooth surface; with ``column``, where ``there``.
         smooth_share: of the pixels with depth around, those on smooth surface; NaN without any.
     """
 
@@ -236,7 +231,6 @@ class Surfaces:
 
     @staticmethod
     def of(depth_m: Float32[np.ndarray, "f h w"], points: int = POINTS) -> "Surfaces":
-        """Find smooth pixels, evenly spread, up to a number in each frame."""
         near, far = _around(depth_m)
         count = len(depth_m)
         row, column = np.zeros((count, points), np.int64), np.zeros((count, points), np.int64)
@@ -310,11 +304,9 @@ class Agreement:
 
     @property
     def pairs(self) -> int:
-        """Number of pairs with enough points."""
         return int((self.points >= FEWEST_POINTS).sum())
 
     def share(self, counts: Int[np.ndarray, " p"]) -> float:
-        """Return a share of the points of the pairs that count."""
         used = self.points >= FEWEST_POINTS
         return float(counts[used].sum() / max(self.points[used].sum(), 1))
 
@@ -326,12 +318,10 @@ class Agreement:
 
     @property
     def same_share(self) -> float:
-        """Share of points on the surface that the other frame sees."""
         return self.share(self.same)
 
     @property
     def through_share(self) -> float:
-        """Share of points that the other frame looks through."""
         return self.share(self.through)
 
 
@@ -344,16 +334,10 @@ def compare(
     sample: Sample, surfaces: Surfaces, world_from_camera: Float[np.ndarray, "f 4 4"], rig: Rig | None = None,
     scale: float = 1.0, floor_m: float = SAME_M, *, colour: bool = True,
 ) -> Agreement:  # fmt: skip
-    """Compare the pairs of a sample.
+    """Compare the pairs of a sample, perhaps with another rig and its depths times a scale.
 
-    Args:
-        sample: the pictures.
-        surfaces: of its depth.
-        world_from_camera: poses of the frames.
-        rig: other cameras than the sample's.
-        scale: what its depths are multiplied by.
-        floor_m: by how much depths of one surface may differ however near it is.
-        colour: whether likeness is measured as well, which takes a third of the time; otherwise nothing is alike.
+    Depths of one surface may differ by ``floor_m`` however near it is. Without ``colour``, which takes a third of the
+    time, nothing is alike.
     """
     rig = rig or sample.rig
     camera = rig.depth

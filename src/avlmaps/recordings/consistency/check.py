@@ -5,7 +5,8 @@ Points of one frame must lie on the surface that another frame sees, and look al
 likeness of 0.87 at least; docs/recordings.md has the figures. `suspicions.py` looks further.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -17,19 +18,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.wording import option
 from avlmaps.recordings.channels import level_faults
-from avlmaps.recordings.consistency import agreement as limits
-from avlmaps.recordings.consistency.agreement import (
-    APART_SAME_M,
-    FEWEST_POINTS,
-    Agreement,
-    Sample,
-    Surfaces,
-    compare,
-    draw_sample,
-    in_colour,
-    steps_between_all,
-    without_occluded,
-)
+from avlmaps.recordings.consistency import agreement
 from avlmaps.recordings.consistency.readings import LEAST_OFF, Trial, Trials, cause_of, find_cause, find_closer
 from avlmaps.recordings.memory import is_of_program
 from avlmaps.recordings.types import Recording
@@ -59,14 +48,7 @@ class Reason(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is not as it should be.
-
-    Attributes:
-        reason: its word.
-        grade: suspicious or impossible.
-        sentence: what, with numbers.
-        remedy: the likely cause and what to do, one sentence.
-    """
+    """One thing that is not as it should be: what, with numbers, and the likely cause with what to do."""
 
     reason: Reason
     grade: Grade
@@ -139,7 +121,6 @@ class Verdict:
         return Grade.UNCHECKED if np.isnan(self.agreeing) else Grade.FINE
 
     def sentences(self) -> tuple[str, ...]:
-        """Return a sentence or two for each finding."""
         return tuple(map(str, self.findings))
 
     def refused(self, allowed: tuple[str, ...]) -> Finding | None:
@@ -172,73 +153,57 @@ class Evidence:
     """What the check looks at: a sample, its surfaces, and how pairs agree that follow or look from apart."""
 
     recording: Recording
-    sample: Sample
-    surfaces: Surfaces
-    after: Agreement
-    apart: Agreement
+    sample: agreement.Sample
+    surfaces: agreement.Surfaces
+    after: agreement.Agreement
+    apart: agreement.Agreement
 
     @classmethod
     def of(cls, recording: Recording) -> Self:
-        """Draw a sample and compare its pairs.
-
-        Raises:
-            RecordingError: there is no frame, or none of the sample can be read.
-        """
+        """Draw a sample and compare its pairs; RecordingError where none of its frames can be read."""
         if len(recording) == 0:
             raise RecordingError(f"{recording.path} has no frames with a pose; there is nothing to check.")
-        sample = draw_sample(recording)
-        surfaces = Surfaces.of(sample.depth_m)
+        sample = agreement.draw_sample(recording)
+        surfaces = agreement.Surfaces.of(sample.depth_m)
         following, distant = sample.only(sample.follows), sample.only(~sample.follows)
-        after = compare(following, surfaces, sample.world_from_camera)
-        apart = compare(distant, surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
-        after, apart = without_occluded(after, following, surfaces), without_occluded(apart, distant, surfaces)
+        after = agreement.compare(following, surfaces, sample.world_from_camera)
+        apart = agreement.compare(distant, surfaces, sample.world_from_camera, floor_m=agreement.APART_SAME_M)
+        after, apart = (
+            agreement.without_occluded(after, following, surfaces),
+            agreement.without_occluded(apart, distant, surfaces),
+        )
         return cls(recording, sample, surfaces, after, apart)
 
     @cached_property
     def median_m(self) -> float:
-        """Middle of the depths; NaN without any."""
         known = self.sample.depth_m[self.sample.depth_m > 0.0]
         return float(np.median(known)) if known.size else float("nan")
 
     @cached_property
     def of_program(self) -> bool:
-        """Whether a program gives the frames, so that it has to give others."""
         return is_of_program(self.recording)
 
     @property
     def judged(self) -> bool:
-        """Whether enough pairs see the same place."""
-        return limits.can_be_judged(self.after)
+        return agreement.can_be_judged(self.after)
 
     @property
     def contradicts(self) -> bool:
         """Whether points of frames that follow one another do not lie on one surface."""
-        return self.judged and not limits.geometry_agrees(self.after)
+        return self.judged and not agreement.geometry_agrees(self.after)
 
     @property
     def drifts(self) -> bool:
         """Whether only those of frames from apart do not."""
-        return not self.contradicts and not limits.apart_agrees(self.apart)
+        return not self.contradicts and not agreement.apart_agrees(self.apart)
 
     @property
-    def unlike(self) -> Agreement | None:
+    def unlike(self) -> agreement.Agreement | None:
         """The pairs whose points lie on one surface and do not look alike, None where they do."""
         return None if self.contradicts or self.drifts else _unlike(self.after, self.apart)
 
     @cached_property
-    def level_faults(self) -> tuple[Sequence[str], Sequence[str]]:
-        """What is silent and what is clipped in the track; of an array, its channels are looked at elsewhere."""
-        track = self.recording.audio
-        if track is None or track.microphones is not None:
-            return (), ()
-        try:
-            return level_faults(track)
-        except AudioError:  # hearing says why
-            return (), ()
-
-    @cached_property
     def trials(self) -> Trials:
-        """Tries other readings."""
         return Trials(self.recording, self.sample)
 
     @cached_property
@@ -248,7 +213,6 @@ class Evidence:
 
     @property
     def explanation(self) -> str:
-        """The cause in words; nothing where there is none."""
         best = self.cause
         if best is None:
             return ""
@@ -256,14 +220,18 @@ class Evidence:
 
     def _explains(self, trial: Trial) -> bool:
         after, apart = trial.after, trial.apart
-        if not limits.can_be_judged(after) or not limits.geometry_agrees(after) or not limits.apart_agrees(apart):
+        if (
+            not agreement.can_be_judged(after)
+            or not agreement.geometry_agrees(after)
+            or not agreement.apart_agrees(apart)
+        ):
             return False
-        if _unlike(after, apart) is not None or trial.score < limits.LEAST_AGREEING * 0.9:
+        if _unlike(after, apart) is not None or trial.score < agreement.LEAST_AGREEING * 0.9:
             return False
-        if not limits.geometry_agrees(self.after):
+        if not agreement.geometry_agrees(self.after):
             return after.same_share > self.after.same_share + 0.5 * (1.0 - self.after.same_share)
-        if not limits.apart_agrees(self.apart):
-            return limits.can_be_judged(apart) and apart.same_share > 0.5 * (1.0 + self.apart.same_share)
+        if not agreement.apart_agrees(self.apart):
+            return agreement.can_be_judged(apart) and apart.same_share > 0.5 * (1.0 + self.apart.same_share)
         return True
 
     def _gain(self, best: Trial) -> str:
@@ -277,16 +245,12 @@ class Evidence:
         return f"(correlation {unlike.likeness:.2f} -> {then.likeness:.2f})"
 
 
-def _unlike(after: Agreement, apart: Agreement) -> Agreement | None:
-    return next((one for one in (after, apart) if limits.can_be_judged(one) and limits.unlike(one)), None)
+def _unlike(after: agreement.Agreement, apart: agreement.Agreement) -> agreement.Agreement | None:
+    return next((one for one in (after, apart) if agreement.can_be_judged(one) and agreement.unlike(one)), None)
 
 
 def check_recording(recording: Recording) -> Verdict:
-    """Check a recording against itself, as a build does.
-
-    Raises:
-        RecordingError: there is no frame, or none of the sample can be read.
-    """
+    """Check a recording against itself, as a build does."""
     return door_verdict(Evidence.of(recording))
 
 
@@ -348,7 +312,7 @@ def _without_colour(evidence: Evidence) -> Iterator[Said]:
     frame, at = np.nonzero(there)
     row, column = evidence.surfaces.row[frame, at], evidence.surfaces.column[frame, at]
     z = evidence.sample.depth_m[frame, row, column].astype(np.float64)
-    share = float(in_colour(rig, rig.depth.rays()[row, column] * z[:, None])[2].mean())
+    share = float(agreement.in_colour(rig, rig.depth.rays()[row, column] * z[:, None])[2].mean())
     if share < _LEAST_COLOURED:
         sentence = f"The colour camera sees {share:.0%} of what the depth camera sees; the rest has no colour."
         yield Said(sentence, sure=share < _IMPOSSIBLE_COLOURED)
@@ -369,9 +333,7 @@ def _depth(evidence: Evidence) -> Iterator[Said]:
         unit = f"{option('depth-unit', 'METRES')} says what one stored unit is (0.001: millimetres)"
         remedy = f"Check its unit: {'depth_m is in metres' if evidence.of_program else unit}."
         sure = not _IMPOSSIBLE_DEPTH_M[0] <= median_m <= _IMPOSSIBLE_DEPTH_M[1]
-        yield Said(
-            f"The depth is {median_m:.3g} m in the middle, where rooms have {low:g} to {high:g} m.", remedy, sure
-        )
+        yield Said(f"The depth is {median_m:.3g} m in the middle; rooms have {low:g} to {high:g} m.", remedy, sure)
     if smooth < _LEAST_SMOOTH and evidence.sample.depth_m.shape[2] >= _FEWEST_COLUMNS:
         on_surface = f"{smooth:.0%} of the pixels lie on a surface with those around"
         yield Said(f"The depth pictures look like noise: {on_surface}.", sure=smooth < _IMPOSSIBLE_SMOOTH)
@@ -426,12 +388,14 @@ def _pace(evidence: Evidence) -> Iterator[Said]:
         )
 
 
-def _silent(evidence: Evidence) -> Iterator[Said]:
-    return map(Said, evidence.level_faults[0])
-
-
-def _clipped(evidence: Evidence) -> Iterator[Said]:
-    return map(Said, evidence.level_faults[1])
+def _levels(evidence: Evidence) -> Iterator[Said]:
+    track, check = evidence.recording.audio, "Check the microphone, and which input was recorded: nothing that sounded"
+    if track is None or track.microphones is not None:  # channels of an array are looked at elsewhere
+        return
+    with suppress(AudioError):  # hearing says why
+        silent, clipped = level_faults(track)
+        yield from (Said(one, f"{check} then is in the map.") for one in silent)
+        yield from (Said(one, "What is loud may be taken for another sound.") for one in clipped)
 
 
 # Frames against frames
@@ -445,17 +409,17 @@ def _contradiction(evidence: Evidence) -> Iterator[Said]:
             f"lie on the surface that another sees, and {after.through_share:.1%} are seen through ({after.pairs} "
             "pairs of frames)."
         )
-        sure = after.same_share < limits.IMPOSSIBLE_AGREEING
+        sure = after.same_share < agreement.IMPOSSIBLE_AGREEING
         yield Said(sentence, evidence.explanation or _other_cause(evidence), sure)
 
 
 def _other_cause(evidence: Evidence) -> str:
     after, recording = evidence.after, evidence.recording
-    if float(steps_between_all(evidence.sample.world_from_camera).max(initial=0.0)) < _STANDS:
+    if float(agreement.steps_between_all(evidence.sample.world_from_camera).max(initial=0.0)) < _STANDS:
         return "All poses are the same, though the pictures are not: the poses are missing, or those of another camera."
-    share = np.where(after.points >= FEWEST_POINTS, after.same / np.maximum(after.points, 1), np.nan)
-    bad, others = limits.bad_pairs(after), share[share >= limits.BAD_PAIR]
-    if 0 < bad <= 0.4 * after.pairs and len(others) and float(np.median(others)) > limits.LEAST_AGREEING:
+    share = np.where(after.points >= agreement.FEWEST_POINTS, after.same / np.maximum(after.points, 1), np.nan)
+    bad, others = agreement.bad_pairs(after), share[share >= agreement.BAD_PAIR]
+    if 0 < bad <= 0.4 * after.pairs and len(others) and float(np.median(others)) > agreement.LEAST_AGREEING:
         pair = evidence.sample.only(evidence.sample.follows).pairs[int(np.nanargmin(share))]
         a, b = (recording.name(int(evidence.sample.index[i])) for i in pair)
         return (
@@ -494,14 +458,14 @@ def _closer(evidence: Evidence) -> Iterator[Said]:
 
 def _unlike_colour(evidence: Evidence) -> Iterator[Said]:
     if (found := evidence.unlike) is not None:
-        bad, pairs = int((found.alike < limits.BAD_LIKENESS).sum()), int(np.isfinite(found.alike).sum())
+        bad, pairs = int((found.alike < agreement.BAD_LIKENESS).sum()), int(np.isfinite(found.alike).sum())
         apart, right = (" from apart", "0.85") if found is evidence.apart else ("", "0.9")
         sentence = (
             "The colour pictures do not show what the depth pictures show: the brightness of the same points in two "
             f"frames{apart} correlates by {found.likeness:.2f} where right recordings have {right} and more, and "
             f"hardly at all in {bad} of {pairs} pairs."
         )
-        yield Said(sentence, evidence.explanation, evidence.after.likeness < limits.IMPOSSIBLE_LIKENESS)
+        yield Said(sentence, evidence.explanation, evidence.after.likeness < agreement.IMPOSSIBLE_LIKENESS)
 
 
 _DOOR = (
@@ -529,12 +493,7 @@ _DOOR = (
         "What they show is not in the map: check that pictures and poses are of one drive and one clock.",
     ),
     Suspicion(Reason.MOTION, _pace, "Check the poses, the intrinsics and the depth unit."),
-    Suspicion(
-        Reason.SOUND,
-        _silent,
-        "Check the microphone, and which input was recorded: nothing that sounded then is in the map.",
-    ),
-    Suspicion(Reason.SOUND, _clipped, "What is loud may be taken for another sound."),
+    Suspicion(Reason.SOUND, _levels),
     Suspicion(
         Reason.GEOMETRY,
         _contradiction,

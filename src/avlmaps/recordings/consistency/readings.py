@@ -11,16 +11,7 @@ from jaxtyping import Float
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import from_quaternion
-from avlmaps.recordings.consistency.agreement import (
-    APART_SAME_M,
-    NOTHING,
-    SAME_M,
-    Agreement,
-    Sample,
-    Surfaces,
-    compare,
-    small_depth,
-)
+from avlmaps.recordings.consistency import agreement
 from avlmaps.recordings.corrections import (
     NAMED,
     NONE,
@@ -58,7 +49,7 @@ _POSES: tuple[tuple[PoseKind, ...], ...] = (
     (PoseKind.WXYZ, PoseKind.CAMERA_FROM_WORLD),
 )
 # A frame of usual size has its depths compared with `SAME_M`; of a scene of another size it is this share.
-_FLOOR_SHARE, _APART_FLOOR_SHARE = SAME_M / 2.5, APART_SAME_M / 2.5
+_FLOOR_SHARE, _APART_FLOOR_SHARE = agreement.SAME_M / 2.5, agreement.APART_SAME_M / 2.5
 # A reading must compare this share of the sample's points to be preferred, and this one of those compared as it is.
 _LEAST_COMPARED, _OF_AS_IT_IS = 0.15, 0.5
 _CLEARLY, _AS_GOOD = 0.02, 1.15
@@ -112,18 +103,16 @@ class Trial:
     """A reading, how frames agree with it that follow one another or look from apart, and one number of both."""
 
     reading: Reading
-    after: Agreement
-    apart: Agreement
+    after: agreement.Agreement
+    apart: agreement.Agreement
     score: float
 
     @property
     def offs(self) -> Float[np.ndarray, " p"]:
-        """Differences of depths of each pair."""
         return np.concatenate([self.after.off, self.apart.off])
 
     @property
     def off(self) -> float:
-        """Their mean; infinite without any."""
         known = self.offs[np.isfinite(self.offs)]
         return float(known.mean()) if len(known) else float("inf")
 
@@ -137,7 +126,7 @@ class Trial:
 class Trials:
     """Tries readings on a few pairs of one sample."""
 
-    def __init__(self, recording: Recording, sample: Sample) -> None:
+    def __init__(self, recording: Recording, sample: agreement.Sample) -> None:
         few = [_some(np.flatnonzero(kind)) for kind in (sample.follows, ~sample.follows)]
         self.recording, self.sample = recording, sample.only(np.concatenate(few))
         self.given = recording.given if isinstance(recording, CorrectedRecording) else NONE
@@ -146,11 +135,12 @@ class Trials:
         self._delayed, self._late, self._pictures = cache(self._poses_at), cache(self._depths_of), cache(self._read_so)
         known = sample.depth_m[sample.depth_m > 0.0]
         self.median_m = float(np.median(known)) if len(known) else 1.0
-        there = Surfaces.of(self.sample.depth_m, _POINTS).there
-        self._points = max(int(there[self.sample.pairs[:, 0]].sum()), 1)
+        as_read = self._pictures(AS_IT_IS)
+        assert as_read is not None
+        self._points = max(int(as_read[1].there[self.sample.pairs[:, 0]].sum()), 1)
         self._compared = int(_LEAST_COMPARED * self._points)
-        as_it_is = self.run(AS_IT_IS, colour=False)
-        seen = int(as_it_is.after.points.sum() + as_it_is.apart.points.sum())
+        self.as_it_is = self.run(AS_IT_IS, colour=False)
+        seen = int(self.as_it_is.after.points.sum() + self.as_it_is.apart.points.sum())
         self._compared = max(self._compared, int(_OF_AS_IT_IS * seen))
 
     def run(self, reading: Reading, *, colour: bool = True) -> Trial:
@@ -159,13 +149,13 @@ class Trials:
         pose, rig = self._delayed(given.pose_delay_s or 0.0), rig_of(self.sample.rig, reading)
         seen = self._pictures(replace(AS_IT_IS, **{name: getattr(reading, name) for name in _OF_PICTURES}))
         if rig is None or pose is None or seen is None:
-            return Trial(reading, NOTHING, NOTHING, 0.0)
+            return Trial(reading, agreement.NOTHING, agreement.NOTHING, 0.0)
         half_rad = np.radians(reading.rolled_deg) / 2.0
         rolled = from_quaternion(np.zeros((1, 3)), np.array([[0.0, 0.0, np.sin(half_rad), np.cos(half_rad)]]))
         (sample, surfaces), pose = seen, reread_poses(pose, given) @ rolled
         median_m = self.median_m * reading.scale
         after, apart = (
-            compare(sample.only(kind), surfaces, pose, rig, reading.scale, floor * median_m, colour=colour)
+            agreement.compare(sample.only(kind), surfaces, pose, rig, reading.scale, floor * median_m, colour=colour)
             for kind, floor in ((sample.follows, _FLOOR_SHARE), (~sample.follows, _APART_FLOOR_SHARE))
         )
         return Trial(reading, after, apart, self._score(after, apart))
@@ -177,21 +167,20 @@ class Trials:
         return known.at(held_s) if float((np.abs(wanted_s - held_s) > 0.05).mean()) <= 0.5 else None
 
     def _depths_of(self, late: int) -> Float[np.ndarray, "f h w"] | None:
-        """Return the depth of frames that come so many after the sample's, None where they cannot be read."""
         if not late:
             return self.sample.depth_m
         rows = np.clip(self.sample.index + late, 0, len(self.recording) - 1)
         if len(np.unique(rows)) < 0.5 * len(rows):
             return None
         try:
-            depths = [small_depth(self.recording.frame(int(row)), self.sample.rig) for row in rows]
+            depths = [agreement.small_depth(self.recording.frame(int(row)), self.sample.rig) for row in rows]
         except RecordingError:
             return None
         depths_m: Float[np.ndarray, "f h w"] = np.stack(depths)
         depths_m[self.sample.index + late != rows] = 0.0  # beyond the ends nothing is known
         return depths_m
 
-    def _read_so(self, reading: Reading) -> tuple[Sample, Surfaces] | None:
+    def _read_so(self, reading: Reading) -> tuple[agreement.Sample, agreement.Surfaces] | None:
         depth_m, grey = self._late(reading.depth_late), self.sample.grey
         if depth_m is None:
             return None
@@ -204,9 +193,9 @@ class Trials:
         if reading.k1:
             depth_m = _straightened(depth_m, self.sample.rig.depth, reading.k1)
             grey = _straightened(grey, self.sample.rig.rgb, reading.k1)
-        return replace(self.sample, depth_m=depth_m, grey=grey), Surfaces.of(depth_m, _POINTS)
+        return replace(self.sample, depth_m=depth_m, grey=grey), agreement.Surfaces.of(depth_m, _POINTS)
 
-    def _score(self, after: Agreement, apart: Agreement) -> float:
+    def _score(self, after: agreement.Agreement, apart: agreement.Agreement) -> float:
         compared = max(int(after.points.sum() + apart.points.sum()), self._compared, 1)
         score = float(after.same.sum() + apart.same.sum()) / compared
         if np.isfinite(after.likeness) and after.textured > 0.05 * self._points:
@@ -264,7 +253,7 @@ def find_closer(trials: Trials) -> Trial | None:
     With a slow camera, points stay within the tolerance of a surface in spite of such a mistake; their differences show
     it, and people who walk by do not change that.
     """
-    as_it_is = trials.run(AS_IT_IS, colour=False)
+    as_it_is = trials.as_it_is
     if not LEAST_OFF < as_it_is.off < float("inf"):
         return None
     readings = (*_SCALED, *_delays(trials.pace_s), *_FOCUSED, *_SHIFTED, *_MOUNTED, *_BENT)
@@ -306,9 +295,8 @@ def find_cause(trials: Trials, enough: Callable[[Trial], bool]) -> Trial | None:
     single += [_refined(trials, max(kind, key=lambda trial: trial.score)) for kind in (delayed, scaled, focal)]
     best = _best([trial for trial in single if enough(trial)])
     if best is None or _is_delayed(best.reading):  # pictures that are late look like poses that are early
-        as_it_is = trials.run(AS_IT_IS, colour=False)
         late = [trials.run(Reading(depth_late=late)) for late in (1, -1, 2, -2, 3, -3)]
-        best = _best([*(t for t in late if enough(t) and is_closer(t, as_it_is)), *([best] if best else [])])
+        best = _best([*(t for t in late if enough(t) and is_closer(t, trials.as_it_is)), *([best] if best else [])])
     if best is not None:
         return _refined(trials, best)
     posed = [
@@ -335,7 +323,6 @@ def _best(trials: list[Trial]) -> Trial | None:
 
 
 def _single(trials: Trials) -> Iterator[Reading]:
-    """Yield every reading with one mistake, the simplest first; first of all without what was corrected."""
     if trials.given.poses:
         yield Reading(Corrections(poses=(PoseKind.WORLD_FROM_CAMERA,)))
     if trials.given.camera_axes is not None:
@@ -357,7 +344,6 @@ def _delays(pace_s: float) -> Iterator[Reading]:
 
 
 def _refined(trials: Trials, best: Trial) -> Trial:
-    """Return the delay, scale or camera near the best at which depths differ least."""
     reading, tried = best.reading, list[Reading]()
     if delay_s := reading.given.pose_delay_s:
         around_s = (round(float(s), 3) for s in delay_s + np.arange(-4, 5) / 100.0)
@@ -399,13 +385,9 @@ _CAMERAS = {"opengl": "an OpenGL camera (y up, z back)", "ros": "a body (x forwa
 
 
 def cause_of(reading: Reading, recording: Recording, median_m: float, gain: str = "") -> str:
-    """Return what a recording looks like and what to do about it.
+    """Return what a recording looks like, the middle of whose depths is read as ``median_m``, and what to do about it.
 
-    Args:
-        reading: with which it agrees.
-        recording: as it is read.
-        median_m: middle of its depths, as they are read.
-        gain: how much better the recording agrees, in parentheses, or nothing.
+    ``gain`` says how much better the recording agrees, in parentheses, or nothing.
     """
     told = list(_told(reading, recording.rig, median_m))
     looks, todo = " and ".join(look for look, _ in told), [by_hand for _, by_hand in told if by_hand]
@@ -418,7 +400,6 @@ def cause_of(reading: Reading, recording: Recording, median_m: float, gain: str 
 
 
 def _told(reading: Reading, rig: Rig, median_m: float) -> Iterator[tuple[str, str]]:
-    """Yield what a recording looks like, and what is to be done where no option does it."""
     given, camera = reading.given, rig.depth
     yield from ((_KINDS[kind], "") for kind in given.poses)
     if (axes := given.camera_axes) is not None:

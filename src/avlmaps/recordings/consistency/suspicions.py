@@ -5,17 +5,9 @@ from dataclasses import replace
 from itertools import islice
 
 import numpy as np
+from jaxtyping import Float
 
-from avlmaps.recordings.consistency import agreement as limits
-from avlmaps.recordings.consistency.agreement import (
-    FEWEST_POINTS,
-    Surfaces,
-    compare,
-    draw_pairs,
-    in_colour,
-    odd_steps,
-    steps_between_all,
-)
+from avlmaps.recordings.consistency import agreement
 from avlmaps.recordings.consistency.check import (
     Evidence,
     Reason,
@@ -25,7 +17,7 @@ from avlmaps.recordings.consistency.check import (
     door_verdict,
     findings_of,
 )
-from avlmaps.recordings.consistency.readings import AS_IT_IS, Reading, is_closer
+from avlmaps.recordings.consistency.readings import Reading, is_closer
 from avlmaps.recordings.corrections import Corrections
 from avlmaps.recordings.types import Recording
 
@@ -46,11 +38,7 @@ _MOST_JUMPS, _ACROSS_STEP, _MISFIT, _MISFIT_RATIO = 3, 0.9, 0.7, 3.0
 
 
 def examine_recording(recording: Recording) -> Verdict:
-    """Check a recording against itself with every row, and say what would not show.
-
-    Raises:
-        RecordingError: there is no frame, or none of the sample can be read.
-    """
+    """Check a recording against itself with every row, and say what would not show."""
     evidence = Evidence.of(recording)
     verdict = door_verdict(evidence)
     findings = [*verdict.findings, *findings_of(_SINGLE, evidence)]
@@ -88,7 +76,7 @@ def _wrapped(evidence: Evidence) -> Iterator[Said]:
 
 def _frozen(evidence: Evidence) -> Iterator[Said]:
     pose, pairs = evidence.sample.world_from_camera, evidence.sample.pairs
-    moved = pairs[[steps_between_all(pose[pair])[0] > _MOVED_STEPS for pair in pairs]]
+    moved = pairs[[agreement.steps_between_all(pose[pair])[0] > _MOVED_STEPS for pair in pairs]]
     for what, pictures in (("depth", evidence.sample.depth_m), ("colour", evidence.sample.grey)):
         one = [bool(pictures[a].any()) and np.array_equal(pictures[a], pictures[b]) for a, b in moved]
         if len(one) >= 3 and float(np.mean(one)) > _MOST_FROZEN:
@@ -105,7 +93,7 @@ def _frozen_pose(evidence: Evidence) -> Iterator[Said]:
 
 
 def _warmth(evidence: Evidence) -> float:
-    """Return how much more of the pictures is redder than blue than bluer than red; 0 for too few frames."""
+    """How much more of the pictures is redder than blue than bluer than red; 0 for too few frames."""
     hue = evidence.sample.hue
     return float((hue > _COLOURED).mean() - (hue < -_COLOURED).mean()) if len(hue) >= _FEWEST_FOR_WARMTH else 0.0
 
@@ -159,8 +147,8 @@ _SINGLE = (
 def _jump(evidence: Evidence) -> Iterator[Said]:
     """Find a pair that does not agree, where no pair across the place does, and those beside do."""
     recording, after, sample = evidence.recording, evidence.after, evidence.sample
-    pairs, odd = sample.index[sample.only(sample.follows).pairs], odd_steps(recording)
-    share = np.where(after.points >= 2 * FEWEST_POINTS, after.same / np.maximum(after.points, 1), 1.0)
+    pairs, odd = sample.index[sample.only(sample.follows).pairs], agreement.odd_steps(recording)
+    share = np.where(after.points >= 2 * agreement.FEWEST_POINTS, after.same / np.maximum(after.points, 1), 1.0)
     most = np.where([odd[a:b].any() for a, b in pairs], _ACROSS_STEP, _MISFIT)
     rows = np.flatnonzero(share < most)
     for row in rows[np.argsort(share[rows] - most[rows], kind="stable")][:_MOST_JUMPS].tolist():
@@ -171,16 +159,16 @@ def _jump(evidence: Evidence) -> Iterator[Said]:
         if a < 1 or b > len(recording) - 2:
             continue
         across = np.array([(a - 1, b), (a, b), (a, b + 1), (a - 1, b + 1), (a - 1, a), (b, b + 1)])
-        near = draw_pairs(recording, across, np.arange(len(across)) < 4)
-        surfaces = Surfaces.of(near.depth_m)
+        near = agreement.draw_pairs(recording, across, np.arange(len(across)) < 4)
+        surfaces = agreement.Surfaces.of(near.depth_m)
         over, beside = (
-            compare(near.only(kind), surfaces, near.world_from_camera, colour=False)
+            agreement.compare(near.only(kind), surfaces, near.world_from_camera, colour=False)
             for kind in (near.follows, ~near.follows)
         )
-        few = over.pairs >= limits.FEWEST_PAIRS and over.same_share < limits.HARDLY_ANY
-        seen = (limits.can_be_judged(over) or few) and limits.can_be_judged(beside)
-        far_off = over.same_share < limits.BAD_PAIR or over.median_off > _MISFIT_RATIO * beside.median_off
-        better = beside.same_share > max(limits.LEAST_AGREEING, over.same_share + 0.1)
+        few = over.pairs >= agreement.FEWEST_PAIRS and over.same_share < agreement.HARDLY_ANY
+        seen = (agreement.can_be_judged(over) or few) and agreement.can_be_judged(beside)
+        far_off = over.same_share < agreement.BAD_PAIR or over.median_off > _MISFIT_RATIO * beside.median_off
+        better = beside.same_share > max(agreement.LEAST_AGREEING, over.same_share + 0.1)
         if seen and better and (is_odd or far_off) and over.same_share < most[row]:
             yield Said(
                 f"Frames {recording.name(a)} and {recording.name(b)} do not agree ({over.same_share:.0%} of the points "
@@ -210,7 +198,7 @@ _LEAST_RATIO, _LEAST_GAIN, _LEAST_GRADIENT = 1.2, 0.7, 0.3
 
 def _exchanged_channels(evidence: Evidence) -> Iterator[Said]:
     red = replace(evidence.sample, grey=255.0 * evidence.sample.hue)
-    alike = compare(red, evidence.surfaces, red.world_from_camera).alike
+    alike = agreement.compare(red, evidence.surfaces, red.world_from_camera).alike
     opposite = int((alike < _OPPOSITE).sum())
     if opposite > 1 or (alike < _SURELY_OPPOSITE).any():
         yield Said(
@@ -225,19 +213,23 @@ def _beside(evidence: Evidence) -> Iterator[Said]:
     sample, surfaces, rig = evidence.sample, evidence.surfaces, evidence.sample.rig
     edge = (surfaces.near_m > 0.0) & (sample.depth_m > 0.0) & (surfaces.far_m > (1.0 + _EDGE) * sample.depth_m)
     (frame, row, column), z = np.nonzero(edge), sample.depth_m[edge].astype(np.float64)
-    u, v, seen = in_colour(rig, rig.depth.rays()[row, column] * z[:, None])
+    u, v, seen = agreement.in_colour(rig, rig.depth.rays()[row, column] * z[:, None])
     marks, (height, width) = np.zeros(sample.grey.shape), sample.grey.shape[1:]
     marks[frame[seen], v[seen], u[seen]] = 1.0
-    steep = np.hypot(*(gaussian_filter(sample.grey, _EDGES_BLUR, order) for order in ((0, 0, 1), (0, 1, 0))))
+    across, along = (gaussian_filter(sample.grey, _EDGES_BLUR, order) for order in ((0, 0, 1), (0, 1, 0)))
+    steep: Float[np.ndarray, "f h w"] = np.hypot(across, along)
     steep = np.minimum(steep / (np.quantile(steep, 0.9, axis=(1, 2), keepdims=True) + 4.0), 1.0)
     steep -= steep.mean(axis=(1, 2), keepdims=True)
     steep /= np.maximum(steep.std(axis=(1, 2), keepdims=True), 1e-6)
-    double = (2 * height, 2 * width)  # so that what leaves the picture does not come in again
+    double = (
+        2 * max(height, _FARTHEST),
+        2 * max(width, _FARTHEST),
+    )  # nothing comes in again beyond an edge
     spectrum = (np.fft.rfft2(steep, double) * np.conj(np.fft.rfft2(marks, double))).sum(axis=0)
     shifts = np.arange(-_FARTHEST, _FARTHEST + 1)
     found = np.fft.irfft2(spectrum, double)[np.ix_(shifts, shifts)] / max(marks.sum(), 1.0)
     none = max(float(found[np.hypot(*np.meshgrid(shifts, shifts)) <= _NONE].max()), 0.0)
-    most, (down, right) = float(found.max()), (shifts[at] for at in np.unravel_index(found.argmax(), found.shape))
+    most, (down, right) = float(found.max()), [int(shifts[at]) for at in divmod(int(found.argmax()), len(shifts))]
     least = max(_LEAST_RATIO * none, none + _LEAST_GAIN * float(found.std()), _LEAST_GRADIENT)
     if marks.sum() < _FEWEST_EDGES or most < least:
         return
@@ -285,14 +277,13 @@ def blind_spots(evidence: Evidence) -> Iterator[str]:
     if not evidence.judged:
         yield f"Poses, depth, colour, intrinsics and clocks cannot be checked here, because {_why(evidence)}."
         return
-    as_it_is = evidence.trials.run(AS_IT_IS, colour=False)
 
     def shows(reading: Reading) -> bool:
         wrong = evidence.trials.run(reading, colour=False)
-        if not limits.can_be_judged(wrong.after):
+        if not agreement.can_be_judged(wrong.after):
             return wrong.after.pairs > 0
-        agrees = limits.geometry_agrees(wrong.after) and limits.apart_agrees(wrong.apart)
-        return not agrees or is_closer(as_it_is, wrong)
+        agrees = agreement.geometry_agrees(wrong.after) and agreement.apart_agrees(wrong.apart)
+        return not agrees or is_closer(evidence.trials.as_it_is, wrong)
 
     if hidden := [what for readings, what in _MADE if not all(map(shows, readings))]:
         yield f"The camera moves too little or too evenly here to show: {'; '.join(hidden)}."

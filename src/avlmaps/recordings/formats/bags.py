@@ -1,11 +1,8 @@
 """The messages of a bag by topic, with their stamps, of one file or several.
 
-ROS 1 and ROS 2 bags are read by `rosbags`, MCAP files by `mcap`: their messages may be of ROS or of Foxglove.
-
-Foxglove's messages, in each of their codings, as the ROS messages that they correspond to.
-
-Foxglove's schemas (its public page) come as JSON, protobuf and ROS messages, with the same names of fields. A stamp
-is {sec, nsec}, {seconds, nanos} or {sec, nanosec}; bytes in JSON are base64.
+ROS 1 and ROS 2 bags are read by `rosbags`, MCAP files by `mcap`. Messages of Foxglove (JSON, protobuf or ROS's codings,
+with the same names of fields) are read as the ROS messages that they correspond to: a stamp is {sec, nsec}, {seconds,
+nanos} or {sec, nanosec}; bytes in JSON are base64.
 """
 
 import base64
@@ -149,15 +146,9 @@ _LARGEST_RECORD = 1 << 31
 
 
 class Bag:
-    """An open bag, of one file or several."""
+    """An open bag, of one file, a folder of one walk or several files; they are opened when they are first needed."""
 
     def __init__(self, path: Path, more: Sequence[Path] = ()) -> None:
-        """Find its files; they are opened when they are first needed.
-
-        Args:
-            path: a file, the folder of a ROS 2 bag, or a folder of the files of one walk.
-            more: further files of the same walk.
-        """
         self.path = path
         self.files = sorted((file for given in (path, *more) for file in bag_files(given)), key=_by_numbers)
         unfinished = sorted(file.name for file in path.glob("*.bag.active")) if path.is_dir() else []
@@ -172,11 +163,9 @@ class Bag:
 
     @property
     def topics(self) -> dict[str, str]:
-        """The type of each topic."""
         return {c.topic: c.msgtype for c in self._container.connections}
 
     def connections(self, topic: str) -> list[Any]:
-        """Return the connections of a topic; each has a ``topic`` and a ``msgtype``."""
         return [connection for connection in self._container.connections if connection.topic == topic]
 
     def topics_of(self, types: tuple[str, ...]) -> list[str]:
@@ -185,18 +174,15 @@ class Bag:
         return sorted(found, key=lambda topic: (types.index(found[topic]), topic))
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
-        """Yield (receive time in ns, message) of a topic."""
         if connections := self.connections(topic):
             with self.readable(topic):
                 for connection, received_ns, raw in self._container.messages(connections):
                     yield received_ns, self._container.message(connection, raw)
 
     def first(self, topic: str) -> Any:
-        """Return the first message of a topic, None where it has none."""
         return next((message for _, message in self.messages(topic)), None)
 
     def stamps(self, topic: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the header stamps (s) and receive times (ns) of a topic's messages."""
         with self.readable(topic):
             found = [
                 (self._container.stamp_s(connection, raw), received_ns)
@@ -205,14 +191,11 @@ class Bag:
         return np.array([stamp for stamp, _ in found], np.float64), np.array([ns for _, ns in found], np.int64)
 
     def message_at(self, topic: str, received_ns: int, stamp_s: float) -> Any:
-        """Return the message of a topic that was received and stamped so."""
         with self.readable(topic):
             for connection, raw in self._container.messages_at(self.connections(topic), received_ns):
                 if abs(self._container.stamp_s(connection, raw) - stamp_s) < 1e-6:
                     return self._container.message(connection, raw)
-        raise RecordingError(
-            f"{self.path} lost the message of {topic} at {stamp_s:.6f} s; was the bag changed meanwhile?"
-        )
+        raise RecordingError(f"{self.path} lost the message of {topic} at {stamp_s:.6f} s; was the bag changed?")
 
     @contextmanager
     def readable(self, topic: str) -> Generator[None]:
@@ -271,16 +254,13 @@ class RosbagsContainer:
         return self._reader.messages(connections=connections)
 
     def messages_at(self, connections: Sequence[Any], received_ns: int) -> Iterator[tuple[Any, bytes]]:
-        """Yield (connection, content) of the messages that were received at one time."""
         found = self._reader.messages(connections=connections, start=received_ns, stop=received_ns + 1)
         return ((connection, raw) for connection, _, raw in found)
 
     def message(self, connection: Any, raw: bytes) -> Any:
-        """Return a message as that of ROS."""
         return self._reader.deserialize(self._plain(raw), connection.msgtype)
 
     def stamp_s(self, connection: Any, raw: bytes) -> float:
-        """Return the stamp of a message that has a header, seconds."""
         return header_stamp_s(self._plain(raw), self._reader.is2)
 
     def _plain(self, raw: bytes) -> bytes:
@@ -303,8 +283,7 @@ class RosbagsContainer:
             except Exception as error:  # rosbags, sqlite and yaml raise their own kinds
                 raise RecordingError(
                     f"{self.files[0]} cannot be read as a ROS bag ({type(error).__name__}: {_first_line(error)}); if "
-                    "it was cut off while recording, fix it with `rosbag reindex`, `ros2 bag reindex` or `mcap "
-                    "recover`."
+                    "recording was cut off, use `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
                 ) from error
             self._local.reader = reader
         return self._local.reader
@@ -312,15 +291,7 @@ class RosbagsContainer:
 
 @dataclass(frozen=True, slots=True)
 class McapConnection:
-    """A channel of an MCAP file.
-
-    Attributes:
-        topic: its name.
-        msgtype: the ROS type of its messages, as which those of Foxglove are read; else the schema's name.
-        file: the file.
-        channel: the channel in it.
-        schema: how its messages are laid out; None where the file does not say.
-    """
+    """A channel of an MCAP file; ``msgtype`` is the ROS type of its messages, as which those of Foxglove are read."""
 
     topic: str
     msgtype: str
@@ -330,7 +301,6 @@ class McapConnection:
 
     @property
     def is_foxglove(self) -> bool:
-        """Whether its messages are Foxglove's."""
         return self.schema is not None and bool(ros_type(self.schema.name))
 
 
@@ -342,13 +312,8 @@ class McapContainer:
         self._local = threading.local()  # readers keep a file position
         self._decoders: dict[tuple[str, str, bytes], Callable[[bytes], Any]] = {}
 
-    @property
-    def connections(self) -> Sequence[McapConnection]:
-        """The topics of every file; each has a ``topic`` and a ``msgtype``."""
-        return self._connections
-
     @cached_property
-    def _connections(self) -> Sequence[McapConnection]:
+    def connections(self) -> Sequence[McapConnection]:
         found: list[McapConnection] = []
         for file in self.files:
             try:
@@ -370,8 +335,6 @@ class McapContainer:
         return found
 
     def messages(self, connections: Sequence[McapConnection]) -> Iterator[tuple[McapConnection, int, bytes]]:
-        """Yield (connection, receive time in ns, content) in the order of time."""
-
         def of(connection: McapConnection) -> Iterator[tuple[McapConnection, int, bytes]]:
             return ((connection, ns, raw) for ns, raw in self._of_channel(connection))
 
@@ -380,17 +343,14 @@ class McapContainer:
     def messages_at(
         self, connections: Sequence[McapConnection], received_ns: int
     ) -> Iterator[tuple[McapConnection, bytes]]:
-        """Yield (connection, content) of the messages that were received at one time."""
         times = {"starting_at": received_ns, "ending_at": received_ns}
         return ((connection, raw) for connection in connections for _, raw in self._of_channel(connection, **times))
 
     def message(self, connection: McapConnection, raw: bytes) -> Any:
-        """Return a message as that of ROS."""
         decoded = self._decoded(connection, raw)
         return to_ros(connection.schema.name, decoded) if connection.is_foxglove else decoded
 
     def stamp_s(self, connection: McapConnection, raw: bytes) -> float:
-        """Return the stamp of a message that has a header, seconds."""
         encoding = connection.channel.message_encoding
         if encoding in ("ros1", "cdr") and not connection.is_foxglove:
             return header_stamp_s(raw, encoding == "cdr")
@@ -434,8 +394,7 @@ def _decoder(connection: McapConnection) -> Callable[[bytes], Any]:
         return lambda raw: plain(decode_json(raw))
     if encoding not in ("protobuf", "ros1", "cdr"):
         raise RecordingError(
-            f"The messages of {topic} are coded as {encoding!r}, which is not read; ROS 1, CDR (ROS 2), JSON and "
-            "protobuf are."
+            f"The messages of {topic} are coded as {encoding!r}; ROS 1, CDR (ROS 2), JSON and protobuf are read."
         )
     if schema is None:
         raise RecordingError(f"The topic {topic} has no schema that says how its messages are laid out.")

@@ -4,7 +4,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import wraps
 from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar, runtime_checkable
@@ -55,14 +55,12 @@ class Shots:
     """Frames as a reader found them, before the unusable ones are sorted out. All have the same length.
 
     Attributes:
-        names: what the recording calls each frame.
         colour: each colour file, below the recording's folder; empty where colour is a video.
         depth: each depth file, below the recording's folder; empty where the recording has no depth at all.
         stamps_s: when, on any clock.
         world_from_camera: (n, 4, 4); NaN or infinity where tracking was lost.
         video_frames: which frame of the video each is; empty where colour is files.
-        confidence: an 8-bit picture for each depth, below the recording's folder, in which 0 says that the depth is not
-            to be trusted; empty where the recording has none.
+        confidence: an 8-bit picture for each depth, in which 0 says that it is not to be trusted; or empty.
     """
 
     names: Sequence[str]
@@ -74,29 +72,19 @@ class Shots:
     confidence: Sequence[str] = ()
 
     def take(self, index: np.ndarray) -> "Shots":
-        """Return some of the shots."""
         if len(index) == len(self.names) and np.array_equal(index, np.arange(len(index))):
             return self
-        rows: list[int] = index.tolist()
-        return Shots(
-            [self.names[i] for i in rows],
-            [self.colour[i] for i in rows] if len(self.colour) else [],
-            [self.depth[i] for i in rows] if len(self.depth) else [],
-            self.stamps_s[index],
-            self.world_from_camera[index],
-            [self.video_frames[i] for i in rows] if len(self.video_frames) else (),
-            [self.confidence[i] for i in rows] if len(self.confidence) else (),
-        )
+        return Shots(*(
+            value[index] if isinstance(value, np.ndarray) else [value[i] for i in index.tolist()] if value else value
+            for value in (getattr(self, each.name) for each in fields(self))
+        ))  # fmt: skip
 
 
 def settle(path: Path, shots: Shots, pose_file: Callable[[int], Path] | None) -> Shots:
     """Leave out what cannot be used, put the rest in the order of time and make the rotations orthonormal.
 
-    Args:
-        path: the recording, for the sentences.
-        shots: as found.
-        pose_file: the file that holds the pose of shot i; None where the reader checked the poses itself. Lost tracking
-            (NaN, infinity) is a notice, not a fault to stop at.
+    ``pose_file`` names the file that holds the pose of shot i, None where the reader checked the poses itself: lost
+    tracking (NaN, infinity) is a notice, not a fault to stop at.
     """
     tracked = np.isfinite(shots.world_from_camera).all(axis=(1, 2))
     if not tracked.all():
@@ -195,7 +183,6 @@ class ShotsRecording(Recording):
         return cls(path=path, format=format, rig=rig, shots=shots, **more)
 
     def frame(self, index: int) -> Frame:
-        """Read one frame; see ``Recording.frame``."""
         if not 0 <= index < len(self):
             raise IndexError(f"there is no frame {index}; the recording has {len(self)}")
         return Frame(
@@ -209,7 +196,6 @@ class ShotsRecording(Recording):
         )
 
     def name(self, index: int) -> str:
-        """Return the recording's name of a frame."""
         return self.shots.names[index]
 
     def _colour(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
@@ -221,14 +207,7 @@ class ShotsRecording(Recording):
 
 @dataclass(eq=False, repr=False, kw_only=True)
 class FileRecording(ShotsRecording):
-    """Frames whose pictures are files in a folder.
-
-    Attributes:
-        depth_units: units of a depth PNG in a metre.
-        video: the colour pictures, where they are one video.
-        trajectory: the poses at their own rate, where those of the frames were interpolated.
-        base_height: where the robot's base is under the camera, where that is known.
-    """
+    """Frames whose pictures are files in a folder, or whose colour is one video."""
 
     depth_units: float = 1000.0
     video: VideoFrames | None = None
@@ -255,19 +234,16 @@ class FileRecording(ShotsRecording):
         return depth_m
 
     def colour_file(self, index: int) -> Path | None:
-        """Return the frame's colour file, where it has one of its own."""
         if self.video is not None:
             return None
         return self.path / self.shots.colour[index]
 
     def depth_file(self, index: int) -> Path | None:
-        """Return the frame's depth file where it is a PNG and all of it counts."""
         if len(self.shots.depth) == 0 or len(self.shots.confidence) or not self.shots.depth[index].endswith(".png"):
             return None
         return self.path / self.shots.depth[index]
 
     def file_groups(self) -> list[tuple[Path, Sequence[str]]]:
-        """Return the video, the pictures and the confidences, and no other file of the folder."""
         video = [self.video.path.name] if self.video is not None else []
         return [(self.path, [*video, *self.shots.colour, *self.shots.depth, *self.shots.confidence])]
 
@@ -296,7 +272,6 @@ class StoredRecording(ShotsRecording):
     base_height: BaseHeight | None = None
 
     def file_groups(self) -> list[tuple[Path, Sequence[str]]]:
-        """Return the files; see ``Recording.file_groups``."""
         return [(file.parent, [file.name]) for file in self.files] or super().file_groups()
 
     def _colour(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
@@ -390,7 +365,6 @@ def likeliest_sound(names: Iterable[str]) -> str | None:
 
 
 def _sounds(files: Sequence[Path]) -> tuple[list[Path], list[Path]]:
-    """Return the files that are called a sound track, the likeliest first, and those of other sounds."""
     every = (*_SOUNDS, *_FILMS)
     # A broken link or a folder of that name is found as well, and is then an error, not a recording without sound.
     named = [file for file in files if file.stem.casefold() in _TRACKS and file.suffix.lower() in every]

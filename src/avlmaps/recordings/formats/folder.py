@@ -81,7 +81,6 @@ def _with_directions(path: Path, audio: AudioTrack | None, start_s: float) -> Au
 
 
 def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> None:
-    """Raise ``RecordingError`` where pictures have another size than their intrinsics."""
     rgb, own = description.intrinsics.rgb, description.intrinsics.depth
     for files, camera, name in ((found.colour, rgb, "rgb"), (found.depth, own or rgb, "depth")):
         size = (camera.width, camera.height)
@@ -99,8 +98,7 @@ def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> 
             )
         raise RecordingError(
             f"The {name} pictures of {folder} are {size[0]}x{size[1]}, but intrinsics.{name} of {layout.DESCRIPTION} "
-            f"are of {camera.width}x{camera.height}; give the intrinsics of these pictures (turned or resized ones "
-            "have others)."
+            f"are of {camera.width}x{camera.height}; give the intrinsics of these pictures (turned or resized)."
         )
 
 
@@ -181,8 +179,7 @@ def _find_pictures(folder: Path, description: Description, known: PoseTable, vid
     found = {name.rsplit(".", 1)[0]: name for name in list_names(folder / where, suffixes)}
     if video is not None and len(found) != len(video):
         raise RecordingError(
-            f"{video.path} has {len(video)} frames, but {folder / 'depth'} has {len(found)} pictures; "
-            "each frame needs its depth."
+            f"{video.path} has {len(video)} frames, but {folder / 'depth'} {len(found)} pictures; each frame needs one."
         )
     path = folder / layout.FRAMES
     if os.path.lexists(path):
@@ -230,9 +227,7 @@ def _stamps_without_list(
 def _pose_pictures(found: _Pictures, known: PoseTable) -> tuple[Shots, float, timeline.Trajectory | None]:
     """Give every picture a pose: its own row's, or one interpolated at its stamp where the poses allow it.
 
-    Returns:
-        The shots, the date that was subtracted from the stamps, seconds, and the poses at their own rate where they
-        were interpolated.
+    Also return the date that was subtracted from the stamps, seconds, and the poses that were interpolated.
     """
     stamps_s = known.stamps_s if found.stamps_s is None else found.stamps_s
     start_s = 0.0
@@ -253,7 +248,6 @@ def _pose_pictures(found: _Pictures, known: PoseTable) -> tuple[Shots, float, ti
 def _interpolated(
     stamps_s: Float[np.ndarray, " n"], known: PoseTable
 ) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], timeline.Trajectory | None]:
-    """Return where a pose is known, the poses there (NaN elsewhere), and all of them."""
     trajectory = known.trajectory(layout.POSES)
     covered, world_from_camera = np.zeros(len(stamps_s), bool), np.full((len(stamps_s), 4, 4), np.nan)
     if trajectory is not None:
@@ -262,8 +256,5 @@ def _interpolated(
     if not covered.all():
         lost = int((~covered).sum())
         span = "none" if trajectory is None else "{:.2f} to {:.2f} s".format(*trajectory.stamps_s[[0, -1]])
-        note(
-            f"{lost} of {len(stamps_s)} frame(s) lie outside the poses of {layout.POSES} ({span}) or in a gap of them; "
-            "left out."
-        )
+        note(f"{lost} of {len(stamps_s)} frame(s) lie outside {layout.POSES} ({span}) or in a gap of it; left out.")
     return covered, world_from_camera, trajectory

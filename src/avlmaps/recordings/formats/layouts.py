@@ -14,6 +14,28 @@ hov-sg: VLMaps and HOV-SG, ``pose/N.txt``: seven numbers are VLMaps' (the robot'
     degrees where no file says otherwise.
 redwood: Redwood, Open3D: five lines a pose, three whole numbers and a matrix; millimetres; a PrimeSense by default;
     names such as ``00012-000000366849.jpg`` carry microseconds; up is not known.
+
+The AVLMaps/VLMaps dataset layout: ``poses.txt``, ``rgb/%06d.png``, ``depth/%06d.npy`` (or 16-bit PNG, mm).
+
+Frames of reference. Poses in the files are in the simulator's world W (x right, y up, z backward). ``T`` turns its
+axes to x forward, y left, z up: (x, y, z) becomes (-z, -x, y). **The world of the recordings opened here is T W: the
+simulator's world with its axes turned and the same origin**, so z is up and a place (x, y, z) of ours is the
+simulator's (-y, z, -x). Of a pose P_i in the files we make
+
+    mobile_base   world_from_camera_i = T P_i C     P_i is the robot's base, C = base_from_camera: the camera at
+                                                    [0, 1.5, 0] in the base, turned by diag(1, -1, -1)
+    camera_base   world_from_camera_i = T P_i       P_i is the camera itself (x right, y down, z forward)
+
+The reference's maps have another origin, the first base pose: with B_i = T P_i T⁻¹ (``base_poses``) a point of ours
+is at B_0⁻¹ p in them (``reference_map_from_world``).
+
+Which of the two the poses are shows in them: the base's y axis points up, the camera's points down. ``camera.json``
+beside ``poses.txt``, every field of which may be left out, overrides what is assumed:
+
+    {"pose_type": "mobile_base", "camera_height_m": 1.5, "fx": 540, "fy": 540, "cx": 540, "cy": 360, "rate_hz": 25}
+
+The sequences below ``audio_video/`` open as well: 25 frames/s, colour without depth, the first of their
+``output_level_N.wav`` as sound track.
 """
 
 import os
@@ -22,7 +44,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -32,21 +54,18 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES
+from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.corrections import from_opengl
 from avlmaps.recordings.faults import note, report
-from avlmaps.recordings.formats import avlmaps_layout
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, opener, sizes, whole_frames
-from avlmaps.recordings.formats.tables import (
-    as_poses,
-    fitted_rig,
-    note_resized,
-    note_unread,
-    pinhole,
-    read_json,
-    read_matrix,
-    read_numbers,
-    read_poses,
-    text_lines,
+from avlmaps.recordings.formats import tables
+from avlmaps.recordings.formats.file_recording import (
+    FileRecording,
+    Shots,
+    list_names,
+    open_audio,
+    opener,
+    sizes,
+    whole_frames,
 )
 from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES, first_picture_size
 from avlmaps.recordings.open import why_unreadable
@@ -76,7 +95,6 @@ class Pattern:
     name: str
 
     def files(self, path: Path) -> dict[int, str]:
-        """Return the files below a recording's folder by their numbers, in the order of these."""
         inside = path / self.folder if self.folder else path
         found = [(re.fullmatch(self.name, name, re.IGNORECASE), name) for name in list_names(inside, ("",))]
         below = f"{self.folder}/" if self.folder else ""
@@ -85,14 +103,9 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A layout of folders.
+    """A layout of folders: ``poses`` gives poses by number, NaN where there is none, and the file of each, of a folder.
 
-    Attributes:
-        name: of the format.
-        colour: the colour pictures; depth: the depth pictures.
-        poses: gives the poses by number, NaN where there is none, and the file of each, of a folder.
-        cameras: gives the cameras of some shots.
-        up: direction against gravity in the poses' world; None where it is not known.
+    ``up`` is the direction against gravity in the poses' world; None where it is not known.
     """
 
     name: str
@@ -132,6 +145,120 @@ def _digits(file: str) -> str:
     return found[-1] if found else Path(file).stem
 
 
+# The data set of AVLMaps and VLMaps
+
+HABITAT_RATE_HZ = 25.0
+CAMERA_HEIGHT_M = 1.5
+# T: rows are the base's forward, left and up axes in the simulator's world.
+WORLD_FROM_HABITAT = np.array(
+    [[0.0, 0.0, -1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+)
+
+
+class CameraFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """The content of ``camera.json``; what is left out is taken from the published data set."""
+
+    pose_type: Literal["mobile_base", "camera_base"] | None = None
+    camera_height_m: float = CAMERA_HEIGHT_M
+    fx: float | None = None
+    fy: float | None = None
+    cx: float | None = None
+    cy: float | None = None
+    rate_hz: float = HABITAT_RATE_HZ
+
+
+def base_from_camera(camera_height_m: float = CAMERA_HEIGHT_M) -> Float[np.ndarray, "4 4"]:
+    """Return the camera's pose in the robot's base (x right, y up, z backward)."""
+    camera = np.diag([1.0, -1.0, -1.0, 1.0])
+    camera[1, 3] = camera_height_m
+    return camera
+
+
+def base_poses(habitat_from_base: Float[np.ndarray, "*n 4 4"]) -> Float[np.ndarray, "*n 4 4"]:
+    """Return the robot's poses with x forward, y left, z up: B_i = T P_i T⁻¹, both base and world being turned."""
+    return WORLD_FROM_HABITAT @ habitat_from_base @ poses.inverse(WORLD_FROM_HABITAT)
+
+
+def reference_map_from_world(first_habitat_from_base: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
+    """Return the transform from a recording's world to the reference's map frame, whose origin is the first base."""
+    return poses.inverse(base_poses(first_habitat_from_base))
+
+
+def read_habitat_poses(path: Path) -> Float[np.ndarray, "n 4 4"]:
+    """Read ``poses.txt``: a line holds px py pz qx qy qz qw, or a 4x4 matrix row by row."""
+    return tables.read_poses(path, (7, 16)).pose
+
+
+@opener
+def open_avlmaps(path: Path) -> FileRecording:
+    """Open a scene of the data set, or one of its ``audio_video`` sequences, in place."""
+    given = read_camera_file(path / "camera.json")
+    if not os.path.lexists(path / "camera.json"):
+        note(f"The stamps are counted at {HABITAT_RATE_HZ:g} frames/s, since poses.txt has none.")
+    habitat_from_body = read_habitat_poses(path / "poses.txt")
+    colour = _numbered(path / "rgb", (".png", ".jpg"))
+    depth = _numbered(path / "depth", (".npy", ".png")) if (path / "depth").is_dir() else {}
+    lines = dict(enumerate(habitat_from_body))
+    numbers = whole_frames(path, colour=colour, **({"depth": depth} if depth else {}), line_of_poses=lines)
+    if not depth:
+        note("There is no depth, so only sounds and views can be mapped.")
+    world_from_camera = camera_poses(habitat_from_body[numbers], given)
+    shots = Shots(
+        names=[f"{number:06d}" for number in numbers],
+        colour=[f"rgb/{colour[number]}" for number in numbers],
+        depth=[f"depth/{depth[number]}" for number in numbers] if depth else [],
+        stamps_s=np.array(numbers, np.float64) / given.rate_hz,
+        world_from_camera=world_from_camera,
+    )
+    rig = rig_of(path, shots, given)
+    level = next(iter(sorted(path.glob("output_level_*.wav"))), None)
+    audio = AudioTrack.open(level) if level else open_audio(path)
+    return FileRecording.settled(
+        path, "avlmaps", rig, shots, lambda _: path / "poses.txt",
+        up_in_world=np.array([0.0, 0.0, 1.0]), audio=audio,
+    )  # fmt: skip
+
+
+def _numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, str]:
+    stems = [(name.split(".", 1)[0], name) for name in list_names(folder, suffixes)]
+    return {int(stem): name for stem, name in stems if stem.isascii() and stem.isdigit()}
+
+
+def read_camera_file(path: Path) -> CameraFile:
+    """Return the content of ``camera.json``, or the defaults where there is none."""
+    if not os.path.lexists(path):
+        return CameraFile()
+    given, _ = tables.read_json(path, CameraFile, DESCRIPTION_BYTES)
+    if not given.rate_hz > 0.0:
+        raise RecordingError(f"{path}: rate_hz is {given.rate_hz}; it must be positive.")
+    return given
+
+
+def camera_poses(habitat_from_body: Float[np.ndarray, "n 4 4"], given: CameraFile) -> Float[np.ndarray, "n 4 4"]:
+    """Turn poses as they stand in the file into the camera's poses in our world, and note what they are taken for."""
+    pose_type, how = given.pose_type, "as camera.json says"
+    if pose_type is None:
+        upward = habitat_from_body[np.isfinite(habitat_from_body[:, 1, 1]), 1, 1]
+        pose_type = "camera_base" if len(upward) and np.median(upward) < 0.0 else "mobile_base"
+        how = f"their y axis points {'down' if pose_type == 'camera_base' else 'up'}"
+    if pose_type == "camera_base":
+        note(f"The poses are taken for the camera's own ({how}).")
+        return WORLD_FROM_HABITAT @ habitat_from_body
+    note(f"The poses are taken for the robot's base ({how}), with the camera {given.camera_height_m:g} m above it.")
+    return WORLD_FROM_HABITAT @ habitat_from_body @ base_from_camera(given.camera_height_m)
+
+
+def rig_of(path: Path, shots: Shots, given: CameraFile) -> Rig:
+    """Make the camera: 90 degrees of horizontal view, the middle of the picture, unless the file says otherwise."""
+    width, height = first_picture_size(path, shots.colour)
+    fx = given.fx if given.fx is not None else width / 2
+    fy = given.fy if given.fy is not None else fx
+    cx = given.cx if given.cx is not None else width / 2
+    cy = given.cy if given.cy is not None else height / 2
+    rgb = tables.pinhole(path / "camera.json", fx, fy, cx, cy, width, height)
+    return Rig(rgb, rgb.resized(*first_picture_size(path, shots.depth)) if shots.depth else rgb)
+
+
 # Poses
 
 
@@ -140,7 +267,7 @@ def _pose_files(pattern: Pattern, path: Path, numbers: Sequence[int]) -> tuple[P
     found: Poses = {}
     for number, name in files.items():
         try:
-            found[number] = read_matrix(path / name, 4, 4)
+            found[number] = tables.read_matrix(path / name, 4, 4)
         except RecordingError as error:
             found[number] = np.full((4, 4), np.nan)
             if number in numbers:
@@ -150,11 +277,10 @@ def _pose_files(pattern: Pattern, path: Path, numbers: Sequence[int]) -> tuple[P
 
 def _rows(name: str, path: Path, numbers: Sequence[int]) -> tuple[Poses, Callable[[int], Path]]:
     note(_NO_CLOCK)
-    return dict(enumerate(read_poses(path / name, (16,)).pose)), lambda _: path / name
+    return dict(enumerate(tables.read_poses(path / name, (16,)).pose)), lambda _: path / name
 
 
 def _of_robot(path: Path, numbers: Sequence[int]) -> tuple[Poses, Callable[[int], Path]]:
-    """Return the poses of VLMaps' and HOV-SG's files, in a world with z up."""
     files = Pattern("pose", r"(\d+)\.txt").files(path)
     rows = {number: _numbers_of(path / name) for number, name in files.items()}
     lengths = {len(row) for row in rows.values() if len(row)}
@@ -163,11 +289,9 @@ def _of_robot(path: Path, numbers: Sequence[int]) -> tuple[Poses, Callable[[int]
             f"The files of {path / 'pose'} hold {' and '.join(map(str, sorted(lengths)))} numbers; each is a pose of "
             "seven (x y z qx qy qz qw) or sixteen (a matrix)."
         )
-    pose = np.stack([as_poses(row[None])[0] if len(row) else np.full((4, 4), np.nan) for row in rows.values()])
-    if lengths == {7}:
-        pose = avlmaps_layout.camera_poses(pose, avlmaps_layout.read_camera_file(path / "camera.json"))
-    else:
-        pose = _of_matrices(pose)
+    pose = np.stack([tables.as_poses(row[None])[0] if len(row) else np.full((4, 4), np.nan) for row in rows.values()])
+    of_base = lengths == {7}
+    pose = camera_poses(pose, read_camera_file(path / "camera.json")) if of_base else _of_matrices(pose)
     note(_NO_CLOCK)
     return dict(zip(rows, pose, strict=True)), lambda number: path / files[number]
 
@@ -179,18 +303,18 @@ def _of_matrices(pose: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "n 4 4"]
     begins_there = len(usable) > 0 and np.allclose(usable[0], np.eye(4), atol=1e-3)
     if axis == 1 and down[1] > 0.0 and not begins_there:  # y up in Habitat's world, and in the camera
         note("The poses are taken for those of a camera with y up that looks along -z, as HOV-SG's (y points up).")
-        return avlmaps_layout.WORLD_FROM_HABITAT @ from_opengl(pose)
+        return WORLD_FROM_HABITAT @ from_opengl(pose)
     turned = "turned so that z is up" if axis == 1 else "in a world with z up"
     note(f"The poses are taken for those of a camera with y down, {turned}.")
     if axis == 1:
         turn = np.diag([1.0, -1.0, -1.0, 1.0] if down[1] > 0.0 else [1.0] * 4)
-        return avlmaps_layout.WORLD_FROM_HABITAT @ turn @ pose
+        return WORLD_FROM_HABITAT @ turn @ pose
     return pose
 
 
 def _numbers_of(file: Path) -> Float[np.ndarray, " n"]:
     try:
-        return read_numbers(file)
+        return tables.read_numbers(file)
     except RecordingError as error:
         report(str(error), file)
         return np.zeros(0)
@@ -200,7 +324,6 @@ def _numbers_of(file: Path) -> Float[np.ndarray, " n"]:
 
 
 def _kinect(path: Path, shots: Shots) -> Cameras:
-    """Return the cameras of camera-intrinsics.txt, or of the Kinect of 7-Scenes where there is none."""
     rgb_size, depth_size = sizes(path, shots)
     places = (path / "camera-intrinsics.txt", path.parent / "camera-intrinsics.txt")
     file = next((place for place in places if place.is_file()), None)
@@ -208,8 +331,8 @@ def _kinect(path: Path, shots: Shots) -> Cameras:
         note("There is no camera-intrinsics.txt; those of 7-Scenes are assumed (focal length 585 at 640x480).")
         depth = Pinhole(585.0, 585.0, 320.0, 240.0, 640, 480).resized(*depth_size)
     else:
-        k = read_matrix(file, 3, 3).tolist()
-        depth = pinhole(file, k[0][0], k[1][1], k[0][2], k[1][2], *depth_size)
+        k = tables.read_matrix(file, 3, 3).tolist()
+        depth = tables.pinhole(file, k[0][0], k[1][1], k[0][2], k[1][2], *depth_size)
     if depth_size == (640, 480) and depth.fx == depth.fy == 585.0:
         colour = Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480).resized(*rgb_size)
         note("The intrinsics are a Kinect's depth camera's (585); for the colour camera 525 is used; it fits better.")
@@ -237,7 +360,6 @@ class _ReplicaCamera(msgspec.Struct, frozen=True):
 
 
 def _replica(path: Path, shots: Shots) -> Cameras:
-    """Return the camera of cam_params.json (in a section of its own, or at the top), or of the published scenes."""
     rgb_size, depth_size = sizes(path, shots)
     places = (path / "cam_params.json", path.parent / "cam_params.json")
     file = next((place for place in places if os.path.lexists(place)), None)
@@ -245,16 +367,16 @@ def _replica(path: Path, shots: Shots) -> Cameras:
     if file is None:
         note("There is no cam_params.json; the camera of the published scenes is assumed.")
     else:
-        plain = read_json(file, dict, DESCRIPTION_BYTES)[1]
+        plain = tables.read_json(file, dict, DESCRIPTION_BYTES)[1]
         section = next((name for name in ("camera", "cam", "camera_params") if isinstance(plain.get(name), dict)), "")
         if section:
-            note_unread(file, plain, (section,))
+            tables.note_unread(file, plain, (section,))
         numbers = {}
         for key, value in (plain[section] if section else plain).items():
             name = _REPLICA_NAMES.get(key, key)
             if numbers.setdefault(name, value) != value:
                 raise RecordingError(f"{file} has {name} twice, as {numbers[name]} and as {value}; remove one of them.")
-        note_unread(file, numbers, (*_ReplicaCamera.__struct_fields__, *_REPLICA_IDLE))
+        tables.note_unread(file, numbers, (*_ReplicaCamera.__struct_fields__, *_REPLICA_IDLE))
     try:
         given = msgspec.convert(numbers, _ReplicaCamera)
     except msgspec.ValidationError as error:
@@ -265,7 +387,7 @@ def _replica(path: Path, shots: Shots) -> Cameras:
     if given.scale is None:
         note(f"cam_params.json has no scale of depth; {scale:g} units a metre are assumed.")
     size = (given.w or rgb_size[0], given.h or rgb_size[1])
-    camera = pinhole(file or path, given.fx, given.fy, given.cx + 0.5, given.cy + 0.5, *size)
+    camera = tables.pinhole(file or path, given.fx, given.fy, given.cx + 0.5, given.cy + 0.5, *size)
     return Cameras(Rig(camera.resized(*rgb_size), camera.resized(*depth_size)), scale)
 
 
@@ -275,19 +397,19 @@ def _scannet(path: Path, shots: Shots) -> Cameras:
     rgb = _centred(inside / "intrinsic_color.txt", rgb_size, (1296, 968))
     depth = _centred(inside / "intrinsic_depth.txt", depth_size, (640, 480))
     body_from_rgb, body_from_depth = (
-        poses.orthonormalize(read_matrix(file, 4, 4), str(file)) if file.is_file() else np.eye(4)
+        poses.orthonormalize(tables.read_matrix(file, 4, 4), str(file)) if file.is_file() else np.eye(4)
         for file in (inside / "extrinsic_color.txt", inside / "extrinsic_depth.txt")
     )
     return Cameras(Rig(rgb, depth, poses.inverse(body_from_rgb) @ body_from_depth))
 
 
 def _centred(file: Path, size: tuple[int, int], own_size: tuple[int, int]) -> Pinhole:
-    k = read_matrix(file, 4, 4).tolist()
+    k = tables.read_matrix(file, 4, 4).tolist()
     for width, height in (size, own_size):
-        camera = pinhole(file, k[0][0], k[1][1], k[0][2] + 0.5, k[1][2] + 0.5, width, height)
+        camera = tables.pinhole(file, k[0][0], k[1][1], k[0][2] + 0.5, k[1][2] + 0.5, width, height)
         # A principal point is at most this share of the picture's size away from its middle.
         if max(abs(camera.cx / width - 0.5), abs(camera.cy / height - 0.5)) <= 0.15:
-            note_resized(camera, size)
+            tables.note_resized(camera, size)
             return camera.resized(*size)
     raise RecordingError(
         f"{file} has its centre at {k[0][2]:.1f}, {k[1][2]:.1f}, but the pictures are {size[0]}x{size[1]}; were they "
@@ -300,10 +422,10 @@ def _robot_camera(path: Path, shots: Shots) -> Cameras:
         return _scannet(path, shots)
     if any(os.path.lexists(path / name) for name in _OPEN3D):
         return _open3d(path, shots)
-    given = avlmaps_layout.read_camera_file(path / "camera.json")
+    given = read_camera_file(path / "camera.json")
     if given.fx is None:
         note("No file says the camera; a view of 90 degrees is assumed (camera.json: fx fy cx cy).")
-    return Cameras(avlmaps_layout.rig_of(path, shots, given))
+    return Cameras(rig_of(path, shots, given))
 
 
 _OPEN3D = ("intrinsic.json", "camera_intrinsic.json", "intrinsics.json", "camera_primesense.json")
@@ -324,8 +446,8 @@ def _open3d(path: Path, shots: Shots) -> Cameras:
     if file is None:
         note("There is no intrinsic.json; a PrimeSense is assumed (focal length 525 at 640x480), as Open3D does.")
         return fitted_cameras(path, shots, Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480), path, 1000.0)
-    given, plain = read_json(file, _Open3dCamera)
-    note_unread(file, plain, (*_Open3dCamera.__struct_fields__, *_OPEN3D_IDLE))
+    given, plain = tables.read_json(file, _Open3dCamera)
+    tables.note_unread(file, plain, (*_Open3dCamera.__struct_fields__, *_OPEN3D_IDLE))
     k = given.intrinsic_matrix
     if len(k) != 9 or not given.depth_scale > 0.0:
         raise RecordingError(
@@ -334,14 +456,14 @@ def _open3d(path: Path, shots: Shots) -> Cameras:
         )
     if k[6] == k[7] == 0.0:  # written by hand, row by row
         k = [k[i] for i in (0, 3, 6, 1, 4, 7, 2, 5, 8)]
-    camera = pinhole(file, k[0], k[4], k[6] + 0.5, k[7] + 0.5, given.width, given.height)
-    note_resized(camera, first_picture_size(path, shots.colour))
+    camera = tables.pinhole(file, k[0], k[4], k[6] + 0.5, k[7] + 0.5, given.width, given.height)
+    tables.note_resized(camera, first_picture_size(path, shots.colour))
     return fitted_cameras(path, shots, camera, file, given.depth_scale)
 
 
 def fitted_cameras(path: Path, shots: Shots, camera: Pinhole, file: Path, units_per_m: float) -> Cameras:
     """Return one camera for colour and depth, at the size that each has."""
-    return Cameras(fitted_rig(camera, *sizes(path, shots), file), units_per_m)
+    return Cameras(tables.fitted_rig(camera, *sizes(path, shots), file), units_per_m)
 
 
 _LAYOUTS = (
@@ -433,14 +555,13 @@ def open_redwood(path: Path) -> FileRecording:
 
 
 def _by_number(names: list[str]) -> dict[int, str]:
-    """Return files by the first number in their names; in order where these do not tell them apart."""
     found = {int(match.group(1)): name for name in names if (match := re.match(r"\D*(\d+)", name))}
     return found if len(found) == len(names) else dict(enumerate(names))
 
 
 def _read_log(file: Path) -> tuple[list[int], Float[np.ndarray, "n 4 4"]]:
     """Read the numbers and the matrices of a log, which must be whole: after a lost line every pose is another's."""
-    lines = [(number, text.split()) for number, text in text_lines(file)]
+    lines = [(number, text.split()) for number, text in tables.text_lines(file)]
     wrong = next((number for at, (number, words) in enumerate(lines) if len(words) != (4 if at % 5 else 3)), None)
     try:
         if wrong is not None or len(lines) % 5:
@@ -449,7 +570,7 @@ def _read_log(file: Path) -> tuple[list[int], Float[np.ndarray, "n 4 4"]]:
         rows = [[float(word) for word in words] for at, (_, words) in enumerate(lines) if at % 5]
     except ValueError as error:
         raise RecordingError(
-            f"{file} is not three whole numbers and a matrix of four lines for each pose ({error}); is it cut off?"
+            f"{file} is not a line of three numbers and a matrix for each pose ({error}); is it cut off?"
         ) from None
     return ids, np.array(rows, np.float64).reshape(-1, 4, 4)
 

@@ -22,6 +22,7 @@ from avlmaps.core import timeline
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.faults import note
+from avlmaps.recordings.formats import tables
 from avlmaps.recordings.formats.file_recording import (
     FileRecording,
     Shots,
@@ -32,16 +33,6 @@ from avlmaps.recordings.formats.file_recording import (
     whole_frames,
 )
 from avlmaps.recordings.formats.layouts import Z_UP, Cameras, Poses, fitted_cameras
-from avlmaps.recordings.formats.tables import (
-    DISTORTED,
-    NAMED_FILE,
-    PoseTable,
-    note_resized,
-    pinhole,
-    read_list,
-    read_opencv_yaml,
-    read_poses,
-)
 from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES
 from avlmaps.recordings.plausible import date_fault, pace_fault, repeat_fault
 
@@ -124,7 +115,6 @@ def open_orb_slam(path: Path) -> FileRecording:
 def _timed(
     path: Path, name: str, stamps_s: Float[np.ndarray, " n"], files: list[tuple[str, str]], start_s: float
 ) -> FileRecording:
-    """Return the recording of pictures with stamps, whose poses lie in a table with stamps."""
     file = find_trajectory(path) or path / TRAJECTORIES[0]
     trajectory = _trajectory(file)
     known_s = trajectory.stamps_s
@@ -155,8 +145,7 @@ def _timed(
 
 
 def _stream(path: Path) -> _Stream:
-    """Read a list of ``stamp file``, in the order of time."""
-    rows = read_list(path, NAMED_FILE[::-1])
+    rows = tables.read_list(path, tables.NAMED_FILE[::-1])
     stamps, files = [row[0] for row in rows], [row[1] for row in rows]
     if not files:
         raise RecordingError(f"{path} lists no picture, so there is nothing to map.")
@@ -169,7 +158,7 @@ def _stream(path: Path) -> _Stream:
 
 
 def _trajectory(path: Path) -> timeline.Trajectory:
-    found = read_poses(path).trajectory(path.name)
+    found = tables.read_poses(path).trajectory(path.name)
     assert found is not None
     note(*timeline.gap_notices(found.stamps_s, f"poses in {path.name}"))
     return found
@@ -193,8 +182,7 @@ def _tum_camera(path: Path, shots: Shots) -> tuple[Cameras, Float[np.ndarray, "3
 
 
 def _orb_camera(file: Path, size: tuple[int, int]) -> tuple[Pinhole, float] | None:
-    """Return the camera of ORB-SLAM's settings, and units of depth; None where the file has none."""
-    settings = read_opencv_yaml(file)
+    settings = tables.read_opencv_yaml(file)
 
     def number(*names: str) -> float | None:
         nodes = (settings.getNode(f"{part}.{name}") for part in ("Camera", "Camera1") for name in names)
@@ -208,16 +196,16 @@ def _orb_camera(file: Path, size: tuple[int, int]) -> tuple[Pinhole, float] | No
     if not units > 0.0:
         raise RecordingError(f"{file} has the DepthMapFactor {units}; it must be positive: 1000 for millimetres.")
     width, height = number("width") or size[0], number("height") or size[1]
-    camera = pinhole(file, fx, fy, cx + 0.5, cy + 0.5, round(width), round(height))
-    note_resized(camera, size)
+    camera = tables.pinhole(file, fx, fy, cx + 0.5, cy + 0.5, round(width), round(height))
+    tables.note_resized(camera, size)
     if any(abs(number(name) or 0.0) > 1e-9 for name in ("k1", "k2", "p1", "p2", "k3")):
-        note(DISTORTED)
+        note(tables.DISTORTED)
     return camera, units
 
 
 def _associations(file: Path) -> list[tuple[float, str, str]]:
     """Return (stamp or number, colour file, depth file) of each line, which may name either first."""
-    found = read_list(file, ("stamp_s", "name", "stamp_s", "name"))
+    found = tables.read_list(file, ("stamp_s", "name", "stamp_s", "name"))
     return [(row[2], row[3], row[1]) if "depth" in row[1] else (row[0], row[1], row[3]) for row in found]
 
 
@@ -253,7 +241,7 @@ def open_icl_nuim(path: Path) -> FileRecording:
 
 
 def _freiburg(file: Path) -> Poses:
-    table = read_poses(file)
+    table = tables.read_poses(file)
     rows = np.flatnonzero(table.usable)
     return dict(zip(table.stamps_s[rows].astype(int).tolist(), table.pose[rows], strict=True))
 
@@ -284,7 +272,7 @@ def open_rtabmap_export(path: Path) -> FileRecording:
             "`rtabmap-export --images --poses --poses_camera`."
         )
     camera, base_from_camera = _exported_camera(path / f"{name}_calib" / files["calib"][0])
-    table = read_poses(file, (8, 9, 12))
+    table = tables.read_poses(file, (8, 9, 12))
     pose = table.pose
     if file.name.endswith("_poses.txt") and not file.name.endswith("camera_poses.txt"):
         pose = pose @ base_from_camera
@@ -307,7 +295,7 @@ def open_rtabmap_export(path: Path) -> FileRecording:
 
 
 def _exported_rows(
-    path: Path, stems: Sequence[str], table: PoseTable
+    path: Path, stems: Sequence[str], table: tables.PoseTable
 ) -> tuple[list[tuple[int, int]], Float[np.ndarray, " k"]]:
     keys = np.array([float(stem) if re.fullmatch(r"\d+(\.\d+)?", stem) else np.nan for stem in stems])
     for own in (table.stamps_s, table.ids) if table.stamped else ():
@@ -327,7 +315,7 @@ def _exported_rows(
 
 
 def _exported_camera(file: Path) -> tuple[Pinhole, Float[np.ndarray, "4 4"]]:
-    content = read_opencv_yaml(file)
+    content = tables.read_opencv_yaml(file)
 
     def matrix(name: str) -> list[float]:
         node = content.getNode(name)
@@ -341,4 +329,4 @@ def _exported_camera(file: Path) -> tuple[Pinhole, Float[np.ndarray, "4 4"]]:
     base_from_camera = np.eye(4)
     if len(local) == 12:
         base_from_camera[:3] = np.array(local).reshape(3, 4)
-    return pinhole(file, k[0], k[4], k[2] + 0.5, k[5] + 0.5, size[0], size[1]), base_from_camera
+    return tables.pinhole(file, k[0], k[4], k[2] + 0.5, k[5] + 0.5, size[0], size[1]), base_from_camera

@@ -134,7 +134,6 @@ def _rows(message: Any, dtype: np.dtype, channels: int, name: str) -> np.ndarray
 
 
 def _decoded(content: Any, name: str, camera: Pinhole | None, colour: bool) -> np.ndarray:
-    """Decode a compressed picture whose header was compared with the camera before."""
     import cv2
 
     flag = cv2.IMREAD_COLOR if colour else cv2.IMREAD_UNCHANGED
@@ -148,9 +147,7 @@ def _decoded(content: Any, name: str, camera: Pinhole | None, colour: bool) -> n
         )
     picture = decode_picture(raw, flag) if size is not None else None
     if picture is None:
-        raise RecordingError(
-            f"The compressed picture {name} ({len(raw)} bytes) cannot be decoded; it is cut short or damaged."
-        )
+        raise RecordingError(f"The compressed picture {name} ({len(raw)} bytes) is cut short or damaged.")
     return picture
 
 
@@ -182,12 +179,8 @@ def is_rectified(topic: str) -> bool:
 def camera_of(info: Any, name: str, rectified: bool = False) -> tuple[Pinhole, bool]:
     """Return the camera of a CameraInfo, and whether it has distortion that a pinhole leaves out.
 
-    ROS counts pixel centres as whole numbers; ours lie at +0.5.
-
-    Args:
-        info: the message.
-        name: its topic, for sentences.
-        rectified: whether the images are: they are those of the matrix P, without distortion, not of K.
+    ROS counts pixel centres as whole numbers; ours lie at +0.5. Rectified images are those of the matrix P, without
+    distortion, not of K.
     """
     k = np.asarray(getattr(info, "k", None) if hasattr(info, "k") else info.K, np.float64)
     d = np.asarray(getattr(info, "d", None) if hasattr(info, "d") else info.D, np.float64)
@@ -195,9 +188,7 @@ def camera_of(info: Any, name: str, rectified: bool = False) -> tuple[Pinhole, b
     of_p = p.shape == (12,) and p[0] > 0 and p[5] > 0  # drivers that rectify nothing leave P empty
     fx, fy, cx, cy = (p[0], p[5], p[2], p[6]) if of_p else (k[0], k[4], k[2], k[5])
     if not (k.shape == (9,) and fx > 0 and fy > 0 and info.width > 0 and info.height > 0):
-        raise RecordingError(
-            f"The camera calibration {name} is empty (K = {k.tolist()}); name a calibrated camera's topics."
-        )
+        raise RecordingError(f"The camera calibration {name} is empty (K = {k.tolist()}); name a calibrated one.")
     try:
         camera = Pinhole(fx, fy, cx + 0.5, cy + 0.5, int(info.width), int(info.height))
     except ValueError as error:
@@ -269,8 +260,6 @@ class RosTopics:
     """Topics by name; empty ones are found by type.
 
     Attributes:
-        rgb: colour images (raw or compressed).
-        depth: depth images (raw or compressedDepth), or point clouds.
         pose: odometry, poses of the camera or the body, transforms, or a file of poses; empty: /tf first.
         audio: audio data; ``none`` leaves the sound out.
         audio_pcm: no topic: ``16000,1`` says that audio data are plain 16-bit samples, 16,000 a second, in one channel.

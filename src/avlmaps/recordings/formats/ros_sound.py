@@ -48,25 +48,18 @@ _USUAL_CHANNELS = (1, 2, 4, 6, 7, 8, 3, 16)
 _FITS, _AGREES, _FEWEST_MESSAGES, _SHORTEST_S = 0.04, 1.25, 8, 1.0
 # A clock that is this far from the pictures' is worth a notice.
 _APART_S = 0.5
-DIRECTION_TYPES = (
-    *(f"std_msgs/msg/{name}" for name in ("Int32", "Int16", "Float32", "Float64")),
-    "geometry_msgs/msg/PoseStamped",
-)
+_NUMBERS = tuple(f"std_msgs/msg/{name}" for name in ("Int32", "Int16", "Float32", "Float64"))
+DIRECTION_TYPES = (*_NUMBERS, "geometry_msgs/msg/PoseStamped")
 BEYOND_A_TURN_RAD = 2.0 * np.pi + 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class PictureClock:
-    """Turns the times at which a bag received messages into seconds of the recording.
+    """Turns the times at which a bag received messages into seconds of the recording, which begins at ``start_s``.
 
     Pictures carry stamps, and a bag notes when it received them. In simulation, and where a bag is replayed into
-    another, the two are different clocks; what has no stamp of its own is placed as the pictures around it are.
-
-    Attributes:
-        apart_s: by how much the pictures' stamps are ahead of the times at which they were received, their median.
-        first_s: the first of their stamps.
-        last_s: the last.
-        start_s: the stamp at which the recording begins.
+    another, the two are different clocks; what has no stamp of its own is placed as the pictures around it are, whose
+    stamps are ``apart_s`` ahead (their median) and go from ``first_s`` to ``last_s``.
     """
 
     apart_s: float
@@ -76,7 +69,6 @@ class PictureClock:
 
     @classmethod
     def of(cls, received_ns: np.ndarray, stamps_s: Float[np.ndarray, " n"], start_s: float) -> "PictureClock":
-        """Return the clock of pictures in any order."""
         apart_s = float(np.median(stamps_s - received_ns * 1e-9))
         return cls(apart_s, float(stamps_s.min()), float(stamps_s.max()), start_s)
 
@@ -85,7 +77,6 @@ class PictureClock:
         return received_s + self.apart_s - self.start_s
 
     def of_stamps(self, stamps_s: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        """Return the recording's time of messages with stamps."""
         return stamps_s - self.start_s
 
     def overlaps(self, times_s: Float[np.ndarray, " k"]) -> bool:
@@ -103,7 +94,6 @@ class Pcm:
 
     @classmethod
     def parse_rate(cls, words: str) -> "Pcm":
-        """Read ``16000`` or ``16000,2`` (samples a second, channels)."""
         rate, _, channels = words.partition(",")
         if not (rate.strip().isdecimal() and (not channels or channels.strip().isdecimal())):
             raise RecordingError(f"audio_pcm takes samples a second and channels, such as 16000,1; not {words!r}.")
@@ -111,7 +101,6 @@ class Pcm:
 
     @classmethod
     def check_rate(cls, rate_hz: int, channels: int, what: str) -> "Pcm":
-        """Return the numbers, or raise ``RecordingError`` where no sound has them."""
         if not (LOWEST_RATE_HZ <= rate_hz <= _HIGHEST_RATE_HZ and 1 <= channels <= _MOST_CHANNELS):
             raise RecordingError(
                 f"{what} says {rate_hz} samples a second and {channels} channel(s), which no sound has; name the right "
@@ -122,12 +111,9 @@ class Pcm:
 
 @dataclass(frozen=True, slots=True)
 class SoundTopic:
-    """The sound messages of a bag; they are read twice: for their times, and for what they hold.
+    """The sound messages of a bag, which are read twice: for their times, and for what they hold.
 
-    Attributes:
-        name: of the topic, for sentences.
-        messages: gives (receive time in ns, AudioData, AudioDataStamped or AudioStamped) from the first on.
-        clock: of the pictures.
+    ``messages`` gives (receive time in ns, AudioData, AudioDataStamped or AudioStamped) from the first on.
     """
 
     name: str
@@ -177,16 +163,8 @@ def silences(
 def extract_audio(sound: SoundTopic, info: Any, folder: Path, pcm: Pcm | None = None) -> AudioTrack | None:
     """Write audio messages into a file: samples as FLAC, a compressed stream (MP3 is the package's default) as it is.
 
-    Where messages are missing the file is silent, so that what follows is still in time.
-
-    Args:
-        sound: the messages and the clock of the pictures.
-        info: the AudioInfo message, or None where the bag has none.
-        folder: where the file goes.
-        pcm: says that the messages are plain 16-bit samples, against AudioInfo if need be.
-
-    Returns:
-        The track, or None where there is none, and why is noted.
+    Where messages are missing the file is silent, so that what follows is still in time. ``info`` is the AudioInfo, and
+    ``pcm`` says that the messages are plain 16-bit samples, against it if need be. Without a track, why is noted.
     """
     first = next(iter(sound.messages()), None)
     if first is None:
@@ -215,7 +193,6 @@ def _messages(sound: SoundTopic) -> Iterator[Any]:
 def _sampled(
     pieces: Callable[[], Iterator[tuple[Pcm, np.ndarray]]], topic: str, folder: Path, times_s: Float[np.ndarray, " n"]
 ) -> AudioTrack:
-    """Write messages of samples, with silence where some are missing."""
     measured = [(len(samples), pcm) for pcm, samples in pieces()]
     pcm, lengths_s = measured[0][1], np.array([count / pcm.rate_hz for count, pcm in measured])
     require_pace(topic, pcm, lengths_s, times_s)
@@ -248,7 +225,6 @@ def _joined(
     silence_s: Float[np.ndarray, " n"],
     pieces: Iterable[Iterable[np.ndarray]],
 ) -> AudioTrack:
-    """Write pieces of sound, each behind so much silence."""
     target, channels = folder / "audio.flac", min(pcm.channels, _FLAC_CHANNELS)
 
     def blocks() -> Iterator[np.ndarray]:
@@ -264,8 +240,7 @@ def _joined(
         first = int(gaps[0])
         note(
             f"{len(gaps)} gap(s) in the sound of {topic}, {silence_s.sum():.4g} s together (the first of "
-            f"{silence_s[first]:.3g} s at {start_s + lengths_s[:first].sum():.2f} s), are filled with silence: its "
-            "messages are missing there."
+            f"{silence_s[first]:.3g} s at {start_s + lengths_s[:first].sum():.2f} s), are filled with silence."
         )
     return AudioTrack.open(target, start_s=start_s, label=topic)
 
@@ -355,12 +330,10 @@ def _compressed(sound: SoundTopic, suffix: str, folder: Path, times_s: Float[np.
 
 
 def _coding_of(sound: SoundTopic, beginning: bytes, said: str, times_s: Float[np.ndarray, " n"]) -> str:
-    """Return the coding of a stream: what AudioInfo says, or what it begins like."""
     if said:
         if not (said.isalnum() and len(said) < 10):
             raise RecordingError(
-                f"The AudioInfo of {sound.name} says that the sound is coded as {said[:20]!r}, which is no coding. "
-                f"{_otherwise()}"
+                f"The AudioInfo of {sound.name} says {said[:20]!r}, which is no coding of sound. {_otherwise()}"
             )
         return said
     for start, coding in _BEGINNINGS.items():

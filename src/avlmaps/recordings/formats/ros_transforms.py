@@ -98,7 +98,6 @@ class TransformTree:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """A sentence for each pair of frames with broken transforms, and for frames with two parents."""
         broken = (
             f"{count} transform(s) from {child!r} to {parent!r} are none (NaN, or no rotation) and left out."
             for (parent, child), count in sorted(self._broken.items())
@@ -111,7 +110,6 @@ class TransformTree:
         return (*broken, *several)
 
     def cycle(self, frame: str) -> str:
-        """Return the frames that go round in a circle above a frame, in words, or nothing."""
         chain = self._chain(frame)
         if not chain or self._edge(chain[-1]).parent not in chain:
             return ""
@@ -124,16 +122,13 @@ class TransformTree:
         return (max(map(min, moving)), min(map(max, moving))) if moving else None
 
     def moves(self, frame: str) -> bool:
-        """Return whether the frame moves relative to its tree's root."""
         return self._carrier(frame) != ""
 
     def root(self, frame: str) -> str:
-        """Return the last ancestor."""
         chain = self._chain(frame)
         return self._edge(chain[-1]).parent if chain else frame.lstrip("/")
 
     def ancestors(self, frame: str) -> list[str]:
-        """Return the frames above a frame, nearest first."""
         return [self._edge(name).parent for name in self._chain(frame)]
 
     def fixed(self, a: str, b: str) -> Float[np.ndarray, "4 4"] | None:
@@ -271,14 +266,7 @@ def _check_pose_topic(bag: Bag, topic: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class CameraMotion:
-    """What moves the camera.
-
-    Attributes:
-        tree: the frames, moved.
-        topic: what moves them.
-        notices: one sentence for each thing that was assumed.
-        z_is_up: whether the world is one of ROS, with z up.
-    """
+    """What moves the camera: frames and topic, what was assumed, and whether the world is one of ROS, with z up."""
 
     tree: TransformTree
     topic: str
@@ -320,10 +308,6 @@ def find_motion(
 
 
 def _tree_of_file(file: Path, camera_frame: str) -> TransformTree:
-    """Return the tree in which a file of poses moves the camera.
-
-    Its columns are stamp tx ty tz qx qy qz qw, as TUM writes them, or what its header says.
-    """
     tree = TransformTree()
     table = read_poses(file)
     for stamp_s, pose in zip(table.stamps_s.tolist(), table.pose, strict=True):
@@ -344,7 +328,7 @@ def body_of(message: Any, topic: str, camera_frame: str, mounts: TransformTree) 
     body = next((name for name in _BASES if name in above), above[-1])
     return (
         body,
-        f"The poses of {topic} do not say of what; they are taken for those of {body!r}, on which the camera is.",
+        f"The poses of {topic} do not say of what; they are taken for those of {body!r}, below the camera.",
     )
 
 

@@ -24,41 +24,18 @@ from avlmaps.core.timeline import associate, in_order
 from avlmaps.core.wording import option
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import note
+from avlmaps.recordings.formats import ros_messages as ros
+from avlmaps.recordings.formats import ros_sound
 from avlmaps.recordings.formats.bags import Bag
 from avlmaps.recordings.formats.file_recording import Shots, StoredRecording, opener
-from avlmaps.recordings.formats.ros_messages import (
-    CLOUD_TYPES,
-    PAIRING_TOLERANCE_S,
-    RosTopics,
-    camera_of,
-    cloud_camera,
-    colour_of,
-    depth_of,
-    depth_of_points,
-    info_beside,
-    is_grey,
-    is_rectified,
-    pair_images,
-    points_of,
-    require_encoding,
-    shared_namespace,
-)
-from avlmaps.recordings.formats.ros_sound import (
-    DIRECTION_TYPES,
-    STAMPED,
-    Pcm,
-    PictureClock,
-    SoundTopic,
-    directions_of,
-    extract_audio,
-)
 from avlmaps.recordings.formats.ros_transforms import TransformTree, base_height, find_motion, is_tf, no_pose, read_tf
+from avlmaps.recordings.images import check_size
 from avlmaps.recordings.plausible import repeat_fault
 
 _IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO_TYPES = ("sensor_msgs/msg/CameraInfo",)
 _AUDIO_INFO_TYPES = ("audio_common_msgs/msg/AudioInfo",)
-_AUDIO_TYPES = ("audio_common_msgs/msg/AudioData", "audio_common_msgs/msg/AudioDataStamped", STAMPED)
+_AUDIO_TYPES = ("audio_common_msgs/msg/AudioData", "audio_common_msgs/msg/AudioDataStamped", ros_sound.STAMPED)
 # A LiDAR turns ten times a second: the nearest picture is at most half a turn away.
 CLOUD_TOLERANCE_S = 0.06
 
@@ -66,37 +43,33 @@ CLOUD_TOLERANCE_S = 0.06
 @opener
 def open_rosbag(path: Path, topics: Mapping[str, str] | None = None, more: Sequence[Path] = ()) -> StoredRecording:
     """Open a ROS 1 ``.bag``, a ROS 2 bag's folder, an ``.mcap`` or a ``.db3`` file, or the files of one walk."""
-    known = [f.name for f in fields(RosTopics)]
+    known = [f.name for f in fields(ros.RosTopics)]
     for name in topics or {}:
         if name not in known:
             raise RecordingError(f"There is no {name!r} among the topics that can be named: {', '.join(known)}.")
     try:
-        return _opened(Bag(Path(path), more), RosTopics(**(topics or {})))
+        return _opened(Bag(Path(path), more), ros.RosTopics(**(topics or {})))
     except (AttributeError, TypeError) as error:  # a message lacks a field, or a topic's name is no text
-        raise RecordingError(
-            f"{path} cannot be read ({error}); its definitions are damaged, or of another version: reindex it."
-        ) from error
+        raise RecordingError(f"{path} cannot be read ({error}); its definitions are damaged: reindex it.") from error
 
 
 @dataclass(eq=False)
 class _Pictures:
-    """Pictures of a bag by their numbers: when each message was received (ns), its stamp (s), and points in cameras."""
-
     bag: Bag
     of_rgb: tuple[str, np.ndarray, np.ndarray]
     of_depth: tuple[str, np.ndarray, np.ndarray]
     camera_from_cloud: np.ndarray | None = None
 
     def colour(self, name: str, camera: Pinhole) -> np.ndarray:
-        return self._fitting(colour_of, self.of_rgb, name, camera)
+        return self._fitting(ros.colour_of, self.of_rgb, name, camera)
 
     def depth(self, name: str, camera: Pinhole) -> np.ndarray:
         moved = self.camera_from_cloud
         if moved is None:
-            return self._fitting(depth_of, self.of_depth, name, camera)
+            return self._fitting(ros.depth_of, self.of_depth, name, camera)
 
         def seen(message: Any, what: str, camera: Pinhole) -> np.ndarray:
-            return depth_of_points(apply(moved[int(name)], points_of(message, what)), camera)
+            return ros.depth_of_points(apply(moved[int(name)], ros.points_of(message, what)), camera)
 
         return self._fitting(seen, self.of_depth, name, camera)
 
@@ -111,24 +84,20 @@ class _Pictures:
         with self.bag.readable(topic):
             what = f"{topic} at {stamp_s:.3f} s"
             picture = decode(self.bag.message_at(topic, received_ns, stamp_s), what, camera)
-        if picture.shape[:2] != (camera.height, camera.width):
-            raise RecordingError(
-                f"The picture {what} is {picture.shape[1]}x{picture.shape[0]}; "
-                f"its calibration says {camera.width}x{camera.height}."
-            )
+        check_size(f"The picture {what}", picture.shape, camera)
         return picture
 
 
-def _opened(bag: Bag, topics: RosTopics) -> StoredRecording:
+def _opened(bag: Bag, topics: ros.RosTopics) -> StoredRecording:
     rgb_topic, depth_topic = _image_topics(bag, topics)
-    of_points = depth_topic in bag.topics_of(CLOUD_TYPES)
+    of_points = depth_topic in bag.topics_of(ros.CLOUD_TYPES)
     transforms, tf_topic = read_tf(bag, rgb_topic, topics.pose if is_tf(bag, topics.pose) else "")
     rig, camera_frame = _read_rig(bag, rgb_topic, depth_topic, transforms.mounts())
     (rgb_s, rgb_ns), (depth_s, depth_ns) = _stamps(bag, rgb_topic), _stamps(bag, depth_topic)
     what = "point clouds" if of_points else "depth images"
     rgb_order, depth_order = in_order(rgb_s, "colour images"), in_order(depth_s, what)
     rgb, depth = rgb_order.index, depth_order.index
-    tolerance_s = CLOUD_TOLERANCE_S if of_points else PAIRING_TOLERANCE_S
+    tolerance_s = CLOUD_TOLERANCE_S if of_points else ros.PAIRING_TOLERANCE_S
     a, b = associate(depth_s[depth], rgb_s[rgb], tolerance_s)
     posed = min(len(rgb) / len(rgb_s), len(depth) / len(depth_s))
     if not topics.depth:
@@ -168,7 +137,7 @@ def _opened(bag: Bag, topics: RosTopics) -> StoredRecording:
     shots = Shots(names, names, names, stamps_s - begins_s, poses[rows])
     used = {"rgb": rgb_topic, "depth": depth_topic, "pose": motion.topic}
     note(*motion.notices, *tree.notices)
-    audio = _sound(bag, topics, PictureClock.of(depth_ns[depth], stamps_s, begins_s), pictures, used)
+    audio = _sound(bag, topics, ros_sound.PictureClock.of(depth_ns[depth], stamps_s, begins_s), pictures, used)
     return StoredRecording.settled(
         bag.path, "rosbag", rig, shots, None,
         pictures=pictures, stored_depth_unit_m=_unit_m(bag.first(depth_topic), of_points), topics=used, audio=audio,
@@ -180,14 +149,14 @@ def _opened(bag: Bag, topics: RosTopics) -> StoredRecording:
 
 
 def _unit_m(message: Any, of_points: bool) -> float:
-    """Return the metres of one unit of depth: 1 for floats, which are metres (REP 118), else a millimetre."""
     encoding = getattr(message, "encoding", None) or getattr(message, "format", "")
-    return 1.0 if of_points or encoding.startswith("32F") else 1e-3
+    return 1.0 if of_points or encoding.startswith("32F") else 1e-3  # floats are metres (REP 118)
 
 
-def _sound(bag: Bag, topics: RosTopics, clock: PictureClock, owner: object, used: dict[str, str]) -> AudioTrack | None:
-    """Return the sound with the directions on a topic; ``used`` gets their topics."""
-    pcm = Pcm.parse_rate(topics.audio_pcm) if topics.audio_pcm else None
+def _sound(
+    bag: Bag, topics: ros.RosTopics, clock: ros_sound.PictureClock, owner: object, used: dict[str, str]
+) -> AudioTrack | None:
+    pcm = ros_sound.Pcm.parse_rate(topics.audio_pcm) if topics.audio_pcm else None
     known = bag.topics_of(_AUDIO_TYPES)
     name = topics.audio or next(iter(known), "none")
     audio: AudioTrack | None = None
@@ -199,17 +168,16 @@ def _sound(bag: Bag, topics: RosTopics, clock: PictureClock, owner: object, used
         weakref.finalize(owner, shutil.rmtree, folder, ignore_errors=True)
         infos = bag.topics_of(_AUDIO_INFO_TYPES)
         info = next((message for topic in infos for _, message in bag.messages(topic)), None)
-        audio = extract_audio(SoundTopic(name, lambda: bag.messages(name), clock), info, folder, pcm)
+        audio = ros_sound.extract_audio(
+            ros_sound.SoundTopic(name, lambda: bag.messages(name), clock), info, folder, pcm
+        )
     if not (topic := topics.directions):
         return audio
-    _require_topic(
-        bag, topic, bag.topics_of(DIRECTION_TYPES), "topic", " of directions (std_msgs numbers or PoseStamped)"
-    )
+    numbers, what = bag.topics_of(ros_sound.DIRECTION_TYPES), " of directions (std_msgs numbers or PoseStamped)"
+    _require_topic(bag, topic, numbers, "topic", what)
     if audio is None:
-        raise RecordingError(
-            f"{bag.path} has no sound, so that the directions on {topic} are of nothing; leave them out."
-        )
-    found = directions_of(topic, lambda: bag.messages(topic), clock)
+        raise RecordingError(f"{bag.path} has no sound, to which the directions on {topic} belong; leave them out.")
+    found = ros_sound.directions_of(topic, lambda: bag.messages(topic), clock)
     found.require_beside(audio.start_s, audio.end_s, f"{bag.path}, {topic}")
     used["directions"] = topic
     return replace(audio, directions=found)
@@ -221,21 +189,20 @@ def _require_topic(bag: Bag, topic: str, known: Sequence[str], what: str, of: st
         raise RecordingError(f"{bag.path} has no {what} {topic!r}{of} (it has: {has}); name one of them.")
 
 
-def _image_topics(bag: Bag, topics: RosTopics) -> tuple[str, str]:
-    images, clouds = bag.topics_of(_IMAGE_TYPES), bag.topics_of(CLOUD_TYPES)
+def _image_topics(bag: Bag, topics: ros.RosTopics) -> tuple[str, str]:
+    images, clouds = bag.topics_of(_IMAGE_TYPES), bag.topics_of(ros.CLOUD_TYPES)
     every = ", ".join(images) or "none"
     for topic, known in ((topics.rgb, images), (topics.depth, [*images, *clouds])):
         if topic and topic not in known:
             raise RecordingError(f"{bag.path} has no image topic {topic!r}; its image topics are: {every}.")
     depths = [topics.depth] if topics.depth else [t for t in images if "depth" in t.lower()]
     colours = [topics.rgb] if topics.rgb else [t for t in images if t not in depths and "depth" not in t.lower()]
-    rgb, depth = pair_images(colours, depths)
+    rgb, depth = ros.pair_images(colours, depths)
     depth = depth or next(iter(clouds), "")
     if not depth or not rgb:
         missing, name = ("depth", "depth") if not depth else ("colour", "rgb")
         raise RecordingError(
-            f"{bag.path} has no topic of {missing} images (image topics: {every}); name it "
-            f"({name}=TOPIC).{_other_topics(bag)}"
+            f"{bag.path} has no {missing} images (it has: {every}); name a topic ({name}=TOPIC).{_other_topics(bag)}"
         )
     return rgb, depth
 
@@ -249,8 +216,8 @@ def _other_topics(bag: Bag) -> str:
 
 def _note_other_cameras(bag: Bag, rgb_topic: str, depth_topic: str) -> None:
     images = [topic for topic in bag.topics_of(_IMAGE_TYPES) if "depth" in topic.lower()]
-    own = shared_namespace(rgb_topic, depth_topic)
-    others = [topic for topic in images if shared_namespace(topic, depth_topic) < max(own, 1)]
+    own = ros.shared_namespace(rgb_topic, depth_topic)
+    others = [topic for topic in images if ros.shared_namespace(topic, depth_topic) < max(own, 1)]
     if others:
         note(
             f"Of several cameras that of {rgb_topic} and {depth_topic} is used; for another name both topics "
@@ -259,10 +226,9 @@ def _note_other_cameras(bag: Bag, rgb_topic: str, depth_topic: str) -> None:
 
 
 def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree) -> tuple[Rig, str]:
-    """Return the cameras, and the depth camera's frame; ``mounts`` links the two."""
     cameras: dict[str, Any] = {}
     frames: dict[str, str] = {}
-    of_points = depth_topic in bag.topics_of(CLOUD_TYPES)
+    of_points = depth_topic in bag.topics_of(ros.CLOUD_TYPES)
     for topic in (rgb_topic,) if of_points else (rgb_topic, depth_topic):
         info_topic = _info_topic(bag, topic)
         if not info_topic and topic == depth_topic:  # drivers that register depth often publish one calibration
@@ -274,19 +240,19 @@ def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree)
         first = bag.first(info_topic)
         if first is None:
             raise RecordingError(f"{bag.path} has no message on {info_topic}, the calibration of {topic}.")
-        cameras[topic], distorted = camera_of(first, info_topic, is_rectified(topic))
+        cameras[topic], distorted = ros.camera_of(first, info_topic, ros.is_rectified(topic))
         if distorted:
-            remedy = "its P is empty" if is_rectified(topic) else "rectified images make a better map"
+            remedy = "its P is empty" if ros.is_rectified(topic) else "rectified images make a better map"
             note(f"{topic} has lens distortion, which a pinhole leaves out; {remedy}.")
         image = bag.first(topic)
-        require_encoding(None if of_points and topic == depth_topic else image, topic, colour=topic == rgb_topic)
-        if topic == rgb_topic and is_grey(image, topic):
+        ros.require_encoding(None if of_points and topic == depth_topic else image, topic, colour=topic == rgb_topic)
+        if topic == rgb_topic and ros.is_grey(image, topic):
             note(f"The pictures of {topic} have no colour (infrared, or grey); colours tell nothing apart.")
         frames[topic] = (image or first).header.frame_id
     if of_points:
         rgb = cameras[rgb_topic]
         note(f"Depth is that of the points of {depth_topic}, as the camera of {rgb_topic} sees them.")
-        return Rig(rgb, cloud_camera(rgb)), frames[rgb_topic]
+        return Rig(rgb, ros.cloud_camera(rgb)), frames[rgb_topic]
     rgb_from_depth = mounts.fixed(frames[rgb_topic], frames[depth_topic])
     if rgb_from_depth is None:
         rgb_from_depth = np.eye(4)
@@ -296,7 +262,7 @@ def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree)
 
 def _info_topic(bag: Bag, image_topic: str) -> str:
     infos = bag.topics_of(_INFO_TYPES)
-    if beside := info_beside(image_topic, infos):
+    if beside := ros.info_beside(image_topic, infos):
         return beside
     image = bag.first(image_topic)
     frame = image.header.frame_id if image else ""
@@ -324,8 +290,7 @@ def _clouds_in_cameras(
     frame = first.header.frame_id if first else ""
     if tree.root(frame) != tree.root(camera_frame):
         raise RecordingError(
-            f"No transform of {bag.path} links the LiDAR {frame!r} of {topic} to the camera {camera_frame!r}; record "
-            "/tf_static with both."
+            f"{bag.path} does not link the LiDAR {frame!r} to the camera {camera_frame!r}; record /tf_static with both."
         )
     world_from_cloud, known = tree.root_from(frame, stamps_s)
     return inverse(world_from_camera) @ world_from_cloud, known

@@ -54,13 +54,11 @@ class _Database:
         wal = path.with_name(path.name + "-wal")
         if wal.is_file() and wal.stat().st_size > 0:
             raise RecordingError(
-                f"{wal} holds changes that were not written into {path.name} yet; close RTAB-Map, or open the "
-                "database in it and close it again."
+                f"{wal} holds changes that are not in {path.name} yet; open it in RTAB-Map and close it again."
             )
 
     @contextmanager
     def told(self) -> Generator[None]:
-        """Turn what SQLite and zlib raise into one sentence."""
         try:
             yield
         except (sqlite3.Error, zlib.error, struct.error, ValueError) as error:
@@ -78,7 +76,6 @@ class _Database:
             return self._local.connection.execute(query, values).fetchall()
 
     def blob(self, column: str, node: str) -> bytes:
-        """Return what a column of a node's data holds."""
         found = self.rows(f"SELECT {column} FROM Data WHERE id = ?", int(node))
         if not found or not isinstance(found[0][0], bytes) or not found[0][0]:
             raise RecordingError(f"Node {node} of {self.path} has no {column}.")
@@ -93,12 +90,9 @@ class _Pictures:
         return images.decode_colour(self._place(name, "colour"), self._database.blob("image", name), camera)
 
     def depth(self, name: str, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
-        depth_m = _unpacked_depth(self._place(name, "depth"), self._database.blob("depth", name))
-        if depth_m.shape != (camera.height, camera.width):
-            raise RecordingError(
-                f"{self._place(name, 'depth')} is {depth_m.shape[1]}x{depth_m.shape[0]}, the others {camera.width}x"
-                f"{camera.height}; every picture of a recording must have one size."
-            )
+        place = self._place(name, "depth")
+        depth_m = _unpacked_depth(place, self._database.blob("depth", name))
+        images.check_size(place, depth_m.shape, camera)
         return depth_m
 
     def _place(self, name: str, what: str) -> Path:
@@ -212,11 +206,8 @@ def _matrix(numbers: np.ndarray) -> Float[np.ndarray, "4 4"]:
 
 
 def _calibration(path: Path, node: int, blob: bytes, version: tuple[int, ...]) -> tuple[Pinhole, Any, bool]:
-    """Return a node's camera, base_from_camera, and whether the pictures are distorted."""
     if version and version < (0, 18):
-        raise RecordingError(
-            f"{path} is of a version of RTAB-Map before 0.18; open it in today's RTAB-Map, which converts it."
-        )
+        raise RecordingError(f"{path} is of RTAB-Map before 0.18; open it in today's, which converts it.")
     head = _HEADER.unpack_from(blob)
     kind, width, height, (k, d, r, p, local) = head[3], head[4], head[5], head[6:]
     if kind == _STEREO:
@@ -225,9 +216,7 @@ def _calibration(path: Path, node: int, blob: bytes, version: tuple[int, ...]) -
         raise ValueError(f"the calibration of node {node} is damaged")
     size = _HEADER.size + 8 * (k + d + r + p) + 4 * local
     if len(blob) > size:
-        raise RecordingError(
-            f"{path} has several cameras a node, side by side in one picture; record or export one of them by itself."
-        )
+        raise RecordingError(f"{path} has several cameras in one picture; record or export one of them.")
     numbers = np.frombuffer(blob, "<f8", k + d + r + p, _HEADER.size)
     distortion, projection = numbers[k : k + d], numbers[k + d + r :]
     fx, fy, cx, cy = numbers[[0, 4, 2, 5]]

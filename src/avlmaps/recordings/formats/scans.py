@@ -52,6 +52,7 @@ from avlmaps.core.files import DESCRIPTION_BYTES, MANIFEST_BYTES, PICTURE_BYTES,
 from avlmaps.recordings import images
 from avlmaps.recordings.corrections import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.faults import note
+from avlmaps.recordings.formats import tables
 from avlmaps.recordings.formats.file_recording import (
     FileRecording,
     Shots,
@@ -64,21 +65,6 @@ from avlmaps.recordings.formats.file_recording import (
     opener,
     sizes,
     whole_frames,
-)
-from avlmaps.recordings.formats.tables import (
-    DISTORTED,
-    as_poses,
-    fitted,
-    fitted_rig,
-    median_camera,
-    note_resized,
-    note_unread,
-    parse_json,
-    read_json,
-    read_matrix,
-    read_table,
-    rigid,
-    text_lines,
 )
 from avlmaps.recordings.images import COLOUR_SUFFIXES, VideoFrames, first_picture_size
 from avlmaps.recordings.plausible import pace_fault
@@ -134,9 +120,9 @@ class _Transforms(_Camera, frozen=True, kw_only=True):
 def open_nerfstudio(path: Path) -> FileRecording:
     """Open a scan in place."""
     file = path / DESCRIPTION
-    given, plain = read_json(file, _Transforms)
+    given, plain = tables.read_json(file, _Transforms)
     known = {name for kind in (_Transforms, _Camera) for name in kind.__struct_fields__}
-    note_unread(file, plain, (*known, *_IDLE))
+    tables.note_unread(file, plain, (*known, *_IDLE))
     _note_frames(file, given, plain)
     frames = [frame for frame in given.frames if frame.depth_file_path]
     if not frames:
@@ -161,7 +147,7 @@ def open_nerfstudio(path: Path) -> FileRecording:
 
 def _note_frames(file: Path, given: _Transforms, plain: dict[str, Any]) -> None:
     present = {key: None for frame in plain["frames"] for key in frame if not key.endswith("_path")}
-    note_unread(file, present, (*_Frame.__struct_fields__, *_IDLE_OF_FRAME))
+    tables.note_unread(file, present, (*_Frame.__struct_fields__, *_IDLE_OF_FRAME))
     note(_NO_CLOCK)
     if given.applied_scale != 1.0:
         note(f"The positions were scaled by {given.applied_scale:g}; they are scaled back to metres.")
@@ -204,8 +190,7 @@ def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> 
         models = {"fisheye"}
     if odd := sorted(models - set(_PINHOLES)):
         raise RecordingError(
-            f"{file} is of the camera model {odd[0]!r}; pinholes are read ({', '.join(_PINHOLES[1:])}), so undistort "
-            "the pictures first."
+            f"{file} is of the camera model {odd[0]!r}; pinholes are read ({', '.join(_PINHOLES[1:])}): undistort it."
         )
     rgb_size = first_picture_size(file.parent, shots.colour)
     said = {(round(f.w or given.w or rgb_size[0]), round(f.h or given.h or rgb_size[1])) for f in frames}
@@ -214,11 +199,11 @@ def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> 
         raise RecordingError(f"{file} has frames of {shown}; the frames of a recording must have one size.")
     size = said.pop()
     numbers = np.array([_numbers(file, frame, given, size) for frame in frames])
-    camera = median_camera(file, numbers, *size)
-    note_resized(camera, rgb_size)
+    camera = tables.median_camera(file, numbers, *size)
+    tables.note_resized(camera, rgb_size)
     if any(abs(getattr(camera_, name)) > 1e-9 for camera_ in (given, *frames) for name in _DISTORTION):
-        note(DISTORTED)
-    return fitted_rig(camera, *sizes(file.parent, shots), file)
+        note(tables.DISTORTED)
+    return tables.fitted_rig(camera, *sizes(file.parent, shots), file)
 
 
 def _numbers(file: Path, frame: _Frame, given: _Transforms, size: tuple[int, int]) -> list[float]:
@@ -275,10 +260,12 @@ def open_polycam(path: Path) -> FileRecording:
     depth, described = _by_stem(frames / "depth", (".png",)), _by_stem(frames / cameras, (".json",))
     names = whole_frames(path, cameras=described, colour=colour, depth=depth)
     files = [frames / cameras / described[stem] for stem in names]
-    read = [read_json(file, _PolycamCamera, DESCRIPTION_BYTES) for file in files]
+    read = [tables.read_json(file, _PolycamCamera, DESCRIPTION_BYTES) for file in files]
     found, matrices = [camera for camera, _ in read], list(map(_matrix, files, (plain for _, plain in read)))
     present = {key: None for _, plain in read for key in plain}
-    note_unread(files[0], present, (*_PolycamCamera.__struct_fields__, *_POLYCAM_POSE, *_POLYCAM_IDLE), strict=False)
+    tables.note_unread(
+        files[0], present, (*_PolycamCamera.__struct_fields__, *_POLYCAM_POSE, *_POLYCAM_IDLE), strict=False
+    )
     sure = _by_stem(frames / "confidence", (".png",)) if (frames / "confidence").is_dir() else {}
     shots = Shots(
         names=names,
@@ -291,9 +278,9 @@ def open_polycam(path: Path) -> FileRecording:
     numbers = np.array([(c.fx, c.fy, c.cx, c.cy) for c in found])
     rgb_size, depth_size = sizes(path, shots)
     # corrected cameras have no size: it is that of the corrected pictures
-    camera = median_camera(files[0], numbers, found[0].width or rgb_size[0], found[0].height or rgb_size[1])
-    note_resized(camera, rgb_size)
-    rig = fitted_rig(camera, rgb_size, depth_size, files[0])
+    camera = tables.median_camera(files[0], numbers, found[0].width or rgb_size[0], found[0].height or rgb_size[1])
+    tables.note_resized(camera, rgb_size)
+    rig = tables.fitted_rig(camera, rgb_size, depth_size, files[0])
     return FileRecording.settled(path, "polycam", rig, shots, files.__getitem__, up_in_world=UP_IN_WORLD.copy())
 
 
@@ -306,7 +293,7 @@ def _matrix(file: Path, plain: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
         rows = msgspec.convert([plain[name] for name in _POLYCAM_POSE[:12]], list[float])
     except (KeyError, msgspec.ValidationError) as error:
         raise RecordingError(f"{file} has no pose, t_00 to t_23 ({error}); export the scan again.") from None
-    return as_poses(np.array([rows]))[0]
+    return tables.as_poses(np.array([rows]))[0]
 
 
 def _keyframe_stamps(cameras: list[_PolycamCamera], names: list[str]) -> Float[np.ndarray, " n"]:
@@ -343,7 +330,7 @@ def open_stray_scanner(path: Path) -> FileRecording:
         colour=[],
         depth=[f"depth/{depth[int(n)]}" for n in numbers],
         stamps_s=rows[:, 0] - rows[0, 0],
-        world_from_camera=rigid(rows[:, 2:5], rows[:, 5:9]),
+        world_from_camera=tables.rigid(rows[:, 2:5], rows[:, 5:9]),
         video_frames=numbers.tolist(),
         confidence=[f"confidence/{sure[int(n)]}" for n in numbers] if all(int(n) in sure for n in numbers) else (),
     )
@@ -357,13 +344,13 @@ def open_stray_scanner(path: Path) -> FileRecording:
 
 
 def _odometry(file: Path) -> np.ndarray:
-    header = next(text_lines(file), (0, ""))[1].replace(" ", "").split(",")
+    header = next(tables.text_lines(file), (0, ""))[1].replace(" ", "").split(",")
     if header not in (_HEADER, _HEADER + _MORE):
         raise RecordingError(
             f"{file} begins with {','.join(header)[:60]!r} where the header {','.join(_HEADER)} belongs; is it another "
             "app's, or another version's?"
         )
-    table = read_table(file, (len(header),))
+    table = tables.read_table(file, (len(header),))
     finite = table.values[np.isfinite(table.values[:, :2]).all(axis=1)]
     if len(finite) == 0:
         raise RecordingError(f"{file} holds no pose, so there is nothing to map.")
@@ -372,17 +359,17 @@ def _odometry(file: Path) -> np.ndarray:
 
 def _stray_rig(path: Path, rows: np.ndarray, video: VideoFrames, shots: Shots) -> Rig:
     file, size = path / "camera_matrix.csv", (video.width, video.height)
-    k = read_matrix(file, 3, 3)
+    k = tables.read_matrix(file, 3, 3)
     per_frame = rows[:, 9:13] if rows.shape[1] > len(_HEADER) else np.zeros((0, 4))
     known = per_frame[np.isfinite(per_frame).all(axis=1) & (per_frame > 0.0).all(axis=1)]
     numbers = known if len(known) else np.array([[k[0, 0], k[1, 1], k[0, 2], k[1, 2]]])
-    camera = median_camera(file, numbers, *size)
+    camera = tables.median_camera(file, numbers, *size)
     if not (0.0 < camera.cx < camera.width and 0.0 < camera.cy < camera.height):
         raise RecordingError(
             f"{file} has its centre at {camera.cx:.1f}, {camera.cy:.1f}, outside of the video's {size[0]}x{size[1]}; "
             "was the video resized? Give the matrix of its present size."
         )
-    return Rig(camera, fitted(camera, first_picture_size(path, shots.depth), file, "depth"))
+    return Rig(camera, tables.fitted(camera, first_picture_size(path, shots.depth), file, "depth"))
 
 
 _FPS = 60.0
@@ -424,9 +411,7 @@ def _inside(path: Path) -> Place:
     try:
         return zipfile.Path(path) if path.is_file() else path / "EXR_RGBD" if (path / "EXR_RGBD").is_dir() else path
     except (zipfile.BadZipFile, OSError) as error:
-        raise RecordingError(
-            f"{path} is no whole .r3d, which is a ZIP archive ({error}); share it from Record3D again."
-        ) from None
+        raise RecordingError(f"{path} is no whole .r3d, a ZIP archive ({error}); share it again.") from None
 
 
 def _names(folder: Place, suffixes: tuple[str, ...]) -> list[str]:
@@ -457,11 +442,7 @@ class _Pictures:
         place, shape = self._inside / name, (camera.height, camera.width)
         if name.endswith(".exr"):
             depth_m = _exr(place)
-            if depth_m.shape != shape:
-                raise RecordingError(
-                    f"{place} is {depth_m.shape[1]}x{depth_m.shape[0]}, the others {camera.width}x{camera.height}; "
-                    "every picture of a recording must have one size."
-                )
+            images.check_size(str(place), depth_m.shape, camera)
             return images.metres(depth_m, 1.0)
         depth_m = images.metres(_unfolded(place, 4 * camera.width * camera.height).view("<f4").reshape(shape), 1.0)
         confidence = self._inside / (name.removesuffix(".depth") + ".conf")
@@ -505,8 +486,7 @@ def _exr(place: Place) -> Float32[np.ndarray, "h w"]:
         return np.asarray(channels[likely].pixels, np.float32)
     except (RuntimeError, ValueError, TypeError, KeyError, StopIteration, MemoryError) as error:
         raise RecordingError(
-            f"{place} cannot be read as OpenEXR ({str(error).splitlines()[0][:120]}); copy it again, or share the "
-            ".r3d instead."
+            f"{place} is no OpenEXR ({str(error).splitlines()[0][:120]}); copy it again, or share the .r3d instead."
         ) from None
 
 
@@ -519,12 +499,12 @@ def open_record3d(path: Path) -> StoredRecording:
         raise RecordingError(f"{path} holds neither metadata with rgbd/ nor metadata.json with rgb/ and depth/.")
     described, colour_in, depth_in = layout
     file = Path(str(inside / described))
-    given, plain = parse_json(file, _read(inside / described, MANIFEST_BYTES), _Metadata)
+    given, plain = tables.parse_json(file, _read(inside / described, MANIFEST_BYTES), _Metadata)
     _require_whole(file, given)
     colour = {number_of(name): name for name in _names(inside / colour_in, images.COLOUR_SUFFIXES)}
     depth = {number_of(name): name for name in _names(inside / depth_in, (".depth", ".exr"))}
     numbers = whole_frames(path, pose=dict(enumerate(given.poses)), colour=colour, depth=depth)
-    note_unread(file, plain, (*_Metadata.__struct_fields__, *_RECORD3D_IDLE), strict=False)
+    tables.note_unread(file, plain, (*_Metadata.__struct_fields__, *_RECORD3D_IDLE), strict=False)
     given_s = _record3d_stamps(given)
     shots = Shots(
         names=[str(n) for n in numbers],
@@ -579,13 +559,13 @@ def _require_whole(file: Path, given: _Metadata) -> None:
 
 def _record3d_poses(given: _Metadata) -> Float[np.ndarray, "n 4 4"]:
     rows = np.array(given.poses, np.float64).reshape(-1, 7)
-    return from_opengl(rigid(rows[:, 4:], rows[:, :4]))
+    return from_opengl(tables.rigid(rows[:, 4:], rows[:, :4]))
 
 
 def _record3d_rig(inside: Place, file: Path, given: _Metadata, shots: Shots) -> Rig:
     k = given.K
     numbers = np.array(given.perFrameIntrinsicCoeffs or [[k[0], k[4], k[6] or k[2], k[7] or k[5]]], np.float64)
-    camera = median_camera(file, numbers, given.w, given.h)
+    camera = tables.median_camera(file, numbers, given.w, given.h)
     first, deep = inside / shots.colour[0], inside / shots.depth[0]
     rgb_size = images.picture_size(Path(str(first)), _read(first))
     depth_size = (given.dw, given.dh)
@@ -596,5 +576,5 @@ def _record3d_rig(inside: Place, file: Path, given: _Metadata, shots: Shots) -> 
         count = len(_decompressed(deep, _read(deep), 4 * camera.width * camera.height)) // 4
         width = max(1, round((count * camera.width / camera.height) ** 0.5))
         depth_size = (width, count // width)
-    note_resized(camera, rgb_size)
-    return fitted_rig(camera, rgb_size, depth_size, file)
+    tables.note_resized(camera, rgb_size)
+    return tables.fitted_rig(camera, rgb_size, depth_size, file)

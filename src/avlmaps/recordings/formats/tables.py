@@ -67,7 +67,6 @@ def _is_header_in_comment(fields: Sequence[str], wanted: Sequence[str]) -> bool:
 
 
 def _column(field: str) -> tuple[str, float]:
-    """Return the column that a name stands for (``""`` for none) and its unit as a factor."""
     word, unit = field.strip(" '\"#%").lower(), ""
     if bracket := _UNIT.search(word):
         word, unit = word[: bracket.start()], bracket.group(1)
@@ -96,22 +95,14 @@ _QUOTED = 100
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Numbers of a text file.
-
-    Attributes:
-        values: one row a line.
-        lines: each row's line in the file, from 1.
-    """
+    """Numbers of a text file, one row a line, and each row's line in the file, from 1."""
 
     values: Float[np.ndarray, "n c"]
     lines: Int[np.ndarray, " n"]
 
 
 def text_lines(path: Path) -> Iterator[tuple[int, str]]:
-    """Yield (number, text) of each line that is neither empty nor a comment (``#``).
-
-    Lines that are not UTF-8 are reported and passed over.
-    """
+    """Yield (number, text) of each line that is neither empty nor a comment; lines that are not UTF-8 are reported."""
     return ((number, text) for number, text in _lines(path) if not text.startswith("#"))
 
 
@@ -141,11 +132,8 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 def read_table(path: Path, columns: tuple[int, ...], names: Sequence[str] = ()) -> Table:
     """Read lines of numbers, split at commas, semicolons (with decimal commas, too) or white space.
 
-    Args:
-        path: the file.
-        columns: how many numbers a line may have; the first line decides which of them.
-        names: the columns that are wanted. Where the first line, or the comment above it, names columns, they are
-            returned in this order and in seconds and metres; a name that is not known is a fault.
+    The first line decides which of the counts in ``columns`` a line has. Where it, or the comment above it, names
+    columns, ``names`` are returned in their order and in seconds and metres; a name that is not known is a fault.
     """
     values, lines, width = array("d"), array("q"), 0
     heading: tuple[int, str] | None = None
@@ -264,14 +252,9 @@ def parse_json(file: Path, content: bytes, kind: type[T]) -> tuple[T, dict[str, 
 
 
 def note_unread(file: Path, present: Mapping[str, Any], known: Collection[str], strict: bool = True) -> None:
-    """Note the keys of a file that nothing reads.
+    """Note the keys of a file that nothing reads and that are not ``known``.
 
-    Args:
-        file: the file, for the sentence.
-        present: its keys.
-        known: those that are read, or say nothing.
-        strict: whether a key about the camera is refused; not where an app writes the file, whose later versions may
-            add some.
+    If ``strict``, a key about the camera is refused; not where an app writes the file, whose later versions add some.
     """
     unread = sorted(present.keys() - set(known))
     telling = [key for key in unread if _ABOUT_GEOMETRY.search(key.lower())]
@@ -343,12 +326,10 @@ def note_resized(camera: Pinhole, size: tuple[int, int]) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseTable:
-    """Poses of a text file, one a line; NaN where a line is no pose.
+    """Poses of a text file, one a line (from 1); NaN where a line is no pose.
 
     Attributes:
         stamps_s: (n,) the first of eight or nine numbers; of fewer or more the line's number among the poses.
-        pose: (n, 4, 4).
-        lines: (n,) each one's line in the file, from 1.
         ids: (n,) the last of nine numbers, else the line's number among the poses.
         stamped: whether the file has stamps.
     """
@@ -361,7 +342,6 @@ class PoseTable:
 
     @property
     def usable(self) -> Bool[np.ndarray, " n"]:
-        """Which of them are poses."""
         return np.asarray(np.isfinite(self.pose).all(axis=(1, 2)))
 
     def trajectory(self, what: str) -> timeline.Trajectory | None:
@@ -387,10 +367,8 @@ def as_poses(rows: Float[np.ndarray, "n c"]) -> Float[np.ndarray, "n 4 4"]:
 def read_poses(path: Path, widths: tuple[int, ...] = (8,)) -> PoseTable:
     """Read a table of poses; a line that is no pose is reported, and not used.
 
-    Args:
-        path: the file.
-        widths: how many numbers a line may have: 7 (tx ty tz qx qy qz qw), 8 (after a stamp), 9 (before an id), 12 or
-            16 (a matrix, row by row). A header may name those of the first of them.
+    ``widths`` says how many numbers a line may have: 7 (tx ty tz qx qy qz qw), 8 (after a stamp), 9 (before an id), 12
+    or 16 (a matrix, row by row). A header may name those of the first of them.
     """
     if not os.path.lexists(path):
         raise RecordingError(f"{path} is missing; the recording needs it.")
@@ -413,9 +391,7 @@ def read_poses(path: Path, widths: tuple[int, ...] = (8,)) -> PoseTable:
         report(f"{path}, line {line}: this is no pose, and not used; {why}.", path, line, fatal=False)
     if len(wrong) == len(values):
         shape = "x y z qx qy qz qw" if widths[0] <= 8 else "a matrix"
-        raise RecordingError(
-            f"{path} holds no usable pose, so there is nothing to map; a line is {'stamp ' * (widths[0] == 8)}{shape}."
-        )
+        raise RecordingError(f"{path} holds no usable pose; a line is {'stamp ' * (widths[0] == 8)}{shape}.")
     if len(wrong):
         note(f"{len(wrong)} line(s) of {path.name} are no poses and not used.")
     return found
@@ -451,9 +427,7 @@ def read_pose_file(path: Path) -> tuple[Float[np.ndarray, " n"], Float[np.ndarra
     found = read_poses(path)
     if not found.usable.all():
         line = int(found.lines[np.argmin(found.usable)])
-        raise RecordingError(
-            f"{path}, line {line}: this is no pose (NaN, or a quaternion of another length than 1); fix or remove it."
-        )
+        raise RecordingError(f"{path}, line {line}: this is no pose (NaN, or a quaternion not of length 1); fix it.")
     return found.stamps_s, found.pose
 
 

@@ -1,6 +1,6 @@
 """From a map that the published AVLMaps/VLMaps code wrote to one of ours: `import_reference_map` is the whole of it.
 
-The imported map lies in the world of a recording of the same scene opened by us (``avlmaps_layout``), so that goals
+The imported map lies in the world of a recording of the same scene opened by us (``layouts``), so that goals
 agree. The reference's grid is turned and shifted against ours by the first base pose; each of its voxels fills the
 voxels of ours whose middle it holds, and where two meet they are averaged by their weights.
 """

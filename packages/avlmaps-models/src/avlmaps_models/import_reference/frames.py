@@ -14,8 +14,8 @@ from avlmaps.core.progress import progress
 from avlmaps.core.wording import option
 from avlmaps.maps.types import Keyframes
 from avlmaps.recordings.faults import noted
-from avlmaps.recordings.formats.avlmaps_layout import CameraFile, camera_poses, read_camera_file, read_habitat_poses
 from avlmaps.recordings.formats.file_recording import list_names
+from avlmaps.recordings.formats.layouts import CameraFile, camera_poses, read_camera_file, read_habitat_poses
 from avlmaps.recordings.images import first_picture_size
 from avlmaps_models.import_reference.areas_h5 import read_areas
 from avlmaps_models.import_reference.scene import AREAS, SceneFiles
@@ -138,7 +138,7 @@ def _listed(scene: SceneFiles) -> tuple[CameraFile, Float64[np.ndarray, "n 4 4"]
 
 
 def _camera(given: CameraFile, folder: Path) -> Pinhole:
-    """Return the camera as ``avlmaps_layout`` makes it; of the published size where there is no picture."""
+    """Return the camera as ``recordings.formats.layouts`` makes it; of the published size where there is no picture."""
     there = (folder / "rgb").is_dir()
     pictures = [f"rgb/{name}" for name in list_names(folder / "rgb", (".png", ".jpg"))] if there else []
     width, height = first_picture_size(folder, pictures[:1]) if pictures else PUBLISHED_SIZE

@@ -6,7 +6,7 @@ Two kinds of grid are in its files:
   y left, z up. A point of M lies in row ``int(gs/2 - int(x/s))``, column ``int(gs/2 - int(y/s))``, layer
   ``int(z/s)``; rows run backward and columns right. ``int`` cuts towards zero, so that cell k of an axis holds
   [k·s, (k+1)·s) for k > 0, its mirror image for k < 0, and (-s, s), twice as much, for k = 0. World: ``B_0`` of
-  ``avlmaps_layout.base_poses``.
+  ``layouts.base_poses``.
 * **from the lowest corner** (``vlmaps_multi_floor.h5df``, ``vlmaps_cam.h5df``): cell k of an axis is centred at
   ``pcd_min + k·s`` along the axes of the poses' own world (y up), as ``round`` has it.
 """
@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 from avlmaps.core import poses
 from avlmaps.core.errors import MapError
 from avlmaps.maps.grid import GridSpec
-from avlmaps.recordings.formats.avlmaps_layout import WORLD_FROM_HABITAT, base_poses
+from avlmaps.recordings.formats.layouts import WORLD_FROM_HABITAT, base_poses
 
 FARTHEST_M = 1e6
 _CUBES_AT_ONCE = 1 << 16

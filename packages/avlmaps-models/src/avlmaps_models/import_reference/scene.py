@@ -20,7 +20,7 @@ class SceneFiles:
         voxels: ``vlmaps.h5df`` or a relative of it.
         areas: ``clip_sparse_map.h5df``, if there is one.
         poses: ``poses.txt``, if there is one.
-        camera: where ``camera.json`` would be (see ``avlmaps_layout``).
+        camera: where ``camera.json`` would be (see ``recordings.formats.layouts``).
         has_sound_map: whether there is a pickled sound map.
         has_visual_map: whether there is a visual map.
     """
