@@ -191,7 +191,7 @@ def test_messages_in_another_coding_are_refused_by_its_name(tmp_path: Path) -> N
     for topic in ("/cam/color", "/cam/depth", "/cam/color/camera_info"):
         kind = "CameraCalibration" if "info" in topic else "RawImage"
         file.add(topic, (f"foxglove.{kind}", "flatbuffer", b"x"), "flatbuffer", START_S, b"y")
-    with pytest.raises(RecordingError, match=r"are coded as 'flatbuffer'; ROS 1, CDR"):
+    with pytest.raises(RecordingError, match=r"are 'flatbuffer'; ROS 1, CDR"):
         open_recording(file.save(tmp_path / "walk"))
 
 

@@ -70,7 +70,7 @@ def test_nothing_there_is_told(tmp_path: Path):
 
 def test_an_unknown_format_lists_the_known_ones(tmp_path: Path):
     names = ", ".join(known.name for known in FORMATS)
-    sentence = f"There is no format called 'kitti'; known: auto, {names}."
+    sentence = f"There is no format 'kitti'; known: auto, {names}."
     with pytest.raises(RecordingError, match=re.escape(sentence)):
         open_recording(tmp_path, format="kitti")
 

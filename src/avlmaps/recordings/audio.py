@@ -152,10 +152,7 @@ def write_flac(path: Path, sound: Sound | Iterable[Sound]) -> None:
 
 
 def write_samples(path: Path, blocks: Iterable[Float[np.ndarray, "n m"]], rate_hz: int, channels: int) -> None:
-    """Write samples of channels as 16-bit FLAC (up to 8), or WAV by the suffix; a kill leaves the old file or the new.
-
-    Samples beyond [-1, 1] are clipped. AudioError says that the disk is full.
-    """
+    """Write samples of channels, clipped to [-1, 1], as 16-bit FLAC (up to 8), or WAV by the suffix; all or nothing."""
     import soundfile
 
     from avlmaps.core.files import replace_atomically

@@ -51,7 +51,7 @@ def with_microphones(track: AudioTrack, microphones: Microphones, files: tuple[P
     """
     if files and len(files) != len(microphones):
         raise RecordingError(
-            f"There are {len(files)} files of channels and {len(microphones)} microphone(s); give each file its place."
+            f"{len(files)} files of channels are of {len(microphones)} microphone(s); place each file."
         )
     for path in files[1:]:
         other = AudioTrack.open(path, track.start_s)
@@ -96,9 +96,8 @@ def write_channels(path: Path, sound: ChannelSound) -> None:
 def level_faults(track: AudioTrack, name: str = "") -> tuple[list[str], list[str]]:
     """Return what is useless of a track, and which of its channels are clipped: their loud sounds are like others.
 
-    Useless is silence; of an array, a channel that is dead or another's copy, since it shows no direction. Channels
-    that are exchanged show only along the drive (``avlmaps.maps.sources.wiring``). Looks at pieces spread over the
-    track; one in which sounds and silence take turns was put together so.
+    Useless is silence; of an array, a channel that is dead or another's copy, since it shows no direction (exchanged
+    ones show along the drive). One in which sounds and silence take turns was put together so.
     """
     samples = _looked_at(track)
     silent = _silent(samples, track, name) if track.microphones is None or not np.ptp(samples) else []

@@ -39,9 +39,7 @@ def self_contained_suffix(content: bytes) -> str | None:
 
 def truncation_error(path: Path, found_s: float, promised_s: float) -> AudioError:
     """Return the error for a file that ends before it should."""
-    return AudioError(
-        f"{path} is truncated: of {promised_s:.2f} s it breaks off at {found_s:.2f} s; copy or convert it again."
-    )
+    return AudioError(f"{path} is truncated: of {promised_s:.2f} s it ends at {found_s:.2f} s; copy it again.")
 
 
 def examine(path: Path) -> tuple[int, int]:

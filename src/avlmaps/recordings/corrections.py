@@ -182,9 +182,8 @@ def _camera_words(camera: GivenCamera) -> str:
 
 
 def corrected(recording: Recording, given: Corrections) -> Recording:
-    """Return a recording as it is with what someone knows better, itself where that is nothing.
+    """Return a recording with what someone knows better; what ``given`` leaves open stays corrected as it was.
 
-    What was corrected already stays so where ``given`` leaves it open: options win over keys of ``recording.json``.
     RecordingError says that something does not fit it (one camera for two, a delay longer than the walk).
     """
     if isinstance(recording, CorrectedRecording):

@@ -155,9 +155,7 @@ def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
         if size is None:
             raise RecordingError(_unknown_kind(path, content))
     if size[0] < 1 or size[1] < 1 or size[0] * size[1] > MOST_PIXELS:
-        raise RecordingError(
-            f"{path} is {size[0]}x{size[1]}; pictures have 1 to {MOST_PIXELS:,} pixels; copy it again."
-        )
+        raise RecordingError(f"{path} is {size[0]}x{size[1]}; pictures have 1 to {MOST_PIXELS} pixels: copy it again.")
     return size
 
 
@@ -196,10 +194,7 @@ def _head(path: Path) -> bytes:
 
 
 def read_colour(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
-    """Read a colour picture as RGB, as the sensor delivered it.
-
-    A turn that EXIF requests is heeded only where the turned picture alone has the camera's size.
-    """
+    """Read a colour picture as RGB; EXIF's turn is heeded only where the turned picture alone has the camera's size."""
     return decode_colour(path, read_bytes(path), camera)
 
 
@@ -327,9 +322,7 @@ def _read_npy(path: Path) -> np.ndarray:
             raise RecordingError(f"{path} is not a whole NPY file ({reason}); copy it again.") from None
     shape = stored.shape[:2] if stored.ndim == 3 and stored.shape[2] == 1 else stored.shape
     if len(shape) != 2 or stored.dtype.kind not in "fiu":
-        raise RecordingError(
-            f"{path} holds {stored.dtype} of {tuple(shape)}; depth must be numbers of (height, width)."
-        )
+        raise RecordingError(f"{path} holds {stored.dtype} of {tuple(shape)}; depth is numbers of (height, width).")
     return stored.reshape(shape)
 
 

@@ -167,7 +167,7 @@ def _rig(name: str, camera: Any, rgb: np.ndarray, depth: np.ndarray) -> Rig:
     (height, width), (depth_height, depth_width) = rgb.shape[:2], depth.shape
     if not isinstance(camera, Pinhole | Rig):
         raise RecordingError(
-            f"camera of {name} must be an avlmaps.Pinhole or an avlmaps.Rig, not {type(camera).__name__}."
+            f"camera of {name} must be an avlmaps.Pinhole or avlmaps.Rig, not {type(camera).__name__}."
         )
     alike = abs(depth_width * height - depth_height * width) <= max(width, height, depth_width, depth_height)
     if isinstance(camera, Pinhole) and (camera.width, camera.height) == (width, height) and alike:

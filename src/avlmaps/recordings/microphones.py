@@ -15,18 +15,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from avlmaps.core import poses
+from avlmaps.core import files, poses
 from avlmaps.core.arrays import Float
 from avlmaps.core.columns import concat, take
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import (
-    DESCRIPTION_BYTES,
-    TABLE_BYTES,
-    decode_json,
-    read_regular,
-    user_path,
-    write_bytes_atomically,
-)
 from avlmaps.recordings.faults import readable
 
 # Two microphones nearer than this hear the same; a robot is smaller than this.
@@ -171,18 +163,16 @@ def microphones_named(words: str) -> Microphones:
     """Return the array of a name, or of a JSON file with ``positions_m``; RecordingError where there is neither."""
     if words in PRESETS:
         return Microphones(np.array(PRESETS[words], np.float64))
-    path = user_path(words)
+    path = files.user_path(words)
     try:
-        return decode_json(read_regular(path, DESCRIPTION_BYTES), MicrophoneNumbers).microphones()
+        return files.decode_json(files.read_regular(path, files.DESCRIPTION_BYTES), MicrophoneNumbers).microphones()
     except OSError as error:
         raise RecordingError(
             f"There are no microphones called {words!r} and no such file ({error.strerror or error}); choose "
             f"{', '.join(PRESETS)}, or a JSON file with positions_m."
         ) from None
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise RecordingError(
-            f'{path} is no microphones ({error}); write {{"positions_m": [[x, y, z], ...]}}.'
-        ) from None
+        raise RecordingError(f'{path} is no microphones ({error}); write {{"positions_m": [[x, y, z]]}}.') from None
 
 
 def given_microphones(given: Any) -> Microphones:
@@ -190,9 +180,7 @@ def given_microphones(given: Any) -> Microphones:
     if isinstance(given, Microphones):
         return given
     if not isinstance(given, str | Path):
-        raise RecordingError(
-            f"microphones are Microphones, a name ({', '.join(PRESETS)}) or a JSON file; not {given!r}."
-        )
+        raise RecordingError(f"microphones: Microphones, a name ({', '.join(PRESETS)}) or a JSON file, not {given!r}.")
     return microphones_named(str(given))
 
 
@@ -200,7 +188,7 @@ def write_microphones(path: Path, microphones: Microphones) -> None:
     """Write an array as a JSON file that ``microphones_named`` reads; all or nothing."""
     content = msgspec.json.format(msgspec.json.encode(MicrophoneNumbers.of(microphones)), indent=2) + b"\n"
     try:
-        write_bytes_atomically(path, content)
+        files.write_bytes_atomically(path, content)
     except OSError as error:
         raise RecordingError(f"{path} cannot be written ({error.strerror or error}); choose another file.") from None
 
@@ -221,7 +209,7 @@ class DirectionTrack:
         azimuth_rad: (n,) from where the depth camera looks, counter-clockwise, but for the device's offset.
         elevation_rad: (n,) over the horizon; NaN where it is not known.
         confidence: (n,) how much each counts, 0 to 1.
-        known_rad: the device's offset and the standard deviation of that, as an earlier recording has shown them.
+        known_rad: the device's offset and its standard deviation, as an earlier recording has shown them.
     """
 
     stamp_s: Float[np.ndarray, " n"]
@@ -310,7 +298,7 @@ def read_directions(path: Path) -> DirectionTrack:
     """Read ``directions.csv``: a line of column names, then numbers; RecordingError names the file and the row."""
     try:
         with readable(path):
-            lines = read_regular(path, TABLE_BYTES).decode("utf-8-sig").splitlines()
+            lines = files.read_regular(path, files.TABLE_BYTES).decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:
         raise RecordingError(f"{path} is not UTF-8 text; save the file as UTF-8.") from None
     rows = [line.strip().split(",") for line in lines if line.strip() and not line.startswith("#")]
@@ -341,4 +329,4 @@ def write_directions(path: Path, track: DirectionTrack) -> None:
     names = [name for name, is_told in zip(COLUMNS, told, strict=True) if is_told]
     columns = [getattr(track, name).tolist() for name in names]
     rows = [",".join("" if isnan(value) else repr(value) for value in row) for row in zip(*columns, strict=True)]
-    write_bytes_atomically(path, ("\n".join([",".join(names), *rows]) + "\n").encode())
+    files.write_bytes_atomically(path, ("\n".join([",".join(names), *rows]) + "\n").encode())

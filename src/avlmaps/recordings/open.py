@@ -304,9 +304,7 @@ def find_format(path: Path, name: str = "auto") -> Format:
     if name != "auto" and name not in known:  # other packages need not be searched for what is built in
         known = {f.name: f for f in formats()}
     if name != "auto" and name not in known:
-        raise RecordingError(
-            f"There is no format called {name!r}; known: auto, {', '.join(known)}{did_you_mean(name, known)}"
-        )
+        raise RecordingError(f"There is no format {name!r}; known: auto, {', '.join(known)}{did_you_mean(name, known)}")
     try:
         if not path.exists():
             close = near_path(path)

@@ -1,7 +1,4 @@
-"""Whether clocks fit one another and poses can be those of one walk, before a map is made of them.
-
-Stamps in milliseconds where seconds belong, or one pose a thousand kilometres away, make a wrong map without a word.
-"""
+"""Whether clocks fit one another and poses can be those of one walk, before a map is made of them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -110,10 +107,9 @@ def plausible_walk(
 ) -> Plausible:
     """Leave out poses that are out of place, and find out whether the rest can be one walk.
 
-    Between two frames the camera may move by ``MAX_JUMP_M``, or at ``MAX_SPEED_M_S``. Where it moves further, the
-    frames up to the next such jump are another stretch. The longest stretch is accepted, and each other one that can
-    be reached from an accepted one. A few frames that cannot are left out; a long stretch that lies at most
-    ``MAX_SHIFT_M`` away is used, and reported (tracking began again).
+    A stretch ends where the camera moves by more than ``MAX_JUMP_M`` and ``MAX_SPEED_M_S``. The longest is accepted,
+    and each other that can be reached from an accepted one. A few frames that cannot are left out; a long stretch at
+    most ``MAX_SHIFT_M`` away is used, and reported (tracking began again).
     """
     every = np.arange(len(stamps_s))
     if not len(every):

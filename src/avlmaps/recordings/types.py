@@ -1,7 +1,4 @@
-"""A recording: frames with poses, an audio track, and how to get at them without reading it whole.
-
-Some frames of a recording, as a recording: every other one for a map, the good ones, a stretch of a long walk.
-"""
+"""A recording: frames with poses, an audio track, and how to get at them without reading it whole; parts of one."""
 
 import hashlib
 import os
@@ -106,9 +103,7 @@ class Recording(ABC):
     Opening one reads the poses and the list of names, never a picture. Frames without a usable pose are not among them.
 
     Attributes:
-        path: the folder or file.
         format: the format's name on the command line, such as ``7scenes``.
-        rig: the cameras (of every frame).
         stamps_s: (n,) float64, strictly rising, seconds from the start of the recording.
         world_from_camera: (n, 4, 4) float64, orthonormal. The world's z axis need not be up.
         up_in_world: unit vector, or None where the recording does not know the up direction.

@@ -133,7 +133,7 @@ class RecordingWriter:
         audio = user_path(audio) if isinstance(audio, str | Path) else audio
         if not isinstance(audio, Path | Sound | ChannelSound | AudioTrack):
             raise AudioError(
-                f"A sound track is a path, an avlmaps.Sound or an avlmaps.ChannelSound, not {type(audio).__name__}."
+                f"A track is a path, an avlmaps.Sound or an avlmaps.ChannelSound, not {type(audio).__name__}."
             )
         for old in self.path.glob("audio.*"):
             old.unlink()
@@ -169,9 +169,7 @@ class RecordingWriter:
 
     def _require_possible(self) -> None:
         if not isinstance(self.rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise RecordingError(
-                f"rig must be an avlmaps.Rig, not {type(self.rig).__name__}, such as Rig(camera, camera)."
-            )
+            raise RecordingError(f"rig must be an avlmaps.Rig, not {type(self.rig).__name__}.")
         if self.colour not in ("png", "jpg"):
             raise RecordingError(f"colour is {self.colour!r}; it must be png or jpg.")
         if fault := layout.impossible(self._described()):

@@ -120,10 +120,7 @@ def small_depth(frame: Frame, rig: Rig) -> Float32[np.ndarray, "h w"]:
 
 
 def choose_pairs(pose: Float[np.ndarray, "n 4 4"]) -> tuple[Int[np.ndarray, "p 2"], Bool[np.ndarray, " p"]]:
-    """Return pairs of frames that should see the same place, and which of them follow one another in time.
-
-    These are pairs after a step and across jumps; the others look one way from places apart.
-    """
+    """Return pairs after a step or across jumps, then of cameras that look one way from apart; which are the former."""
     n = len(pose)
     if n < 2:
         return np.zeros((0, 2), np.int64), np.zeros(0, bool)
@@ -373,9 +370,8 @@ def compare(
 def without_occluded(found: Agreement, sample: Sample, surfaces: Surfaces) -> Agreement:
     """Return an agreement in which points that a wide step has hidden do not count.
 
-    Who goes round a corner leaves behind it what was in view: that is no contradiction, however many points it are.
-    Wrong poses, depths or cameras always let one of the two frames look through what the other sees; where neither
-    does, hidden points say nothing. Frames that are close together are judged by all of their points.
+    Who goes round a corner leaves behind what was in view. Wrong poses, depths or cameras always let one of the frames
+    look through what the other sees; where neither does, hidden points say nothing.
     """
     place = sample.world_from_camera[:, :3, 3]
     step_m = np.linalg.norm(place[sample.pairs[:, 1]] - place[sample.pairs[:, 0]], axis=-1)

@@ -85,17 +85,14 @@ def findings_of(rows: Iterable[Suspicion], evidence: Any) -> Iterator[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The outcome of the check.
+    """The outcome of the check of some frames, of which some pairs see the same place and some could not be read.
 
     Attributes:
-        frames: number of frames that were looked at.
-        pairs: number of pairs of them that see the same place.
         agreeing: share of points of the one frame on the surface that the other sees; NaN without pairs.
         seen_through: share of points that the other frame looks through; NaN without pairs.
         likeness: correlation of the brightness of the same points; NaN where nothing varies.
         median_depth_m: of the pixels with a depth; NaN without any.
         findings: what is wrong, the gravest first.
-        unread: number of frames of the sample that could not be read.
         unchecked: what could be wrong without showing, and why, one sentence each, where there are no findings.
     """
 

@@ -11,18 +11,9 @@ from jaxtyping import Float
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import from_quaternion
+from avlmaps.recordings import corrections
 from avlmaps.recordings.consistency import agreement
-from avlmaps.recordings.corrections import (
-    NAMED,
-    NONE,
-    CorrectedRecording,
-    Corrections,
-    GivenCamera,
-    PoseKind,
-    all_axes,
-    reread_poses,
-    uncorrected,
-)
+from avlmaps.recordings.corrections import NAMED, NONE, Corrections, GivenCamera, PoseKind, all_axes
 from avlmaps.recordings.memory import is_of_program
 from avlmaps.recordings.types import Recording
 
@@ -69,11 +60,9 @@ class Reading:
         focal: factor of the focal lengths.
         off_centre: by how much the principal point lies to the right and below, as shares of the picture.
         centred: whether the principal point is put into the middle, with the focal length in proportion.
-        turn: how pictures are turned.
-        turned: which.
+        turn: how the pictures that are ``turned`` are.
         rolled_deg: by how much the camera is turned about its axis of view, in its mount.
         k1: of the lens, whose distortion is in the pictures.
-        along_ray: whether the depth is the distance along the ray.
         depth_late: by how many frames depth pictures come after what they belong to.
     """
 
@@ -129,7 +118,7 @@ class Trials:
     def __init__(self, recording: Recording, sample: agreement.Sample) -> None:
         few = [_some(np.flatnonzero(kind)) for kind in (sample.follows, ~sample.follows)]
         self.recording, self.sample = recording, sample.only(np.concatenate(few))
-        self.given = recording.given if isinstance(recording, CorrectedRecording) else NONE
+        self.given = recording.given if isinstance(recording, corrections.CorrectedRecording) else NONE
         self.pace_s = float(np.median(np.diff(recording.stamps_s))) if len(recording) > 1 else 0.0
         # what is the same for many readings is kept
         self._delayed, self._late, self._pictures = cache(self._poses_at), cache(self._depths_of), cache(self._read_so)
@@ -152,7 +141,7 @@ class Trials:
             return Trial(reading, agreement.NOTHING, agreement.NOTHING, 0.0)
         half_rad = np.radians(reading.rolled_deg) / 2.0
         rolled = from_quaternion(np.zeros((1, 3)), np.array([[0.0, 0.0, np.sin(half_rad), np.cos(half_rad)]]))
-        (sample, surfaces), pose = seen, reread_poses(pose, given) @ rolled
+        (sample, surfaces), pose = seen, corrections.reread_poses(pose, given) @ rolled
         median_m = self.median_m * reading.scale
         after, apart = (
             agreement.compare(sample.only(kind), surfaces, pose, rig, reading.scale, floor * median_m, colour=colour)
@@ -161,7 +150,7 @@ class Trials:
         return Trial(reading, after, apart, self._score(after, apart))
 
     def _poses_at(self, delay_s: float) -> Float[np.ndarray, "f 4 4"] | None:
-        known = uncorrected(self.recording).walk
+        known = corrections.uncorrected(self.recording).walk
         wanted_s = self.sample.stamps_s + delay_s
         held_s = np.clip(wanted_s, known.stamps_s[0], known.stamps_s[-1])
         return known.at(held_s) if float((np.abs(wanted_s - held_s) > 0.05).mean()) <= 0.5 else None
@@ -250,8 +239,7 @@ def rig_of(rig: Rig, reading: Reading) -> Rig | None:
 def find_closer(trials: Trials) -> Trial | None:
     """Return the scale, delay or camera with which depths differ clearly less; None without one.
 
-    With a slow camera, points stay within the tolerance of a surface in spite of such a mistake; their differences show
-    it, and people who walk by do not change that.
+    With a slow camera points stay within the tolerance in spite of such a mistake; their differences show it.
     """
     as_it_is = trials.as_it_is
     if not LEAST_OFF < as_it_is.off < float("inf"):

@@ -7,16 +7,8 @@ from itertools import islice
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.recordings.consistency import agreement
-from avlmaps.recordings.consistency.check import (
-    Evidence,
-    Reason,
-    Said,
-    Suspicion,
-    Verdict,
-    door_verdict,
-    findings_of,
-)
+from avlmaps.recordings.consistency import agreement, check
+from avlmaps.recordings.consistency.check import Evidence, Reason, Said, Suspicion
 from avlmaps.recordings.consistency.readings import Reading, is_closer
 from avlmaps.recordings.corrections import Corrections
 from avlmaps.recordings.types import Recording
@@ -37,15 +29,15 @@ _DRAWN = 0.93  # right recordings: 0.78 in the middle of their frames at most
 _MOST_JUMPS, _ACROSS_STEP, _MISFIT, _MISFIT_RATIO = 3, 0.9, 0.7, 3.0
 
 
-def examine_recording(recording: Recording) -> Verdict:
+def examine_recording(recording: Recording) -> check.Verdict:
     """Check a recording against itself with every row, and say what would not show."""
     evidence = Evidence.of(recording)
-    verdict = door_verdict(evidence)
-    findings = [*verdict.findings, *findings_of(_SINGLE, evidence)]
+    verdict = check.door_verdict(evidence)
+    findings = [*verdict.findings, *check.findings_of(_SINGLE, evidence)]
     disagrees = evidence.contradicts or evidence.drifts or evidence.unlike is not None
     if not disagrees or evidence.cause is None:
         in_space = evidence.contradicts or evidence.drifts
-        pairs = findings_of((_JUMP,) if in_space else (_JUMP, *_COLOUR), evidence)
+        pairs = check.findings_of((_JUMP,) if in_space else (_JUMP, *_COLOUR), evidence)
         findings += islice(pairs, 1)  # one cause has several symptoms
     unchecked = () if findings else tuple(blind_spots(evidence))
     return replace(verdict, findings=tuple(findings), unchecked=unchecked)

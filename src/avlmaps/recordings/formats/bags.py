@@ -1,8 +1,7 @@
 """The messages of a bag by topic, with their stamps, of one file or several.
 
-ROS 1 and ROS 2 bags are read by `rosbags`, MCAP files by `mcap`. Messages of Foxglove (JSON, protobuf or ROS's codings,
-with the same names of fields) are read as the ROS messages that they correspond to: a stamp is {sec, nsec}, {seconds,
-nanos} or {sec, nanosec}; bytes in JSON are base64.
+ROS 1 and ROS 2 bags are read by `rosbags`, MCAP files by `mcap`. Foxglove's messages (JSON, protobuf, ROS's codings)
+are read as the ROS messages that they correspond to; their names of fields are the same in each coding.
 """
 
 import base64
@@ -394,7 +393,7 @@ def _decoder(connection: McapConnection) -> Callable[[bytes], Any]:
         return lambda raw: plain(decode_json(raw))
     if encoding not in ("protobuf", "ros1", "cdr"):
         raise RecordingError(
-            f"The messages of {topic} are coded as {encoding!r}; ROS 1, CDR (ROS 2), JSON and protobuf are read."
+            f"The messages of {topic} are {encoding!r}; ROS 1, CDR (ROS 2), JSON and protobuf are read."
         )
     if schema is None:
         raise RecordingError(f"The topic {topic} has no schema that says how its messages are laid out.")

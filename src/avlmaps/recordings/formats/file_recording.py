@@ -334,8 +334,7 @@ def natural_key(name: str) -> tuple[tuple[str | float, ...], str]:
 def open_audio(folder: Path, start_s: float = 0.0) -> AudioTrack | None:
     """Open the sound track that someone put beside a recording's files, and note where it was not certain which.
 
-    A file that is called ``audio`` or ``sound``, in any case and container, is the track; else the only sound file that
-    is there, also in a folder ``audio`` or ``sound``.
+    It is called ``audio`` or ``sound``, or is the only sound file that is there, also in a folder called so.
     """
     if not folder.is_dir():
         return None

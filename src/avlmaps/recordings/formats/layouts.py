@@ -569,9 +569,7 @@ def _read_log(file: Path) -> tuple[list[int], Float[np.ndarray, "n 4 4"]]:
         ids = [int(words[0]) for _, words in lines[::5]]
         rows = [[float(word) for word in words] for at, (_, words) in enumerate(lines) if at % 5]
     except ValueError as error:
-        raise RecordingError(
-            f"{file} is not a line of three numbers and a matrix for each pose ({error}); is it cut off?"
-        ) from None
+        raise RecordingError(f"{file} is no log of three numbers and a matrix each ({error}); is it cut off?") from None
     return ids, np.array(rows, np.float64).reshape(-1, 4, 4)
 
 

@@ -39,9 +39,6 @@ from avlmaps.recordings.plausible import date_fault, pace_fault, repeat_fault
 RATE_HZ = 30.0
 
 
-# Pictures in lists, with poses at their own stamps or numbers: TUM, ORB-SLAM, ICL-NUIM
-
-
 @dataclass(frozen=True, slots=True)
 class _Stream:
     stamps_s: Float[np.ndarray, " n"]
@@ -78,8 +75,7 @@ def is_orb_slam(path: Path) -> bool:
 def open_tum(path: Path) -> FileRecording:
     """Open a sequence of the TUM RGB-D benchmark, or one laid out like it, in place.
 
-    A colour and a depth picture make a frame where they are each other's nearest in time and at most 20 ms apart;
-    the frame's stamp is the depth picture's, and its pose is interpolated there.
+    Pictures that are each other's nearest in time, within 20 ms, are a frame at the depth picture's stamp.
     """
     colour, depth = (_stream(path / name) for name in ("rgb.txt", "depth.txt"))
     of_colour, of_depth = timeline.associate(colour.stamps_s, depth.stamps_s, _PAIR_TOLERANCE_S)

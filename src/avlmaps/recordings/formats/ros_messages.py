@@ -275,10 +275,7 @@ class RosTopics:
 
 
 def pair_images(colours: list[str], depths: list[str]) -> tuple[str, str]:
-    """Return the colour and the depth topic that belong together: of one namespace, depth registered to colour.
-
-    Raw topics go before compressed ones (the order of the lists).
-    """
+    """Return the colour and the depth topic that belong together: of one namespace, registered, raw ones first."""
     pairs = [(colour, depth) for depth in depths for colour in colours]
     if not pairs:
         return next(iter(colours), ""), next(iter(depths), "")

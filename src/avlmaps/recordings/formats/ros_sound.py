@@ -146,8 +146,7 @@ def silences(
 ) -> tuple[float, Float[np.ndarray, " n"]]:
     """Return when the first message sounds, and how much silence belongs before each.
 
-    Messages arrive late now and then and the next ones catch up; only what none of the later ones catches up is missing
-    sound. Less than ``GAP_S`` is left: clocks differ a little.
+    Only what none of the later messages catches up is missing sound, of ``GAP_S`` and more: clocks differ a little.
     """
     before_s = np.concatenate([[0.0], np.cumsum(lengths_s)[:-1]])
     behind_s = np.minimum.accumulate((times_s - before_s)[::-1])[::-1]
@@ -163,8 +162,8 @@ def silences(
 def extract_audio(sound: SoundTopic, info: Any, folder: Path, pcm: Pcm | None = None) -> AudioTrack | None:
     """Write audio messages into a file: samples as FLAC, a compressed stream (MP3 is the package's default) as it is.
 
-    Where messages are missing the file is silent, so that what follows is still in time. ``info`` is the AudioInfo, and
-    ``pcm`` says that the messages are plain 16-bit samples, against it if need be. Without a track, why is noted.
+    Where messages are missing the file is silent. ``info`` is the AudioInfo, and ``pcm`` says that the messages are
+    plain 16-bit samples, against it if need be. Without a track, why is noted.
     """
     first = next(iter(sound.messages()), None)
     if first is None:
@@ -248,8 +247,7 @@ def _joined(
 def require_pace(topic: str, said: Pcm, lengths_s: Float[np.ndarray, " n"], times_s: Float[np.ndarray, " n"]) -> None:
     """Hold how long messages sound, as their declared rate and channels have it, against when they came.
 
-    Lost messages leave gaps between others that follow on one another; a wrong rate or number of channels makes all of
-    them longer or shorter than the time until the next.
+    Lost messages leave gaps; a wrong rate or number of channels makes all longer or shorter than until the next.
     """
     lasts_s, came_s = float(lengths_s.sum()), float(np.ptp(times_s)) + float(lengths_s.mean())
     if len(times_s) < _FEWEST_MESSAGES or came_s < _SHORTEST_S:
@@ -333,7 +331,7 @@ def _coding_of(sound: SoundTopic, beginning: bytes, said: str, times_s: Float[np
     if said:
         if not (said.isalnum() and len(said) < 10):
             raise RecordingError(
-                f"The AudioInfo of {sound.name} says {said[:20]!r}, which is no coding of sound. {_otherwise()}"
+                f"The AudioInfo of {sound.name} says {said[:20]!r}, no coding of sound. {_otherwise()}"
             )
         return said
     for start, coding in _BEGINNINGS.items():
@@ -384,10 +382,9 @@ def sampled_pieces(messages: Iterable[Any], topic: str) -> Iterator[tuple[Pcm, n
 
 
 def directions_of(topic: str, messages: Callable[[], Iterator[tuple[int, Any]]], clock: PictureClock) -> DirectionTrack:
-    """Return the directions on a topic.
+    """Return the directions on a topic: whole numbers are degrees, and so are floats beyond a turn.
 
-    Whole numbers are degrees, since whole radians are no angles; so are floats beyond a turn. A pose's yaw is its
-    azimuth, or, where it is not turned, the direction to its position.
+    A pose's yaw is its azimuth, or, where it is not turned, the direction to its position.
     """
     rows = [
         (received_ns * 1e-9, stamp_of(message) if hasattr(message, "pose") else np.nan, *angle_of(message))

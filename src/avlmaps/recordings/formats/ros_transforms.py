@@ -51,10 +51,9 @@ class _Edge:
 
 
 class TransformTree:
-    """Frames by name. Filled from /tf and /tf_static, or from odometry.
+    """Frames by name, from /tf and /tf_static, or from odometry.
 
-    Of a frame with several parents the one that moves it most often counts: of a URDF's base_link and a visual
-    odometry's odom, odom.
+    Of a frame with several parents the one that moves it most often counts (of base_link and a visual odometry, this).
     """
 
     def __init__(self) -> None:
@@ -145,8 +144,7 @@ class TransformTree:
     ) -> tuple[Float[np.ndarray, "k 4 4"], Bool[np.ndarray, " k"]]:
         """Return the pose of a frame in its tree's root, or in a frame above it, at each stamp, and where it is known.
 
-        The transform that moves the frame most often has to be known there; the others, which correct it, may come
-        seldom (``HOLD_S``).
+        What moves the frame most often has to be known there; others, which correct it, may come seldom (``HOLD_S``).
         """
         pose, known = np.broadcast_to(np.eye(4), (len(stamps_s), 4, 4)).copy(), np.ones(len(stamps_s), bool)
         carrier = self._carrier(frame)
@@ -201,7 +199,7 @@ _STATIC = "tf_static"
 def read_tf(bag: Bag, image_topic: str, named: str = "") -> tuple[TransformTree, str]:
     """Return the tree of a bag's transforms, and the topic that moves it (``/tf``), if any.
 
-    Of several robots' topics (``/robot1/tf``) those count whose namespace the image topic is in; all, if none is.
+    Of several robots' topics those count whose namespace the image topic is in; all, if none is.
     """
     topics = bag.topics_of(_TF_TYPES)
     beside = [topic for topic in topics if image_topic.startswith(_namespace(topic))]
@@ -318,18 +316,14 @@ def _tree_of_file(file: Path, camera_frame: str) -> TransformTree:
 def body_of(message: Any, topic: str, camera_frame: str, mounts: TransformTree) -> tuple[str, str]:
     """Return whose poses a topic has, and a notice where the messages do not name it.
 
-    A camera that is mounted on a robot is seldom what a robot's pose is of: unless the topic is called after a camera,
-    it is the base that the camera hangs on.
+    Unless the topic is called after a camera, it is the base that the camera hangs on.
     """
     named = getattr(message, "child_frame_id", "")
     above = mounts.ancestors(camera_frame)
     if named or not above or any(word in topic.lower() for word in ("cam", "optical")):
         return named or camera_frame, ""
     body = next((name for name in _BASES if name in above), above[-1])
-    return (
-        body,
-        f"The poses of {topic} do not say of what; they are taken for those of {body!r}, below the camera.",
-    )
+    return body, f"The poses of {topic} do not say of what; they are taken for those of {body!r}, below the camera."
 
 
 def _unlinked(tree: TransformTree, camera_frame: str, body: str = "") -> str:

@@ -1,10 +1,9 @@
 """ROS 1 bags, ROS 2 bags and MCAP files (of ROS or Foxglove), read in place; no ROS is needed.
 
-Topics are found by type, or named: ``{"rgb": "/camera/color/image_raw", "pose": "/odom"}``. The pose of the
-depth camera comes from /tf where the tree reaches from the camera to a world that it moves in, else from odometry
-or a pose topic together with the static transforms from the body to the camera, or a file of poses. World: the tree's
-root (``map``, ``odom``), which by ROS's own convention (REP 103) has z up. Where there are no depth images, the point
-clouds of a LiDAR are projected into the colour camera.
+Topics are found by type, or named. The pose of the depth camera comes from /tf where the tree reaches from the camera
+to a world that it moves in, else from odometry or a pose topic together with the static transforms from the body to
+the camera, or a file of poses. World: the tree's root (``map``, ``odom``), which by REP 103 has z up. Where there are
+no depth images, the point clouds of a LiDAR are projected into the colour camera.
 """
 
 import shutil

@@ -53,9 +53,7 @@ class _Database:
             checked_size(path, SAMPLED_BYTES)
         wal = path.with_name(path.name + "-wal")
         if wal.is_file() and wal.stat().st_size > 0:
-            raise RecordingError(
-                f"{wal} holds changes that are not in {path.name} yet; open it in RTAB-Map and close it again."
-            )
+            raise RecordingError(f"{wal} holds changes that are not in {path.name}; open it in RTAB-Map, and close it.")
 
     @contextmanager
     def told(self) -> Generator[None]:
