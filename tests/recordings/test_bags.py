@@ -73,9 +73,7 @@ def test_the_second_part_of_a_split_bag_says_where_the_mounts_are(tmp_path: Path
 
 def test_poses_that_name_no_body_are_those_of_the_base_and_it_is_said(tmp_path: Path) -> None:
     recording = open_recording(_written(tmp_path / "walk", Messages(1), poses="pose"))
-    said = (
-        "The poses of /amcl_pose do not say of what; they are taken for those of 'base_link', on which the camera is."
-    )
+    said = "The poses of /amcl_pose do not say of what; they are taken for those of 'base_link', below the camera."
     assert said in recording.notices
     assert recording.base_height is not None
 

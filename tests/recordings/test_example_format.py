@@ -97,7 +97,7 @@ def test_a_package_that_cannot_be_imported_is_named(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(known_formats, "entry_points", lambda group: [broken])
     known_formats._brought_formats.cache_clear()
     try:
-        with pytest.raises(RecordingError, match=r"The recording format 'gone' cannot be loaded from no_such_package"):
+        with pytest.raises(RecordingError, match=r"The format 'gone' cannot be loaded from no_such_package"):
             find_format(tmp_path)
     finally:
         known_formats._brought_formats.cache_clear()

@@ -78,7 +78,7 @@ def _calibration(change: Callable[[bytes], bytes]) -> Callable[[Path], Any]:
         ("stray-scanner", _replace("odometry.csv", "qx, qy, qz, qw", "qw, qx, qy, qz"), "where the header"),
         ("stray-scanner", lambda path: np.savetxt(path / "camera_matrix.csv", np.diag([900.0, 900, 1]), delimiter=","),
          "outside of the video's 64x48"),
-        ("redwood", _replace("trajectory.log", "0 0 1\n", ""), "a matrix of four lines for each pose (line 1)"),
+        ("redwood", _replace("trajectory.log", "0 0 1\n", ""), "no log of three numbers and a matrix each (line 1)"),
         ("redwood", _edit("intrinsic.json", lambda d: d.update(depth_unit=0.1)), "has the key 'depth_unit'"),
         ("icl-nuim", lambda path: (path / "livingRoom0.gt.freiburg").unlink(), "has no poses"),
         ("scannet", lambda path: np.savetxt(path / "intrinsic/intrinsic_color.txt", np.diag([900.0, 900, 1, 1])),

@@ -97,7 +97,7 @@ def test_depth_arrays_that_cannot_be_used_are_named(tmp_path: Path):
         read_depth(tmp_path / "cut.npy", CAMERA, 1000.0)
     with pytest.raises(RecordingError, match=r"objects.npy is not a whole NPY file"):
         read_depth(tmp_path / "objects.npy", CAMERA, 1000.0)
-    with pytest.raises(RecordingError, match=r"flat.npy holds float64 of \(7,\); depth must be numbers of"):
+    with pytest.raises(RecordingError, match=r"flat.npy holds float64 of \(7,\); depth is numbers of"):
         read_depth(tmp_path / "flat.npy", CAMERA, 1000.0)
     with pytest.raises(RecordingError, match=r"gone.npy is missing"):
         read_depth(tmp_path / "gone.npy", CAMERA, 1000.0)

@@ -101,7 +101,7 @@ def test_a_bare_video_is_told_what_it_lacks(tmp_path: Path):
 def test_a_map_is_told_from_a_recording(tmp_path: Path):
     (tmp_path / "map.json").write_text("{}")
     with pytest.raises(
-        RecordingError, match=r"is a map, not a recording; ask it with `avlmaps query`, or give the rec"
+        RecordingError, match=r"is a map, not a recording; ask it with `avlmaps query`, or give its rec"
     ):
         open_recording(tmp_path)
 

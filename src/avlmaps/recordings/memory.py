@@ -158,7 +158,7 @@ def _depths(name: str, given: Any) -> Float[np.ndarray, "hd wd"]:
     least, middle, most = (float(seen.min()), float(np.median(seen)), float(seen.max())) if len(seen) else (1.0,) * 3
     if least < 0.0 or middle > FARTHEST_MIDDLE_M or most < _NEAREST_FARTHEST_M:
         unit = ", which looks like millimetres or centimetres" if middle > FARTHEST_MIDDLE_M else ""
-        middles = f"its median is {middle:,.4g}, and all {least:.4g} to {most:,.4g}{unit}"
+        middles = f"its median is {middle:,.4g}, its least {least:.4g}, its largest {most:,.4g}{unit}"
         raise RecordingError(f"depth_m of {name} must be in metres; {middles}.")
     return depth
 

@@ -109,7 +109,9 @@ class Microphones:
             )
         if known and not (len(known) == len(self.channels) == len(place) and min(known) >= 0):
             numbers = ", ".join(str(channel + 1) for channel in self.channels)
-            raise RecordingError(f"microphones.channels are {numbers}; name {len(place)} different ones, from 1.")
+            raise RecordingError(
+                f"microphones.channels are {numbers}; name {len(place)} different ones, counted from 1."
+            )
         poses.orthonormalize(self.camera_from_robot, "the robot's frame in the camera, microphones.camera_from_robot,")
         for one, other in itertools.combinations(range(len(place)), 2):
             apart_m = float(np.linalg.norm(place[one] - place[other]))

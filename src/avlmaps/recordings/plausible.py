@@ -125,7 +125,8 @@ def plausible_walk(
         first: list[int] = strays[:_SHOWN].tolist()
         shown = ", ".join(names[i] for i in first) + (" ..." if len(strays) > _SHOWN else "")
         notices.append(
-            f"{len(strays)} frame(s) are {away_m.max():,.0f} m away, too far to be reached; {strays_are}: {shown}."
+            f"{len(strays)} frame(s) are up to {away_m.max():,.0f} m from the others, too far to be reached; "
+            f"{strays_are}: {shown}."
         )
     rows: list[int] = kept.tolist()
     return Plausible(kept, (*notices, *shifts), fault or _extent_fault(positions_m[kept], [names[i] for i in rows]))

@@ -201,7 +201,8 @@ def _image_topics(bag: Bag, topics: ros.RosTopics) -> tuple[str, str]:
     if not depth or not rgb:
         missing, name = ("depth", "depth") if not depth else ("colour", "rgb")
         raise RecordingError(
-            f"{bag.path} has no {missing} images (it has: {every}); name a topic ({name}=TOPIC).{_other_topics(bag)}"
+            f"{bag.path} has no topic of {missing} images (image topics: {every}); name it "
+            f"({name}=TOPIC).{_other_topics(bag)}"
         )
     return rgb, depth
 
