@@ -4,7 +4,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import wraps
 from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar, runtime_checkable
@@ -74,10 +74,13 @@ class Shots:
     def take(self, index: np.ndarray) -> "Shots":
         if len(index) == len(self.names) and np.array_equal(index, np.arange(len(index))):
             return self
-        return Shots(*(
-            value[index] if isinstance(value, np.ndarray) else [value[i] for i in index.tolist()] if value else value
-            for value in (getattr(self, each.name) for each in fields(self))
-        ))  # fmt: skip
+
+        def some(values: Sequence[Any]) -> list[Any]:
+            return [values[i] for i in index] if values else []
+
+        pictures = some(self.names), some(self.colour), some(self.depth)
+        numbers = self.stamps_s[index], self.world_from_camera[index]
+        return Shots(*pictures, *numbers, some(self.video_frames), some(self.confidence))
 
 
 def settle(path: Path, shots: Shots, pose_file: Callable[[int], Path] | None) -> Shots:
