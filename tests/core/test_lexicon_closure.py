@@ -54,12 +54,8 @@ def test_the_pixel_networks_names_and_their_other_phrases_are_entries() -> None:
             entry = KNOWN.named(name, kind)
             assert entry.split == "training"
             assert list(entry.learnt) == notes["called"].get(name, []), name
-    trained = {
-        entry.name
-        for kind in (EntryKind.THING, EntryKind.ROOM)
-        for entry in KNOWN.entries(kind)
-        if entry.split == "training"
-    }
+    entries = [*KNOWN.entries(EntryKind.THING), *KNOWN.entries(EntryKind.ROOM)]
+    trained = {entry.name for entry in entries if entry.split == "training"}
     assert trained == {*notes["categories"], *notes["rooms"]} - {"other"}
 
 
@@ -95,12 +91,8 @@ def test_things_of_the_simulator_and_of_other_encoders_are_entries() -> None:
 def test_rooms_of_the_simulator_and_of_queries_are_entries() -> None:
     import numpy as np
 
-    drawn = {
-        kind
-        for seed in range(30)
-        for programme in (home_programme, office_programme)
-        for kind, _ in programme(np.random.default_rng(seed))
-    }
+    programmes = (one(np.random.default_rng(seed)) for seed in range(30) for one in (home_programme, office_programme))
+    drawn = {kind for programme in programmes for kind, _ in programme}
     assert len(drawn) > 15
     assert not unknown([*drawn, *AREA_NAMES], EntryKind.ROOM)
 
@@ -128,7 +120,7 @@ def test_words_of_the_demonstration_are_entries() -> None:
 
 
 def test_aliases_of_the_word_encoder_are_known() -> None:
-    strange = {word for word in EmbeddedWords().aliases if KNOWN.head(word) is None}
+    strange = {word for word in EmbeddedWords()._aliases if KNOWN.head(word) is None}
     assert strange <= {"c", "choo"}, "pieces of a/c and a-choo"
 
 

@@ -20,28 +20,11 @@ def rigid(draw: st.DrawFn) -> np.ndarray:
     return poses.from_quaternion(draw(arrays(float, 3, elements=st.floats(-100, 100))), quaternion)
 
 
-@given(rigid(), rigid(), rigid())
-def test_composition_is_associative(a: np.ndarray, b: np.ndarray, c: np.ndarray):
-    assert np.allclose((a @ b) @ c, a @ (b @ c), atol=1e-9)
-
-
-@given(rigid(), rigid())
-def test_composing_two_poses_gives_a_pose(a: np.ndarray, b: np.ndarray):
-    product = a @ b
-    assert np.allclose(product[:3, :3].T @ product[:3, :3], np.eye(3), atol=1e-12)
-    assert np.linalg.det(product[:3, :3]) == pytest.approx(1.0)
-
-
 @given(rigid())
 def test_the_inverse_undoes_a_pose_on_either_side(a: np.ndarray):
     assert np.allclose(a @ poses.inverse(a), np.eye(4), atol=1e-10)
     assert np.allclose(poses.inverse(a) @ a, np.eye(4), atol=1e-10)
     assert np.array_equal(poses.inverse(a[None, None])[0, 0], poses.inverse(a))
-
-
-@given(rigid(), rigid())
-def test_the_inverse_of_a_product_is_the_product_of_inverses_reversed(a: np.ndarray, b: np.ndarray):
-    assert np.allclose(poses.inverse(a @ b), poses.inverse(b) @ poses.inverse(a), atol=1e-9)
 
 
 @given(rigid(), rigid(), arrays(float, (4, 3), elements=st.floats(-10, 10)))
@@ -100,33 +83,16 @@ def test_a_rotation_with_rounding_is_made_orthonormal_and_hardly_moved(a: np.nda
     assert np.allclose(poses.orthonormalize_all(written[None], ["frame 7"])[0], mended, atol=1e-12)
 
 
-def _scaled() -> np.ndarray:
-    return np.diag([2.0, 2.0, 2.0, 1.0])
-
-
-def _mirrored() -> np.ndarray:
-    return np.diag([1.0, 1.0, -1.0, 1.0])
-
-
-def _sheared_bottom() -> np.ndarray:
-    pose = np.eye(4)
-    pose[3, 0] = 0.5
-    return pose
-
-
-def _nan() -> np.ndarray:
-    pose = np.eye(4)
-    pose[0, 3] = np.nan
-    return pose
-
-
 @pytest.mark.parametrize(
     ("pose", "sentence"),
     [
-        (_scaled(), "off orthonormal by 3, determinant 8"),
-        (_mirrored(), "determinant -1"),
-        (_sheared_bottom(), "The pose of frame 000012 is not a rigid transform"),
-        (_nan(), "The pose of frame 000012 holds NaN or infinity; remove that frame or fix its pose."),
+        (np.diag([2.0, 2.0, 2.0, 1.0]), "off orthonormal by 3, determinant 8"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "determinant -1"),
+        (np.eye(4) + 0.5 * np.eye(4, k=-3), "The pose of frame 000012 is not a rigid transform"),
+        (
+            np.diag([1.0, 1.0, 1.0, np.nan]),
+            "The pose of frame 000012 holds NaN or infinity; remove that frame or fix its pose.",
+        ),
     ],
 )
 def test_what_is_no_pose_is_refused_with_the_frames_name(pose: np.ndarray, sentence: str):

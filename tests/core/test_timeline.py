@@ -101,29 +101,20 @@ def test_whatever_the_clock_did_the_stamps_rise_strictly_afterwards(stamps: list
     assert len(order.index) == len(stamps) or order.notices
 
 
-def test_a_good_clock_is_left_alone():
-    order = in_order(np.array([0.0, 0.1, 0.2]), "frames")
-    assert order.index.tolist() == [0, 1, 2] and order.notices == ()
-
-
-def test_samples_a_little_out_of_order_are_sorted():
-    order = in_order(np.array([0.0, 0.2, 0.1, 0.3]), "frames")
-    assert order.index.tolist() == [0, 2, 1, 3]
-    assert order.notices == ("The stamps of the frames run backwards 1 time(s); they were sorted.",)
-
-
-def test_where_the_clock_was_set_back_the_longest_stretch_is_kept():
-    order = in_order(np.array([100.0, 100.1, 5.0, 5.1, 5.2, 5.3]), "poses")
-    assert order.index.tolist() == [2, 3, 4, 5]
-    assert order.notices == (
-        "The clock of the poses jumps back 1 time(s), by up to 95.1 s; the longest stretch, 4 of 6, is used.",
-    )
-
-
-def test_of_equal_stamps_the_first_is_kept():
-    order = in_order(np.array([0.0, 0.1, 0.1, 0.2]), "frames")
-    assert order.index.tolist() == [0, 1, 3]
-    assert order.notices == ("1 frames repeat the stamp of the one before and are left out.",)
+@pytest.mark.parametrize(
+    ("stamps", "index", "notices"),
+    [
+        ([0.0, 0.1, 0.2], [0, 1, 2], ()),
+        ([0.0, 0.2, 0.1, 0.3], [0, 2, 1, 3], ("The stamps of the poses run backwards 1 time(s); they were sorted.",)),
+        ([0.0, 0.1, 0.1, 0.2], [0, 1, 3], ("1 poses repeat the stamp of the one before and are left out.",)),
+        ([100.0, 100.1, 5.0, 5.1, 5.2, 5.3], [2, 3, 4, 5], (
+            "The clock of the poses jumps back 1 time(s), by up to 95.1 s; the longest stretch, 4 of 6, is used.",
+        )),
+    ],
+)  # fmt: skip
+def test_a_clock_is_sorted_cut_or_left_alone(stamps: list[float], index: list[int], notices: tuple[str, ...]):
+    order = in_order(np.array(stamps), "poses")
+    assert (order.index.tolist(), order.notices) == (index, notices)
 
 
 def test_gaps_are_told_with_their_place_and_length():

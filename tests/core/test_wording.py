@@ -5,12 +5,9 @@ import sys
 from contextvars import copy_context
 from threading import Thread
 
-import numpy as np
 import pytest
 
-from avlmaps.core.errors import NoAudioStreamError
 from avlmaps.core.wording import Spelling, asked_as, flag, option, options_as
-from avlmaps.recordings.containers import examine
 
 
 @pytest.mark.parametrize(
@@ -52,18 +49,3 @@ def test_processes_that_a_front_starts_spell_as_it_does():
     with options_as(Spelling.FLAG):
         said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert said.strip() == "--overwrite"
-
-
-@pytest.mark.parametrize(("spelling", "said"), [(Spelling.ARGUMENT, "(audio)"), (Spelling.FLAG, "(--audio)")])
-def test_an_error_of_the_library_names_the_option_of_its_reader(tmp_path, spelling, said):
-    av = pytest.importorskip("av")
-    path = tmp_path / "silent.mp4"
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("mpeg4", rate=5)
-        stream.width = stream.height = 32
-        stream.pix_fmt = "yuv420p"
-        container.mux(stream.encode(av.VideoFrame.from_ndarray(np.zeros((32, 32, 3), np.uint8), "rgb24")))
-        container.mux(stream.encode())
-    with options_as(spelling), pytest.raises(NoAudioStreamError) as raised:
-        examine(path)
-    assert said in str(raised.value)

@@ -76,20 +76,14 @@ def test_rays_through_the_place_from_where_it_was_seen_are_evidence() -> None:
     assert seen.through == len(BOX) and seen.verdict(GRID.voxel_size_m) is DayVerdict.GONE
 
 
-def test_rays_from_the_other_side_prove_nothing() -> None:
-    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], HERE, day(views(BACK, MIDDLE, 4.0)))
-    assert seen.through == 0 and seen.verdict(GRID.voxel_size_m) is DayVerdict.UNKNOWN
-
-
-@pytest.mark.parametrize("free_m", [0.0, 1.0, 1.5])
-def test_rays_that_end_before_it_prove_nothing(free_m: float) -> None:
-    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], HERE, day(views(FRONT, MIDDLE, free_m)))
-    assert (seen.through, seen.surface) == (0, 0)
-
-
-def test_one_view_is_not_enough() -> None:
-    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], HERE, day(views(FRONT[:1], MIDDLE, 4.0)))
-    assert seen.through == 0
+@pytest.mark.parametrize(
+    ("places", "free_m"), [(BACK, 4.0), (FRONT, 0.0), (FRONT, 1.0), (FRONT, 1.5), (FRONT[:1], 4.0)]
+)
+def test_rays_from_the_other_side_or_that_end_before_it_and_a_single_view_prove_nothing(
+    places: list[tuple[float, float, float]], free_m: float
+) -> None:
+    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], HERE, day(views(places, MIDDLE, free_m)))
+    assert (seen.through, seen.surface) == (0, 0) and seen.verdict(GRID.voxel_size_m) is DayVerdict.UNKNOWN
 
 
 def test_surface_in_its_place_keeps_it() -> None:

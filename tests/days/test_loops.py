@@ -59,9 +59,10 @@ def stored(poses: np.ndarray) -> SimpleNamespace:
 
 @pytest.fixture
 def located(monkeypatch: pytest.MonkeyPatch):
-    """Let a keyframe be located where it truly is, off by what a function says."""
+    """Return a map of some poses whose keyframes are located where they truly are, off by what a function says."""
 
-    def install(map_: SimpleNamespace, true: np.ndarray, off=lambda row: np.eye(4), score: float = 0.8) -> None:
+    def install(poses: np.ndarray, true: np.ndarray, off=lambda row: np.eye(4), score: float = 0.8) -> SimpleNamespace:
+        map_ = stored(poses)
         stamps, places = map_.data.keyframes.stamp_s, map_.data.keyframes.place
 
         def fake(there, local, place, camera, rng, settings) -> Located:
@@ -73,14 +74,14 @@ def located(monkeypatch: pytest.MonkeyPatch):
             return Located(there.keyframes.world_from_camera[0] @ measured, 50, None, score, 0.0, CAMERA)
 
         monkeypatch.setattr(loops, "locate_features", fake)
+        return map_
 
     return install
 
 
 def test_a_drive_that_came_back_is_put_right(located) -> None:
     true = drive()
-    map_ = stored(strayed(true))
-    located(map_, true)
+    map_ = located(strayed(true), true)
     found = find_loops(map_)
     before, after = (
         np.linalg.norm(of[:, :3, 3] - true[:, :3, 3], axis=1)
@@ -95,8 +96,7 @@ def test_a_drive_that_came_back_is_put_right(located) -> None:
 def test_what_is_up_stays_up(located) -> None:
     true = drive()
     tipped = motions(np.array([[0.0, 0.0, 0.0, 0.01, -0.004, 0.0]]))[0]
-    map_ = stored(strayed(true))
-    located(map_, true, lambda row: tipped)  # each place is seen a little tipped
+    map_ = located(strayed(true), true, lambda row: tipped)  # each place is seen a little tipped
     found = find_loops(map_)
     turned = (found.poses @ inverse(map_.data.keyframes.world_from_camera))[:, :3, :3].sum(axis=0)
     left, _, right = np.linalg.svd(turned)
@@ -105,33 +105,27 @@ def test_what_is_up_stays_up(located) -> None:
 
 def test_where_the_poses_are_right_they_stay(located) -> None:
     true = drive()
-    map_ = stored(true)
-    located(map_, true)
-    np.testing.assert_allclose(find_loops(map_).poses, true, atol=1e-6)
+    np.testing.assert_allclose(find_loops(located(true, true)).poses, true, atol=1e-6)
 
 
 def test_one_wrong_place_among_right_ones_is_left_out(located) -> None:
     true = drive()
-    map_ = stored(strayed(true))
     wrong = motions(np.array([[0.3, 0.2, 0.0, 0.0, 0.0, 0.4]]))[0]
-    located(map_, true, lambda row: wrong if row == 60 else np.eye(4))
-    found = find_loops(map_)
+    found = find_loops(located(strayed(true), true, lambda row: wrong if row == 60 else np.eye(4)))
     assert found.agreeing == found.closures - 1
     assert found.apart_m < 0.02
 
 
 def test_places_that_disagree_close_nothing(located) -> None:
     true, rng = drive(), np.random.default_rng(1)
-    map_ = stored(strayed(true))
-    located(map_, true, lambda row: motions(rng.normal(scale=0.3, size=(1, 6)))[0])
+    map_ = located(strayed(true), true, lambda row: motions(rng.normal(scale=0.3, size=(1, 6)))[0])
     with pytest.raises(MapError, match=r"contradict each other.*stays as it was"):
         find_loops(map_)
 
 
 def test_a_drive_that_came_nowhere_again_says_so(located) -> None:
     true = drive()
-    map_ = stored(true)
-    located(map_, true, score=0.52)  # located, but not surely
+    map_ = located(true, true, score=0.52)  # located, but not surely
     with pytest.raises(MapError, match=r"not seen to come back: of \d+ keyframes 0 were located"):
         find_loops(map_)
 
@@ -139,12 +133,10 @@ def test_a_drive_that_came_nowhere_again_says_so(located) -> None:
 def test_a_drive_is_not_bent_against_its_odometry(located, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(loops, "MOST_STRAIN", 0.1)
     true = drive()
-    map_ = stored(true)
     shifted = true.copy()
     shifted[COUNT // 2 :, 0, 3] += 0.45
-    located(map_, shifted)
     with pytest.raises(MapError, match="contradict its odometry"):
-        find_loops(map_)
+        find_loops(located(true, shifted))
 
 
 def test_some_keyframes_have_their_own_keypoints_and_pictures() -> None:

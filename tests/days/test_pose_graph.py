@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.poses import inverse
-from avlmaps.days.loops import Edges, crosses, motions, optimise
+from avlmaps.days.loops import Edges, motions, optimise
 
 COUNT = 24
 
@@ -87,9 +87,3 @@ def test_one_wrong_closure_among_right_ones_hardly_counts() -> None:
     wrong[-1, :3, 3] += 2.0
     found = optimise(start, Edges(right.first, right.second, wrong, right.sigma_m, right.sigma_rad, right.is_closure))
     np.testing.assert_allclose(found[:, :3, 3], true[:, :3, 3], atol=0.05)
-
-
-def test_crosses_are_cross_products() -> None:
-    rng = np.random.default_rng(4)
-    one, other = rng.normal(size=(2, 5, 3))
-    np.testing.assert_allclose(np.einsum("nij,nj->ni", crosses(one), other), np.cross(one, other), atol=1e-12)

@@ -110,15 +110,6 @@ def test_frames_that_bring_nothing_are_dropped_by_reason(tmp_path: Path) -> None
     assert len(live) + sum(dropped.values()) == live.status().frames_in == 48
 
 
-def test_late_frames_are_dropped_and_counted(tmp_path: Path) -> None:
-    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=EVERY) as live:
-        for number in range(40):
-            one = frame(number)
-            live.add_frame(one.rgb, one.depth_m, one.camera, one.world_from_camera, one.stamp_s)
-    status = live.status()
-    assert status.fused + status.dropped.get("late", 0) == status.frames_in == 40
-
-
 @pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("wrong", "said"),
@@ -137,13 +128,8 @@ def test_what_is_no_next_frame_is_refused_and_costs_nothing(tmp_path: Path, wron
         for number in range(12):
             add(live, frame(number))
         good = frame(12)
-        parts = dict(
-            rgb=good.rgb,
-            depth_m=good.depth_m,
-            camera=good.camera,
-            world_from_camera=good.world_from_camera,
-            stamp_s=1.2,
-        )
+        names = ("rgb", "depth_m", "camera", "world_from_camera")
+        parts = {name: getattr(good, name) for name in names} | {"stamp_s": 1.2}
         with pytest.raises(RecordingError, match=said):
             live.add_frame(**{**parts, **wrong})
         with pytest.raises(AudioError, match=r"must be an avlmaps\.Sound"):

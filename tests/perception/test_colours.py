@@ -1,11 +1,9 @@
-from dataclasses import replace
+"""Colour words for pixels: what people call colours, in light and shade."""
 
 import numpy as np
 import pytest
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.core.registry import Kind, load
-from avlmaps.perception.conformance import check
 from avlmaps.perception.embedded.colours import COLOURS, SHADES, ColourWords
 from avlmaps.recordings.types import Frame
 
@@ -29,11 +27,6 @@ def painted(*codes: str) -> np.ndarray:
 def named(*codes: str) -> list[str]:
     scores = painted(*codes) @ ENCODER.encode_words(COLOURS).T
     return [COLOURS[k] for k in scores.argmax(axis=1)]
-
-
-def test_it_is_a_pixel_encoder_like_any_other() -> None:
-    check(Kind.PIXELS, ENCODER)
-    assert isinstance(load(Kind.PIXELS, "colours"), ColourWords)
 
 
 @pytest.mark.parametrize(
@@ -100,20 +93,6 @@ def test_a_phrase_is_read_for_its_colour(phrase: str, understood: str, terms: se
     feature = ENCODER.encode_words([phrase])[0]
     assert {(COLOURS + SHADES)[k] for k in np.flatnonzero(feature)} == terms
     assert np.linalg.norm(feature) == pytest.approx(1.0 if terms else 0.0)
-
-
-def test_features_lie_on_a_quarter_of_the_pictures_grid() -> None:
-    features = ENCODER.encode(frame_of(np.zeros((48, 64, 3), np.uint8)))
-    assert features.shape == (12, 16, ENCODER.card.dim)
-    assert np.allclose(np.linalg.norm(features, axis=-1), 1.0, atol=1e-5)
-
-
-def test_the_card_changes_with_the_code_that_makes_features() -> None:
-    card = ENCODER.card
-    assert card == ColourWords().card
-    assert len(card.checksum) == 64
-    assert card.note == "it reads the colour in a phrase and knows nothing of things"
-    assert replace(card, id="x") != card
 
 
 def test_the_kitchens_cabinets_are_red(shared_data) -> None:

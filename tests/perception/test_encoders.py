@@ -105,11 +105,6 @@ def test_words_that_are_no_rows_are_refused() -> None:
         Encoders(pixels=Raising())
 
 
-def test_encoders_do_not_change() -> None:
-    with pytest.raises(AttributeError):
-        Encoders.named("embedded").name = "other"  # pyright: ignore[reportAttributeAccessIssue]
-
-
 GUIDE = Path(__file__).parents[2] / "docs"
 
 

@@ -2,8 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.perception.embedded.keypoints import RATIO, MutualRatio, match_mutual
-from avlmaps.perception.protocols import LocalFeatures, Matcher
+from avlmaps.perception.embedded.keypoints import RATIO, match_mutual
 
 
 def unit_rows(seed: int, count: int, dim: int = 8) -> np.ndarray:
@@ -69,10 +68,3 @@ def test_without_points_there_are_no_pairs() -> None:
 def test_halved_descriptors_of_a_map_are_taken_as_they_are() -> None:
     a = unit_rows(0, 20, dim=64)
     assert len(match_mutual(a, a.astype(np.float16))) == 20
-
-
-def test_it_is_a_matcher() -> None:
-    matcher = MutualRatio()
-    assert isinstance(matcher, Matcher)
-    local = LocalFeatures(np.zeros((5, 2), np.float32), unit_rows(0, 5))
-    np.testing.assert_array_equal(matcher.match(local, local), np.stack([np.arange(5)] * 2, axis=1))

@@ -143,12 +143,9 @@ def without_weights(**changes: tuple[str, ...]) -> SceneNetwork:
     return SceneNetwork(lambda: b"", msgspec.structs.replace(load_network().notes, **changes))
 
 
-def test_a_second_network_that_knows_more_categories_is_refused():
-    names = load_network().notes.categories
+def test_a_second_network_that_knows_more_categories_or_other_rooms_is_refused():
+    names, rooms = load_network().notes.categories, load_network().notes.rooms
     with pytest.raises(ValueError, match=names[-1]):
         PairedNetworks(without_weights(categories=names[:-1]), load_network())
-
-
-def test_a_second_network_that_knows_other_rooms_is_refused():
     with pytest.raises(ValueError, match="kinds of room"):
-        PairedNetworks(load_network(), without_weights(rooms=load_network().notes.rooms[1:]))
+        PairedNetworks(load_network(), without_weights(rooms=rooms[1:]))

@@ -1,8 +1,6 @@
 """The network behind the embedded pixel and view encoders: how large it looks, and what it gives back."""
 
-import shutil
 from importlib.resources import files
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -11,8 +9,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.core.errors import BackendError
-from avlmaps.perception.embedded import scene_network
 from avlmaps.perception.embedded.scene_network import (
     DEFAULT_WEIGHTS,
     SYNTHETIC_WEIGHTS,
@@ -68,18 +64,3 @@ def test_the_checksum_beside_the_weights_is_theirs(weights: str) -> None:
     assert checksum_of(content + b" ", notes) != notes.checksum
     assert checksum_of(content, msgspec.structs.replace(notes, fineness=notes.fineness + 1)) != notes.checksum
     assert checksum_of(content, msgspec.structs.replace(notes, temperature=notes.temperature + 0.1)) != notes.checksum
-
-
-def test_weights_of_another_description_are_refused_at_the_first_frame(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    frame, folder = frame_of(160, 120, 150.0), tmp_path / "weights"
-    shutil.copytree(Path(str(files("avlmaps.perception.embedded") / "weights")), folder)
-    (folder / f"{DEFAULT_WEIGHTS}.onnx").write_bytes((folder / f"{SYNTHETIC_WEIGHTS}.onnx").read_bytes())
-    monkeypatch.setattr(scene_network, "__file__", str(tmp_path / "scene_network.py"))
-    network = load_network.__wrapped__(DEFAULT_WEIGHTS)  # past the cache
-    with pytest.raises(BackendError, match=r"scene_encoder\.onnx and scene_encoder\.json do not belong together"):
-        network.see(frame)
-    (folder / f"{DEFAULT_WEIGHTS}.onnx").unlink()
-    with pytest.raises(BackendError, match="install the package again"):
-        load_network.__wrapped__(DEFAULT_WEIGHTS).see(frame)

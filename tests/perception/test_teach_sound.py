@@ -100,30 +100,19 @@ def test_sounds_taught_to_other_weights_are_left_out(knowing: EmbeddedSounds, tm
     assert [taught.name for taught in enrolled_sounds(tmp_path)] == ["toy"]
 
 
-def test_silence_teaches_nothing(knowing: EmbeddedSounds, tmp_path: Path) -> None:
-    file = tmp_path / "silence.wav"
-    soundfile.write(file, np.zeros(RATE_HZ), RATE_HZ)
-    with pytest.raises(AudioError) as refused:
-        teach_sound("nothing", [file], tmp_path, knowing)
-    assert str(refused.value) == (
-        "There is nothing to hear in silence.wav (peak 0.000000 of 1); give a clip that holds the sound."
-    )
+def test_what_teaches_nothing_is_refused(knowing: EmbeddedSounds, tmp_path: Path) -> None:
+    soundfile.write(tmp_path / "silence.wav", np.zeros(RATE_HZ), RATE_HZ)
+    (tmp_path / "broken.wav").write_bytes(b"no sound at all")
+    for name, clips, kind, said in (
+        ("toy", ["silence.wav"], AudioError, r"nothing to hear in silence\.wav \(peak 0\.000000 of 1\); give a clip"),
+        ("toy", ["broken.wav"], AudioError, r"broken\.wav"),
+        ("toy", ["missing.wav"], AudioError, r"missing\.wav"),
+        ("toy", [], AudioError, "No clips were given to learn 'toy' from; give at least one sound file"),
+        ("  ", ["silence.wav"], BackendError, "A taught sound needs a name; give one, as you would ask for it"),
+    ):
+        with pytest.raises(kind, match=said):
+            teach_sound(name, [tmp_path / clip for clip in clips], tmp_path, knowing)
     assert enrolled_sounds(tmp_path) == []
-
-
-def test_what_cannot_be_read_is_refused(knowing: EmbeddedSounds, tmp_path: Path) -> None:
-    broken = tmp_path / "broken.wav"
-    broken.write_bytes(b"no sound at all")
-    with pytest.raises(AudioError, match=r"broken\.wav"):
-        teach_sound("broken", [broken], tmp_path, knowing)
-    with pytest.raises(AudioError, match=r"missing\.wav"):
-        teach_sound("missing", [tmp_path / "missing.wav"], tmp_path, knowing)
-    with pytest.raises(AudioError) as refused:
-        teach_sound("none", [], tmp_path, knowing)
-    assert str(refused.value) == "No clips were given to learn 'none' from; give at least one sound file."
-    with pytest.raises(BackendError) as unnamed:
-        teach_sound("  ", [sparkle(0)], tmp_path, knowing)
-    assert str(unnamed.value) == "A taught sound needs a name; give one, as you would ask for it."
 
 
 def test_damaged_notes_are_named(knowing: EmbeddedSounds, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.perception.embedded.keypoints import WORDS, Vlad, learned_words
-from avlmaps.perception.protocols import LocalFeatures, PlaceEncoder
+from avlmaps.perception.protocols import LocalFeatures
 
 NO_PICTURE = np.zeros((1, 1, 3), np.uint8)
 
@@ -16,16 +16,6 @@ def features(seed: int, count: int = 200) -> LocalFeatures:
 
 VLAD = Vlad()
 STATE = VLAD.fit([features(seed) for seed in range(8)], np.random.default_rng(0))
-
-
-def test_it_is_a_place_encoder_and_its_state_is_one_array_of_centres() -> None:
-    assert isinstance(VLAD, PlaceEncoder)
-    assert {name: array.shape for name, array in STATE.items()} == {"centres": (WORDS, 128)}
-
-
-def test_the_same_generator_learns_the_same_words() -> None:
-    again = VLAD.fit([features(seed) for seed in range(8)], np.random.default_rng(0))
-    np.testing.assert_array_equal(STATE["centres"], again["centres"])
 
 
 @given(st.integers(0, 1000), st.integers(1, 300))

@@ -88,7 +88,4 @@ OTHERS = (SIMULATOR, MODELS, ROS)
 
 def how_to_get(what: What, name: str) -> str | None:
     """Return the command that installs what brings a verb, a profile or a backend; None where no distribution does."""
-    for one in OTHERS:
-        if name in getattr(one, what):
-            return install_command(distribution=one.name)
-    return None
+    return next((install_command(distribution=one.name) for one in OTHERS if name in getattr(one, what)), None)

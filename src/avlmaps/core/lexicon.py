@@ -165,22 +165,13 @@ class Lexicon:
                 return True
         return _ends_with(other, wanted)
 
-    def suggest(self, word: str, kind: EntryKind | None = None, most: int = 3) -> tuple[str, ...]:
-        """Return known spellings close to one that `find` does not know, the closest first: "labtop" gives laptop."""
-        return tuple(spelling for spelling, _ in self.scored_suggestions(word, kind, most))
-
-    def scored_suggestions(
-        self, word: str, kind: EntryKind | None = None, most: int = 3
-    ) -> tuple[tuple[str, float], ...]:
-        """Return the names of `suggest`, each with its likeness: 1 is the word itself, 0 nothing in common."""
+    def suggest(self, word: str, kind: EntryKind | None = None, most: int = 3) -> tuple[tuple[str, float], ...]:
+        """Return known spellings close to one that `find` does not know, with their likeness (1: equal), best first."""
         return self._spellers[kind].suggest(word, most)
 
-    def words(self) -> frozenset[str]:
-        """Return every known word in small letters: of all spellings, joined ones too, colours and materials."""
-        return self._words
-
     @cached_property
-    def _words(self) -> frozenset[str]:
+    def words(self) -> frozenset[str]:
+        """Every known word in small letters: of all spellings, joined ones too, colours and materials."""
         phrases = [*self.colours, *self.materials]
         for entry in self.entries():
             phrases += [*entry.spellings, entry.plural]

@@ -3,11 +3,10 @@
 import contextlib
 import ctypes
 import os
-import queue
 import sys
-import threading
+from collections import deque
 from collections.abc import Generator, Iterable
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
 from ipaddress import ip_address
 from typing import Any, Literal, TypedDict, TypeVar
 
@@ -16,9 +15,7 @@ import numpy as np
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class _End:
-    fault: BaseException | None = None
+_END: Any = object()
 
 
 def run_ahead(items: Iterable[T], depth: int = 2) -> Generator[T]:
@@ -28,42 +25,19 @@ def run_ahead(items: Iterable[T], depth: int = 2) -> Generator[T]:
     exception, ``close``), the thread stops after the item at hand and is waited for; a generator that makes the items
     is closed in that thread, so that producers may run ahead of one another in a row.
     """
-    ready: queue.Queue[Any] = queue.Queue(maxsize=max(depth, 1))
-    stop = threading.Event()
-    thread = threading.Thread(target=_produce, args=(items, ready, stop), name="avlmaps-ahead", daemon=True)
-    thread.start()
-    try:
-        while not isinstance(item := ready.get(), _End):
-            yield item
-        if item.fault is not None:
-            raise item.fault
-    finally:
-        stop.set()
-        thread.join()
-
-
-def _produce(items: Iterable[Any], ready: queue.Queue[Any], stop: threading.Event) -> None:
-    fault: BaseException | None = None
-    try:
-        for item in items:
-            if stop.is_set():
-                return
-            _hand_over(item, ready, stop)
-    except BaseException as raised:  # noqa: BLE001 - raised again by the consumer
-        fault = raised
-    finally:
-        if isinstance(items, Generator):
-            items.close()
-    _hand_over(_End(fault), ready, stop)
-
-
-def _hand_over(item: Any, ready: queue.Queue[Any], stop: threading.Event) -> None:
-    while not stop.is_set():
+    source = iter(items)
+    with ThreadPoolExecutor(1, "avlmaps-ahead") as thread:
+        ahead = deque(thread.submit(next, source, _END) for _ in range(max(depth, 1)))
         try:
-            ready.put(item, timeout=0.05)
-        except queue.Full:
-            continue
-        return
+            while (item := ahead.popleft().result()) is not _END:
+                ahead.append(thread.submit(next, source, _END))
+                yield item
+        finally:
+            for later in ahead:
+                later.cancel()
+            if isinstance(source, Generator):
+                with contextlib.suppress(RuntimeError):  # Python ends, and takes no more work
+                    thread.submit(source.close)
 
 
 def usable_cores() -> int:

@@ -55,20 +55,20 @@ def _as_text(given: Any) -> str | None:
 
 
 # By what a parameter or a field is declared as: what it must be, and how that is read.
-_NUMBERS: dict[Any, tuple[str, Callable[[Any], Any]]] = {
+_ROWS: dict[Any, tuple[str, Callable[[Any], Any]]] = {
     float: ("a number", as_number),
     int: ("a whole number", as_whole),
     Sequence[str]: ("a list of words", as_words),
     tuple[str, ...]: ("a list of words", as_words),
+    str: ("text", _as_text),
 }
-_NULLABLE: dict[Any, tuple[str, Callable[[Any], Any]]] = {kind | None: row for kind, row in _NUMBERS.items()}
-_NULLABLE[str | None] = ("text", _as_text)
-_KINDS = _NUMBERS | _NULLABLE | {str: _NULLABLE[str | None], bool: ("True or False", _as_flag)}
+_OR_NONE: dict[Any, tuple[str, Callable[[Any], Any]]] = {kind | None: row for kind, row in _ROWS.items()}
+_KINDS = _ROWS | _OR_NONE | {bool: ("True or False", _as_flag)}
 
 
 def _held(given: Any, kind: Any, name: str, error: type[Exception]) -> Any:
     wanted, read = _KINDS[kind]
-    if given is None and kind in _NULLABLE:
+    if given is None and kind in _OR_NONE:
         return None
     if (held := read(given)) is None:
         said = repr(given)

@@ -80,12 +80,8 @@ def _why_no_pose(pose: Float[np.ndarray, "4 4"], max_fault: float) -> str:
 
 def inverse(b_from_a: Float[np.ndarray, "*batch 4 4"]) -> Float[np.ndarray, "*batch 4 4"]:
     """Return ``a_from_b`` of a rigid ``b_from_a``, exactly (no general inverse)."""
-    a_from_b = np.zeros_like(b_from_a)
     transposed = np.swapaxes(b_from_a[..., :3, :3], -1, -2)
-    a_from_b[..., :3, :3] = transposed
-    a_from_b[..., :3, 3] = -np.einsum("...ij,...j->...i", transposed, b_from_a[..., :3, 3])
-    a_from_b[..., 3, 3] = 1.0
-    return a_from_b
+    return from_rotation(transposed, -np.einsum("...ij,...j->...i", transposed, b_from_a[..., :3, 3]))
 
 
 def apply(b_from_a: Float[np.ndarray, "4 4"], points_a: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
@@ -94,13 +90,13 @@ def apply(b_from_a: Float[np.ndarray, "4 4"], points_a: Float[np.ndarray, "*n 3"
 
 
 def from_rotation(
-    rotation: Float[np.ndarray, "3 3"], translation: Float[np.ndarray, "3"] | None = None
-) -> Float[np.ndarray, "4 4"]:
-    """Build a pose from a rotation and a translation, metres; none about the origin."""
-    pose = np.eye(4)
-    pose[:3, :3] = rotation
+    rotation: Float[np.ndarray, "*n 3 3"], translation: Float[np.ndarray, "*n 3"] | None = None
+) -> Float[np.ndarray, "*n 4 4"]:
+    """Build poses from rotations and translations, metres; none about the origin."""
+    pose = np.zeros((*rotation.shape[:-2], 4, 4))
+    pose[..., :3, :3], pose[..., 3, 3] = rotation, 1.0
     if translation is not None:
-        pose[:3, 3] = translation
+        pose[..., :3, 3] = translation
     return pose
 
 
@@ -110,11 +106,8 @@ def from_quaternion(
     """Build poses from translations (metres) and quaternions x y z w of any positive norm (0: ``ValueError``)."""
     from scipy.spatial.transform import Rotation
 
-    pose = np.zeros((*translation.shape[:-1], 4, 4))
-    pose[..., :3, :3] = Rotation.from_quat(quaternion_xyzw.reshape(-1, 4)).as_matrix().reshape(*pose.shape[:-2], 3, 3)
-    pose[..., :3, 3] = translation
-    pose[..., 3, 3] = 1.0
-    return pose
+    rotation = Rotation.from_quat(quaternion_xyzw.reshape(-1, 4)).as_matrix()
+    return from_rotation(rotation.reshape(*quaternion_xyzw.shape[:-1], 3, 3), translation)
 
 
 def to_quaternion(b_from_a: Float[np.ndarray, "*n 4 4"]) -> Float[np.ndarray, "*n 4"]:

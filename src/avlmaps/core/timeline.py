@@ -128,10 +128,8 @@ class Trajectory:
     ) -> Bool[np.ndarray, " k"]:
         """Return for each stamp whether a pose can be interpolated there.
 
-        Args:
-            stamps_s: when.
-            edge_s: how far outside the trajectory a stamp may lie.
-            max_gap_s: the longest pause that is bridged; by default 1 s or five usual intervals, whichever is longer.
+        A stamp may lie ``edge_s`` outside the trajectory. A pause is bridged up to ``max_gap_s``, by default one second
+        or five times the usual interval, whichever is longer.
         """
         first, last = self.stamps_s[0], self.stamps_s[-1]
         inside = (stamps_s >= first - edge_s) & (stamps_s <= last + edge_s)

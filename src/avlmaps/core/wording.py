@@ -106,13 +106,10 @@ def flag(name: str, value: str = "") -> str:
 
 
 def option(name: str, value: str = "", argument: str = "", python: str = "") -> str:
-    """Return how the reader of a sentence gives an option.
+    """Return how the reader of a sentence gives an option, by its name on the command line without dashes.
 
-    Args:
-        name: its name on the command line, without dashes.
-        value: what to give, such as ``METRES``; "" for a switch, or to name the option alone.
-        argument: its name in Python, where that is another one here than elsewhere.
-        python: what to give in Python, where that is another value.
+    ``value`` is what to give, such as ``METRES``; "" for a switch, or to name the option alone. ``argument`` and
+    ``python`` are its name here and the value in Python, where these are others.
     """
     spelling = _asked_as.get() or _spelling
     if spelling is Spelling.FLAG:

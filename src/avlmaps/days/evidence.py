@@ -88,14 +88,6 @@ class DayViews:
     def __len__(self) -> int:
         return len(self.pose)
 
-    def only(self, some: Bool[np.ndarray, " k"]) -> "DayViews":
-        """Return some of the views."""
-        return take(self, some)
-
-    def moved(self, map_from_recording: Float[np.ndarray, "4 4"]) -> "DayViews":
-        """Return them in another world."""
-        return DayViews(self.clear_mm, map_from_recording @ self.pose, self.camera)
-
     def through(self, index: Int[np.ndarray, "n 3"], grid: GridSpec) -> Int[np.ndarray, " n"]:
         """Return how many views see through each voxel; see ``count_through``."""
         views = FreeViews(np.asarray(self.clear_mm), np.asarray(self.pose, np.float64))
@@ -149,7 +141,7 @@ def seen_again(
     allowed = _from_where_it_was_seen(grid.centre_of(np.asarray(index)), before, day.views)
     through = np.zeros(len(index), bool)
     if allowed.sum() >= THROUGH_VIEWS:
-        through = day.views.only(allowed).through(index, grid) >= THROUGH_VIEWS
+        through = take(day.views, allowed).through(index, grid) >= THROUGH_VIEWS
     own = known.alone(index)
     return _counted(through, day.has_surface(grid.centre_of(np.asarray(index))), own)
 

@@ -121,11 +121,10 @@ def gather_votes(avlmap: AVLMap, other: AVLMap, rng: np.random.Generator) -> Vot
         votes.append(found.world_from_camera @ inverse(there))
         cameras.append(there)
         if len(votes) >= ENOUGH:
-            agree = supporters(np.stack(votes), np.stack(cameras))
-            if agree.sum() >= ENOUGH and spread_m(np.stack(cameras)[agree]) >= LEAST_SPREAD_M:
+            agree = supporters(np.array(votes), np.array(cameras))
+            if agree.sum() >= ENOUGH and spread_m(np.array(cameras)[agree]) >= LEAST_SPREAD_M:
                 break
-    none = np.zeros((0, 4, 4))
-    return Votes(np.stack(votes) if votes else none, np.stack(cameras) if cameras else none, tried)
+    return Votes(np.array(votes).reshape(-1, 4, 4), np.array(cameras).reshape(-1, 4, 4), tried)
 
 
 def features_of(avlmap: AVLMap, row: int) -> LocalFeatures:
@@ -255,9 +254,7 @@ def _agreement(avlmap: AVLMap, other: Path, points: Float[np.ndarray, "n 3"], kn
     grid = avlmap.data.grid
     on_surface = known.near(points)
     index = grid.index_of(points)
-    free = np.zeros(len(index), np.int64)
-    for views in views_of(avlmap):
-        free += views.through(index, grid)
+    free = np.sum([views.through(index, grid) for views in views_of(avlmap)], axis=0)
     through = (free >= THROUGH_VIEWS) & ~on_surface
     looked = int(on_surface.sum() + through.sum())
     share = float(on_surface.sum() / max(looked, 1))
@@ -280,18 +277,14 @@ def visits_of(avlmap: AVLMap) -> tuple[Visit, ...]:
     seen = np.asarray(avlmap.data.voxels.last_seen_s)
     begin = min(begin, float(seen.min(initial=begin)))
     end = max(float(stamps.max(initial=begin)), float(seen.max(initial=begin)))
-    day = day_of(clock_s(info.recording, begin))
+    at_s = clock_s(info.recording, begin)
+    day = "" if at_s is None else datetime.fromtimestamp(at_s, UTC).date().isoformat()
     return (
         Visit(
             day=day, recording=info.recording, begin_s=begin, end_s=end, shift_s=0.0, map_from_recording=_IDENTITY,  # pyright: ignore[reportArgumentType]
             rig=info.rig, frames=info.counts.frames,
         ),
     )  # fmt: skip
-
-
-def day_of(at_s: float | None) -> str:
-    """Return the day of a moment; "" where no clock said it."""
-    return "" if at_s is None else datetime.fromtimestamp(at_s, UTC).date().isoformat()
 
 
 def clock_s(recording: RecordingInfo | Recording, stamp_s: float) -> float | None:

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-import msgspec
 import numpy as np
+from msgspec.structs import replace
 from scipy.optimize import linear_sum_assignment
 
 from avlmaps.core.arrays import Bool, Float, Int
@@ -81,39 +81,23 @@ def lived_on(
     their stay, as ``SeenThing.feature``.
     """
     voxels = [life.voxels(number) for number in range(len(life))]
-    stays = [
-        _still_absent(stay, own, day, before, known, visit, grid) for stay, own in zip(life.stays, voxels, strict=True)
-    ]
+    stays = list(life.stays)
     present = [number for number, stay in enumerate(stays) if stay.gone is None]
     matched = _matched(present, stays, voxels, things, same)
-    for number in present:
-        stay = stays[number]
+    for number, stay in enumerate(stays):
         if (thing := matched.get(number)) is not None:
             seen = things[thing]
             better = seen.confidence > stay.confidence
-            stays[number] = msgspec.structs.replace(
-                stay,
-                name=seen.name if better else stay.name,
-                confidence=max(stay.confidence, seen.confidence),
-                last=visit,
-                looked=visit,
-                last_seen_s=seen.seen_s,
-                there_on=(*stay.there_on, visit),
-            )
+            name, confidence = (seen.name, seen.confidence) if better else (stay.name, stay.confidence)
+            stays[number] = replace(_there(stay, visit, seen.seen_s), name=name, confidence=confidence)
             continue
-        views = [one for one in before[stay.first : visit] if len(one)]
-        seen = seen_again(voxels[number], grid, views, known, day)
-        match seen.verdict(grid.voxel_size_m):
-            case DayVerdict.THERE:
-                there_on = (*stay.there_on, visit)
-                stays[number] = msgspec.structs.replace(
-                    stay, last=visit, looked=visit, last_seen_s=at_s[visit], there_on=there_on
-                )
-            case DayVerdict.GONE:
-                absent_on = (*stay.absent_on, visit)
-                stays[number] = msgspec.structs.replace(stay, looked=visit, gone=visit, absent_on=absent_on)
-            case DayVerdict.UNKNOWN:
-                pass
+        views = [one for one in before[stay.first : visit if stay.gone is None else stay.gone] if len(one)]
+        verdict = seen_again(voxels[number], grid, views, known, day).verdict(grid.voxel_size_m)
+        if verdict is DayVerdict.GONE:
+            gone = replace(stay, absent_on=(*stay.absent_on, visit))
+            stays[number] = replace(gone, looked=visit, gone=visit) if stay.gone is None else gone
+        elif verdict is DayVerdict.THERE and stay.gone is None:
+            stays[number] = _there(stay, visit, at_s[visit])
     new: list[int] = []
     looks = dict(features)
     for number in sorted(set(range(len(things))) - set(matched.values())):
@@ -127,28 +111,14 @@ def lived_on(
         if stay.appeared:
             each = [seen_before(thing.index, grid, [views], known, day) for views in before]
             absent_on = tuple(one for one, verdict in enumerate(each) if verdict is DayVerdict.GONE)
-            stay = msgspec.structs.replace(stay, absent_on=absent_on)
+            stay = replace(stay, absent_on=absent_on)
         stays.append(stay)
         voxels.append(thing.index)
     return Life.of(_moved(stays, new, looks, visit, at_s, same), voxels)
 
 
-def _still_absent(
-    stay: Stay,
-    voxels: Int[np.ndarray, "v 3"],
-    day: Day,
-    before: Sequence[DayViews],
-    known: Occupied,
-    visit: int,
-    grid: GridSpec,
-) -> Stay:
-    if stay.gone is None:
-        return stay
-    views = [one for one in before[stay.first : stay.gone] if len(one)]
-    seen = seen_again(voxels, grid, views, known, day)
-    if seen.verdict(grid.voxel_size_m) is not DayVerdict.GONE:
-        return stay
-    return msgspec.structs.replace(stay, absent_on=(*stay.absent_on, visit))
+def _there(stay: Stay, visit: int, seen_s: float) -> Stay:
+    return replace(stay, last=visit, looked=visit, last_seen_s=seen_s, there_on=(*stay.there_on, visit))
 
 
 def _stay(thing: SeenThing, visit: int, appeared: bool) -> Stay:
@@ -172,7 +142,8 @@ def _matched(
     value = np.zeros((len(present), len(things)))
     for row, number in enumerate(present):
         for column, thing in enumerate(things):
-            if np.linalg.norm(np.subtract(stays[number].position, thing.position)) > _far(stays[number], thing):
+            far_m = (np.linalg.norm(stays[number].size) + np.linalg.norm(thing.size)) / 2 + 0.2
+            if np.linalg.norm(np.subtract(stays[number].position, thing.position)) > far_m:
                 continue
             shared = int(np.isin(own[row], keys[column], assume_unique=False).sum())
             smaller, larger = sorted((len(own[row]), len(thing.index)))
@@ -187,10 +158,6 @@ def _matched(
         for row, column in zip(rows.tolist(), columns.tolist(), strict=True)
         if value[row, column] > 0.0
     }
-
-
-def _far(stay: Stay, thing: SeenThing) -> float:
-    return float(np.linalg.norm(stay.size) + np.linalg.norm(thing.size)) / 2 + 0.2
 
 
 def _moved(
@@ -221,18 +188,15 @@ def _moved(
             named = same(stays[one].name, stays[other].name)
             clear = named and now and stays[other].appeared
             fits = alike >= (LEAST_LIKENESS if clear else LIKENESS_UNNAMED)
-            if (named or unsure) and fits and _apart_m(stays[one], stays[other]) <= REACH_M:
+            apart_m = np.linalg.norm(np.subtract(stays[one].position, stays[other].position))
+            if (named or unsure) and fits and apart_m <= REACH_M:
                 value[row, column] = alike + _NAMED * named
     for row, column in zip(*linear_sum_assignment(-value), strict=True):
         if value[row, column] > 0.0:
             one, other = gone[row], new[column]
-            stays[one] = msgspec.structs.replace(stays[one], moved_to=other)
-            stays[other] = msgspec.structs.replace(stays[other], moved_from=one)
+            stays[one] = replace(stays[one], moved_to=other)
+            stays[other] = replace(stays[other], moved_from=one)
     return stays
-
-
-def _apart_m(one: Stay, other: Stay) -> float:
-    return float(np.linalg.norm(np.subtract(one.position, other.position)))
 
 
 def look_alike(one: Float[np.ndarray, " d"], other: Float[np.ndarray, " d"]) -> float:

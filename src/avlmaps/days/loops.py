@@ -55,15 +55,17 @@ class Edges:
     def __len__(self) -> int:
         return len(self.first)
 
-    def only(self, kept: Bool[np.ndarray, " e"]) -> "Edges":
-        """Return some of them."""
-        return take(self, kept)
+    def sigmas(self) -> Float[np.ndarray, "e 6"]:
+        """Return the standard deviations of ``errors``."""
+        return np.repeat(np.stack([self.sigma_m, self.sigma_rad], axis=1), 3, axis=1)
 
     def errors(self, poses: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "e 6"]:
-        """Return how far each is from what the poses say: translation (3, metres), rotation (3, radians)."""
+        """Return how far each is from what the poses say: translation, metres; rotation, axis times angle, radians."""
+        from scipy.spatial.transform import Rotation
+
         found = inverse(poses[self.first]) @ poses[self.second]
         off = inverse(self.measured) @ found
-        return np.concatenate([off[:, :3, 3], rotation_vectors(off)], axis=1)
+        return np.concatenate([off[:, :3, 3], Rotation.from_matrix(off[:, :3, :3]).as_rotvec()], axis=1)
 
 
 def optimise(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> Float[np.ndarray, "n 4 4"]:
@@ -71,28 +73,18 @@ def optimise(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> Float[np.ndarra
     from scipy.sparse import csc_matrix
     from scipy.sparse.linalg import spsolve
 
-    count, found = len(poses), poses.copy()
-    scale = 1.0 / np.repeat(np.stack([edges.sigma_m, edges.sigma_rad], axis=1), 3, axis=1)
-    row = np.arange(6 * len(edges)).reshape(-1, 6)
-    columns = [6 * ends[:, None] + np.arange(6) for ends in (edges.first, edges.second)]
-    free = np.arange(6 * count - 6)
-    damping = csc_matrix((np.full(len(free), 1e-9), (free, free)), shape=(len(free), len(free)))
+    shape, found = (6 * len(edges), 6 * len(poses)), poses.copy()
+    scale = 1.0 / edges.sigmas()
+    of_both = (6 * np.stack([edges.first, edges.second], axis=1)[:, :, None] + np.arange(6)).reshape(-1, 12)
+    row, column = np.broadcast_arrays(np.arange(shape[0]).reshape(-1, 6, 1), of_both[:, None])
+    free = np.arange(shape[1] - 6)
+    damping = csc_matrix((np.full(len(free), 1e-9), (free, free)))
     for _ in range(_STEPS):
         error = edges.errors(found) * scale
         weight = np.where(edges.is_closure, 1.0 / (1.0 + (error**2).sum(axis=1) / 6.0), 1.0)
         root = np.sqrt(weight)[:, None]
-        of_first, of_second = _slopes(found, edges)
-        values = [slope * (scale * root)[:, :, None] for slope in (of_first, of_second)]
-        slope = csc_matrix(
-            (
-                np.concatenate([one.ravel() for one in values]),
-                (
-                    np.concatenate([np.repeat(row, 6, axis=1).ravel()] * 2),
-                    np.concatenate([np.tile(column, (1, 6)).ravel() for column in columns]),
-                ),
-            ),
-            shape=(6 * len(edges), 6 * count),
-        )[:, 6:]
+        value = _slopes(found, edges) * (scale * root)[:, :, None]
+        slope = csc_matrix((value.ravel(), (row.ravel(), column.ravel())), shape)[:, 6:]
         step = -spsolve(slope.T @ slope + damping, slope.T @ (error * root).ravel()).reshape(-1, 6)
         found[1:] = found[1:] @ motions(step)
         if np.abs(step).max(initial=0.0) < _STILL:
@@ -100,8 +92,8 @@ def optimise(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> Float[np.ndarra
     return found
 
 
-def _slopes(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> tuple[np.ndarray, np.ndarray]:
-    # How errors change with small motions of both poses, in their own frames: (e, 6, 6) each. Of the rotation's
+def _slopes(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> Float[np.ndarray, "e 6 12"]:
+    # How errors change with small motions of both poses, in their own frames. Of the rotation's
     # logarithm the slope is taken at 0, which is exact where the edges fit.
     off = inverse(edges.measured) @ inverse(poses[edges.first]) @ poses[edges.second]
     between = inverse(poses[edges.second]) @ poses[edges.first]  # of a motion of i, seen from j
@@ -111,7 +103,7 @@ def _slopes(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> tuple[np.ndarray
     turn = between[:, :3, :3]
     carried[:, :3, :3], carried[:, 3:, 3:] = turn, turn
     carried[:, :3, 3:] = crosses(between[:, :3, 3]) @ turn
-    return -second @ carried, second
+    return np.concatenate([-second @ carried, second], axis=2)
 
 
 def crosses(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
@@ -122,21 +114,11 @@ def crosses(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
     return out - np.swapaxes(out, 1, 2)
 
 
-def rotation_vectors(transforms: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "n 3"]:
-    """Return the rotations as axis times angle, radians."""
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(transforms[:, :3, :3]).as_rotvec()
-
-
 def motions(steps: Float[np.ndarray, "n 6"]) -> Float[np.ndarray, "n 4 4"]:
     """Return small motions: a translation, metres, and a rotation as axis times angle."""
     from scipy.spatial.transform import Rotation
 
-    out = np.tile(np.eye(4), (len(steps), 1, 1))
-    out[:, :3, :3] = Rotation.from_rotvec(steps[:, 3:]).as_matrix()
-    out[:, :3, 3] = steps[:, :3]
-    return out
+    return from_rotation(Rotation.from_rotvec(steps[:, 3:]).as_matrix(), steps[:, :3])
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,10 +167,10 @@ def find_loops(avlmap: AVLMap) -> Loops:
     found = optimise(poses, concat([odometry, closures]))
     agree = _agreeing(closures, found)
     if 0 < agree.sum() < len(agree):
-        found = optimise(poses, concat([odometry, closures.only(agree)]))
+        found = optimise(poses, concat([odometry, take(closures, agree)]))
         agree = _agreeing(closures, found)
     found = _upright(found, poses, avlmap.data.up_in_world)
-    strain = odometry.errors(found) / np.repeat(np.stack([odometry.sigma_m, odometry.sigma_rad], axis=1), 3, axis=1)
+    strain = odometry.errors(found) / odometry.sigmas()
     bent = float(np.sqrt(np.mean(strain**2))) if len(odometry) else 0.0
     before, after = (np.linalg.norm(closures.errors(of)[:, :3], axis=1) for of in (poses, found))
     said = (

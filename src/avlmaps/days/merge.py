@@ -111,8 +111,9 @@ def merge_maps(
     grid = avlmap.data.grid
     before = find.views_of(avlmap)
     laid, *_ = resampled(np.asarray(other.data.voxels.index), grid, moved)
+    (views,) = find.views_of(other)
     now = Day(
-        find.views_of(other)[0].moved(moved),
+        replace(views, pose=moved @ views.pose),
         Occupied.of(np.asarray(other.data.voxels.index), grid),
         inverse(moved),
         Occupied.of(laid, grid),

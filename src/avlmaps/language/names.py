@@ -100,7 +100,7 @@ def _is_compound(word: str) -> bool:
 @cache
 def near_names(word: str) -> tuple[tuple[str, float], ...]:
     """Return known names that are spelt like a word, and how alike they are, the closest first."""
-    return lexicon().scored_suggestions(word, None, 3)
+    return lexicon().suggest(word)
 
 
 @cache
@@ -130,7 +130,7 @@ def _is_name(phrase: str) -> bool:
     if book.find(phrase, EntryKind.THING) is not None or book.find(phrase, EntryKind.ROOM) is not None:
         return True
     words = phrase.split()
-    described = words[0] in book.words() or words[0] in _adjectives()
+    described = words[0] in book.words or words[0] in _adjectives()
     if words[-1] in _ONLY_ROOMS and len(words) == 2 and words[0] not in listed("never") and described:
         return True
     return any(name in also_things() for name in (phrase, *singulars_of(phrase)))
@@ -297,4 +297,4 @@ def _known() -> frozenset[str]:
     texts = (text for text in classes.lists.values() if isinstance(text, str))
     listed = (word.strip(",") for text in texts for word in text.split())
     phrases = (word for each in classes.words.values() for phrase in each for word in phrase.split())
-    return frozenset({*listed, *phrases, *lexicon().words(), *WORDS, *sounding_words()})
+    return frozenset({*listed, *phrases, *lexicon().words, *WORDS, *sounding_words()})

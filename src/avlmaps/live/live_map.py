@@ -59,19 +59,13 @@ class Gates:
 
     def reason_against(self, frame: Frame, mapper: Mapper) -> str | None:
         """Return why a frame brings nothing, ``still`` or ``known``; None where it is to be fused."""
-        if not len(mapper) or self._last is None or self._new_share(frame, mapper) > self._settings.new_share:
-            self._last = np.asarray(frame.world_from_camera, np.float64)
+        pose, last = np.asarray(frame.world_from_camera, np.float64), self._last
+        if not len(mapper) or last is None or self._new_share(frame, mapper) > self._settings.new_share:
+            self._last = pose
             return None
-        return "still" if self.is_still(frame) else "known"
-
-    def is_still(self, frame: Frame) -> bool:
-        """Return whether the camera did not move since the last frame that was to be fused."""
-        if self._last is None:
-            return False
-        pose = np.asarray(frame.world_from_camera, np.float64)
-        moved_m = float(np.linalg.norm(pose[:3, 3] - self._last[:3, 3]))
-        turned_rad = float(rotation_angle_rad(pose[None], self._last[None])[0])
-        return moved_m < self._settings.still_m and turned_rad < np.radians(self._settings.still_deg)
+        moved_m = float(np.linalg.norm(pose[:3, 3] - last[:3, 3]))
+        looks_there = rotation_angle_rad(pose, last) < np.radians(self._settings.still_deg)
+        return "still" if looks_there and moved_m < self._settings.still_m else "known"
 
     def _new_share(self, frame: Frame, mapper: Mapper) -> float:
         world = _points(frame, self._farthest_m)

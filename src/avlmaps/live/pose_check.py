@@ -10,15 +10,7 @@ import numpy as np
 
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.recordings.channels import LONGEST_GAP_S
-from avlmaps.recordings.consistency.agreement import (
-    LEAST_AGREEING,
-    Surfaces,
-    can_be_judged,
-    compare,
-    draw_pairs,
-    geometry_agrees,
-    without_occluded,
-)
+from avlmaps.recordings.consistency import agreement
 from avlmaps.recordings.memory import MemoryRecording
 from avlmaps.recordings.plausible import pace_fault
 from avlmaps.recordings.types import Frame
@@ -113,13 +105,13 @@ class PoseCheck:
 
     def _compared(self) -> str | None:
         pairs = np.array([(a, b) for a, b in combinations(range(len(self._held)), 2) if b - a <= 2])
-        sample = draw_pairs(MemoryRecording(self._held), pairs, np.ones(len(pairs), bool))
-        surfaces = Surfaces.of(sample.depth_m)
-        found = compare(sample, surfaces, sample.world_from_camera, colour=False)
-        found = without_occluded(found, sample, surfaces)
-        if not can_be_judged(found):
+        sample = agreement.draw_pairs(MemoryRecording(self._held), pairs, np.ones(len(pairs), bool))
+        surfaces = agreement.Surfaces.of(sample.depth_m)
+        found = agreement.compare(sample, surfaces, sample.world_from_camera, colour=False)
+        found = agreement.without_occluded(found, sample, surfaces)
+        if not agreement.can_be_judged(found):
             return None
-        if geometry_agrees(found) or found.same_share >= _LEAST_AGREEING:
+        if agreement.geometry_agrees(found) or found.same_share >= _LEAST_AGREEING:
             self._bad, self._in_doubt = 0, False
             return None
         self._bad += 1
@@ -129,6 +121,6 @@ class PoseCheck:
         first, last = self._held[0].stamp_s, self._held[-1].stamp_s
         return (
             f"The poses do not fit the pictures from {first:.1f} to {last:.1f} s: {found.same_share:.0%} of the points "
-            f"of one frame lie on the surface that another sees, where right poses have {LEAST_AGREEING:.0%}. Check "
-            "the odometry, or whether the robot slips."
+            f"of one frame lie on the surface that another sees, where right poses have {agreement.LEAST_AGREEING:.0%}."
+            " Check the odometry, or whether the robot slips."
         )

@@ -52,12 +52,9 @@ def replay(
 ) -> None:
     """Give a live map the frames and the sound of a recording. Frames that cannot be read are left out.
 
-    Args:
-        recording: what to play.
-        live: the map.
-        rate: how many times faster than it was recorded; None waits for the map, so that no frame is late.
-        tell: called with each doubt, as soon as it is known.
-        over: whether to end before the recording does; queried before each frame.
+    ``rate`` is how many times faster than it was recorded; None waits for the map, so that no frame is late. ``tell``
+    is called with each doubt, as soon as it is known; ``over``, queried before each frame, ends it before the recording
+    does.
     """
     begin_s, told, ears = time.perf_counter(), set[str](), Ears(recording.audio, live)
     shown = progress(range(len(recording)), "mapping", total=len(recording), note=lambda: _note(live))

@@ -28,19 +28,11 @@ from avlmaps.core.progress import say
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
+from avlmaps.perception import protocols
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models import cache_folder, precision_in_force
 from avlmaps.perception.networks import key_of, seen_in
 from avlmaps.perception.own_encoder import with_members
-from avlmaps.perception.protocols import (
-    PROTOCOLS,
-    BatchPixelEncoder,
-    FrameSoundEncoder,
-    LocalFeatures,
-    ModelCard,
-    PixelEncoder,
-    members_of,
-)
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 
@@ -82,7 +74,7 @@ class FeatureStore:
         self._full = False
         self._lock = threading.Lock()
 
-    def get(self, kind: Kind, card: ModelCard, key: str) -> Mapping[str, np.ndarray] | None:
+    def get(self, kind: Kind, card: protocols.ModelCard, key: str) -> Mapping[str, np.ndarray] | None:
         """Return stored arrays by name, None where there are none that can be read."""
         path = self._path(kind, card, key)
         try:
@@ -95,7 +87,7 @@ class FeatureStore:
             self.found[kind] = self.found.get(kind, 0) + 1
         return arrays
 
-    def put(self, kind: Kind, card: ModelCard, key: str, arrays: Mapping[str, np.ndarray]) -> None:
+    def put(self, kind: Kind, card: protocols.ModelCard, key: str, arrays: Mapping[str, np.ndarray]) -> None:
         """Store arrays by name, if there is room for them."""
         if self._full:
             return
@@ -109,7 +101,7 @@ class FeatureStore:
         except OSError as fault:
             self._stop(f"Features are not cached any longer: {self.folder}: {fault.strerror or fault}.")
 
-    def _path(self, kind: Kind, card: ModelCard, key: str) -> Path:
+    def _path(self, kind: Kind, card: protocols.ModelCard, key: str) -> Path:
         named = re.sub(r"[^A-Za-z0-9._-]+", "-", card.id).strip(".-")[:60]
         return self.folder / f"{kind}-{named}-{card.checksum[:16]}" / f"{key}.safetensors"
 
@@ -179,7 +171,7 @@ _Made = Mapping[str, np.ndarray]
 
 def _each(
     kind: Kind,
-    card: ModelCard,
+    card: protocols.ModelCard,
     store: FeatureStore | None,
     make: Callable[[list[int]], Sequence[_Made]],
     seen: Sequence[Sequence[Any]],
@@ -229,18 +221,19 @@ def cached(kind: Kind, encoder: Any, store: FeatureStore | None, *, half: bool =
         return once(lambda: encoder.encode(sound), sound.samples, sound.rate_hz)
 
     def places(
-        rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
+        rgb: UInt8[np.ndarray, "h w 3"], local: protocols.LocalFeatures, state: dict[str, np.ndarray]
     ) -> Float32[np.ndarray, " d"]:
         learnt = [part for name in sorted(state) for part in (name, np.asarray(state[name]))]
         seen = (rgb, local.xy, local.descriptors, local.score, *learnt)
         return once(lambda: encoder.encode(rgb, local, state), *seen)
 
-    def keypoints(rgb: UInt8[np.ndarray, "h w 3"]) -> LocalFeatures:
+    def keypoints(rgb: UInt8[np.ndarray, "h w 3"]) -> protocols.LocalFeatures:
         (made,) = each(lambda _: [_arrays_of(encoder.encode(rgb))], [[rgb]])
         width, height = made["size"].tolist()
-        return LocalFeatures(made["xy"], made["descriptors"], made["score"], (width, height))
+        return protocols.LocalFeatures(made["xy"], made["descriptors"], made["score"], (width, height))
 
-    names = (*members_of(FrameSoundEncoder if kind is Kind.SOUNDS else PROTOCOLS[kind]), "keyframes_only")
+    protocol = protocols.FrameSoundEncoder if kind is Kind.SOUNDS else protocols.PROTOCOLS[kind]
+    names = (*protocols.members_of(protocol), "keyframes_only")
     others: dict[Kind, dict[str, Any]] = {
         Kind.PIXELS: {
             "encode": lambda frame: pixels([frame])[0],
@@ -255,13 +248,13 @@ def cached(kind: Kind, encoder: Any, store: FeatureStore | None, *, half: bool =
     return with_members(encoder, names, {**others[kind], "store": store})
 
 
-def encode_batch(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
+def encode_batch(encoder: protocols.PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
     """Return the features of each frame, made in one go where the encoder can."""
-    if len(frames) > 1 and isinstance(encoder, BatchPixelEncoder):
+    if len(frames) > 1 and isinstance(encoder, protocols.BatchPixelEncoder):
         return encoder.encode_batch([frame.copy() for frame in frames])
     return [encoder.encode(frame.copy()) for frame in frames]
 
 
-def _arrays_of(local: LocalFeatures) -> dict[str, np.ndarray]:
+def _arrays_of(local: protocols.LocalFeatures) -> dict[str, np.ndarray]:
     columns = {name: np.asarray(getattr(local, name), np.float32) for name in ("xy", "descriptors", "score")}
     return {**columns, "size": np.array(local.size)}

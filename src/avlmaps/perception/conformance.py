@@ -79,10 +79,6 @@ def _equal(one: np.ndarray, other: np.ndarray) -> bool:
     return one.shape == other.shape and np.allclose(one, other, rtol=1e-4, atol=1e-5)
 
 
-def _check_word_encoder(encoder: protocols.WordEncoder) -> None:
-    _check_words(encoder.encode, encoder.card.dim, zero_allowed=False)
-
-
 def _check_pixel_encoder(encoder: protocols.PixelEncoder) -> None:
     features = encoder.encode(example_frame())
     hold(features.ndim == 3, f"pixel features must have three axes, not {features.ndim}")
@@ -205,7 +201,7 @@ def _check_pairs(pairs: np.ndarray, first: int, second: int) -> None:
 
 
 _CHECKS: dict[Kind, Callable[[Any], None]] = {
-    Kind.WORDS: _check_word_encoder,
+    Kind.WORDS: lambda encoder: _check_words(encoder.encode, encoder.card.dim, zero_allowed=False),
     Kind.PIXELS: _check_pixel_encoder,
     Kind.VIEWS: _check_view_encoder,
     Kind.SOUNDS: _check_sound_encoder,

@@ -6,23 +6,14 @@ models. A map remembers the name of its profile and every model's card.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import how_to_get
 from avlmaps.core.registry import Backend, Kind, brought, entry_points, find, load
 from avlmaps.core.words import nearest
+from avlmaps.perception import protocols
 from avlmaps.perception.own_encoder import completed, whole
-from avlmaps.perception.protocols import (
-    PROTOCOLS,
-    LocalEncoder,
-    Matcher,
-    ModelCard,
-    PixelEncoder,
-    PlaceEncoder,
-    SoundEncoder,
-    ViewEncoder,
-)
 
 ENTRY_POINT_GROUP = "avlmaps.profiles"
 GIVEN = "given:"
@@ -61,7 +52,7 @@ class Source:
                 f"which it does not hold; open it in Python with encoders=avlmaps.Encoders({self.kind}=...)."
             )
         encoder = load(self.kind, self.name)
-        return encoder if isinstance(encoder, PROTOCOLS[self.kind]) else whole(self.kind, encoder)
+        return encoder if isinstance(encoder, protocols.PROTOCOLS[self.kind]) else whole(self.kind, encoder)
 
     @property
     def backend(self) -> Backend | None:
@@ -106,12 +97,12 @@ class Encoders:
         self,
         name: str = _OWN,
         *,
-        pixels: PixelEncoder | object | None = None,
-        views: ViewEncoder | object | None = None,
-        sounds: SoundEncoder | object | None = None,
-        local: LocalEncoder | object | None = None,
-        place: PlaceEncoder | object | None = None,
-        matcher: Matcher | object | None = None,
+        pixels: protocols.PixelEncoder | object | None = None,
+        views: protocols.ViewEncoder | object | None = None,
+        sounds: protocols.SoundEncoder | object | None = None,
+        local: protocols.LocalEncoder | object | None = None,
+        place: protocols.PlaceEncoder | object | None = None,
+        matcher: protocols.Matcher | object | None = None,
         about: str = "",
         weight_variance_m2: float = 0.6,
         sources: Mapping[Kind, Source] | None = None,
@@ -196,45 +187,45 @@ class Encoders:
         )
 
     @property
-    def pixels(self) -> PixelEncoder:
+    def pixels(self) -> protocols.PixelEncoder:
         """Features of objects."""
-        return cast(PixelEncoder, self.load(Kind.PIXELS))
+        return self.load(Kind.PIXELS)
 
     @property
-    def views(self) -> ViewEncoder:
+    def views(self) -> protocols.ViewEncoder:
         """Features of areas."""
-        return cast(ViewEncoder, self.load(Kind.VIEWS))
+        return self.load(Kind.VIEWS)
 
     @property
-    def sounds(self) -> SoundEncoder:
+    def sounds(self) -> protocols.SoundEncoder:
         """Features of sounds."""
-        return cast(SoundEncoder, self.load(Kind.SOUNDS))
+        return self.load(Kind.SOUNDS)
 
     @property
-    def local(self) -> LocalEncoder:
+    def local(self) -> protocols.LocalEncoder:
         """Keypoints."""
-        return cast(LocalEncoder, self.load(Kind.LOCAL))
+        return self.load(Kind.LOCAL)
 
     @property
-    def place(self) -> PlaceEncoder:
+    def place(self) -> protocols.PlaceEncoder:
         """Retrieval of places."""
-        return cast(PlaceEncoder, self.load(Kind.PLACE))
+        return self.load(Kind.PLACE)
 
     @property
-    def matcher(self) -> Matcher:
+    def matcher(self) -> protocols.Matcher:
         """Matching of keypoints."""
-        return cast(Matcher, self.load(Kind.MATCHER))
+        return self.load(Kind.MATCHER)
 
     @property
     def keyframes_only(self) -> bool:
         """Whether only keyframes get features of pixels."""
         return Kind.PIXELS in self and self.sources[Kind.PIXELS].keyframes_only
 
-    def card(self, kind: Kind) -> ModelCard:
+    def card(self, kind: Kind) -> protocols.ModelCard:
         """Return one module's card; no other model is loaded for it. Raises ``BackendError`` where there is none."""
-        return cast(ModelCard, self.load(kind).card)
+        return self.load(kind).card
 
-    def cards(self) -> dict[Kind, ModelCard]:
+    def cards(self) -> dict[Kind, protocols.ModelCard]:
         """Return the card of every model. Loads them."""
         return {kind: self.card(kind) for kind in MODULES if kind in self}
 
@@ -247,9 +238,6 @@ def _known(sources: dict[Kind, Source]) -> dict[Kind, Source]:
     for source in sources.values():
         _ = source.backend
     return sources
-
-
-_PROFILES: dict[str, Encoders] = {}
 
 
 def register_profile(profile: Encoders) -> None:
@@ -313,7 +301,7 @@ _KEYPOINTS: Any = {"local": "xfeat", "place": "xfeat", "matcher": "xfeat"}
 # A small network knows a sofa from two metres better than a cushion's width of it from half a metre: with nearly even
 # weights 44 % of the voxels of things are named rightly, with the paper's 41 %.
 _EVEN_M2 = 50.0
-_SHIPPED = (
+_PROFILES = {one.name: one for one in (
     Encoders(
         "embedded", pixels="embedded", views="embedded", sounds="embedded", **_KEYPOINTS, weight_variance_m2=_EVEN_M2,
         about="small models shipped with the package: no download, no GPU; its eyes learnt from rendered worlds and "
@@ -332,6 +320,4 @@ _SHIPPED = (
         "trained", pixels="trained", views="trained", sounds="embedded", **_KEYPOINTS, weight_variance_m2=_EVEN_M2,
         about="as embedded, with eyes that you trained yourself",
     ),
-)  # fmt: skip
-for _profile in _SHIPPED:
-    register_profile(_profile)
+)}  # fmt: skip

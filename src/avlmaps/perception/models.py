@@ -50,22 +50,15 @@ Precision = Literal["auto", "float32", "float16", "bfloat16"]
 
 @dataclass(frozen=True, slots=True)
 class ModelSettings:
-    """How this process loads models.
+    """How this process loads models."""
 
-    Attributes:
-        folder: looked through before the hub's cache; holds models as ``org/name``, ``org--name`` or ``name``, and
-            single files by their name.
-        device: ``auto`` (a GPU where there is one), ``cpu``, ``cuda``, ``cuda:1``, ``mps``.
-        precision: of weights and activations; ``auto`` is float16 on a CUDA device and float32 elsewhere.
-        batch: frames that go through a model at once; 0 lets each model choose (1 on a CPU).
-        offline: never ask a hub; only files that are here.
-    """
-
+    # looked through before the hub's cache; holds models as ``org/name``, ``org--name`` or ``name``, and single files
+    # by their name
     folder: Path | None = None
-    device: str = "auto"
-    precision: Precision = "auto"
-    batch: int = 0
-    offline: bool = False
+    device: str = "auto"  # ``auto`` (a GPU where there is one), ``cpu``, ``cuda``, ``cuda:1``, ``mps``
+    precision: Precision = "auto"  # of weights and activations; ``auto`` is float16 on a CUDA device, else float32
+    batch: int = 0  # frames that go through a model at once; 0 lets each model choose (1 on a CPU)
+    offline: bool = False  # never ask a hub; only files that are here
 
     def __post_init__(self) -> None:
         if self.precision not in get_args(Precision):

@@ -17,17 +17,9 @@ _PARTS = (slice(0, 3), slice(3, 6), slice(6, 7))
 
 @dataclass(frozen=True, slots=True)
 class PoseSettings:
-    """How a pose is estimated.
-
-    A point agrees when it is seen within ``max_error_rad`` of where it should be (6 px at f = 525); RANSAC stops after
-    ``max_iterations`` samples.
-    """
+    """How a pose is estimated: a point agrees when it is seen within this of where it should be (6 px at f = 525)."""
 
     max_error_rad: float = 0.012
-    """A point agrees with a pose when it is seen within this angle of where it should be (6 px at f = 525)."""
-
-    max_iterations: int = 2000
-    """RANSAC stops after this many samples."""
 
 
 def estimate_pose(
@@ -50,7 +42,7 @@ def estimate_pose(
     ransac = {
         "max_reproj_error": max_error_px,
         "max_error": max_error_px,  # its name from PoseLib 2.1 on
-        "max_iterations": settings.max_iterations,
+        "max_iterations": 2000,
         "min_iterations": 100,
         "seed": int(rng.integers(2**31)),
     }

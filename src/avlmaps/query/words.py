@@ -202,12 +202,12 @@ def unknown_note(phrase: str, kind: EntryKind = EntryKind.THING) -> str:
 def _respelt(phrase: str, noun: str, kind: EntryKind) -> tuple[str, str]:
     known = lexicon()
     before = phrase.lower().split()[: phrase.split().index(noun)]
-    nouns = [(noun, near) for near in known.suggest(noun, kind)]
+    nouns = [(noun, near) for near, _ in known.suggest(noun, kind)]
     for compound in (" ".join([*before, near]) for _, near in nouns if before):
         if known.find(compound, kind) is not None:
             return phrase, compound
-    wholes = [(phrase, near) for near in known.suggest(phrase, kind, most=1)] if before else []
-    right_before = all(word in known.words() for word in before)
+    wholes = [(phrase, near) for near, _ in known.suggest(phrase, kind, most=1)] if before else []
+    right_before = all(word in known.words for word in before)
     return next(iter([*nouns, *wholes] if right_before else [*wholes, *nouns]), (noun, ""))
 
 

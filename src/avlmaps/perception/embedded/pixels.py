@@ -50,7 +50,7 @@ class NamedEncoder:
         self._network = load_pair() if network is None else network
         self._words = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
         self.names: tuple[str, ...] = getattr(self._network.notes, self._names)
-        self.codes = word_codes(self.names, self._words)
+        self.codes = orthonormal_codes(self._words.encode(self.names))
         self.card = self._card(self._network.notes, self._network.checksum, licence)
 
     def _card(self, notes: Notes, checksum: str, licence: str) -> ModelCard:
@@ -97,11 +97,6 @@ def features_of(
 ) -> Float32[np.ndarray, "*n d"]:
     """Return Σ √p·code for distributions over the names."""
     return np.sqrt(np.maximum(probability, 0.0)).astype(np.float32) @ codes
-
-
-def word_codes(names: Sequence[str], words: WordEncoder) -> Float32[np.ndarray, "n d"]:
-    """Return the code of each name."""
-    return orthonormal_codes(words.encode(list(names)))
 
 
 # Beyond these an instance's size says no more for or against it.

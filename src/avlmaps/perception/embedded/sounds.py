@@ -74,7 +74,7 @@ class EmbeddedSounds:
         self._folder = folder
         about = json.loads(notes)
         self._words: WordEncoder = cast("WordEncoder", load(Kind.WORDS, "embedded")) if words is None else words
-        self.kinds = tuple(KnownKind(k["name"], tuple(k["called"]), k["origin"], k["clips"]) for k in about["kinds"])
+        self.kinds = msgspec.convert(about["kinds"], tuple[KnownKind, ...])
         self.sources = frozenset[int](about.get("sources", ()))  # freesound's numbers of the recordings it learnt from
         # features of some of the clips that the network learnt from, sorted by kind
         self._examples = np.load(BytesIO(examples), allow_pickle=False).astype(np.float32)

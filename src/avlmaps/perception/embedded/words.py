@@ -83,7 +83,7 @@ class EmbeddedWords:
 
     def __init__(self) -> None:
         self._weights, self._pieces, self._aliases = _load()
-        self._known: dict[str, Float32[np.ndarray, " d"]] = {}
+        self._vector = lru_cache(maxsize=_REMEMBERED)(self._compute)
         self.card = ModelCard(
             id="avlmaps/words-1",
             dim=self._weights.table.shape[1],
@@ -91,11 +91,6 @@ class EmbeddedWords:
             checksum=self._weights.checksum,
             note="A small English encoder for things, rooms and sounds of homes and offices.",
         )
-
-    @property
-    def aliases(self) -> Mapping[str, str]:
-        """The alias table: alias to canonical phrase, both cleaned; a canonical phrase stands for itself."""
-        return self._aliases
 
     def encode(self, phrases: Sequence[str]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each phrase, computed alone; ``QueryError`` where one holds no English word."""
@@ -105,21 +100,6 @@ class EmbeddedWords:
         for row, phrase in enumerate(phrases):
             vectors[row] = self._vector(phrase)
         return vectors
-
-    def nearest(self, phrase: str, labels: Sequence[str]) -> list[tuple[str, float]]:
-        """Return the labels with their cosine to the phrase, nearest first; errors as of ``encode``."""
-        cosines = self.encode(labels) @ self.encode([phrase])[0]
-        order = np.argsort(-cosines, kind="stable").tolist()
-        return [(str(labels[int(index)]), float(cosines[index])) for index in order]
-
-    def _vector(self, phrase: str) -> Float32[np.ndarray, " d"]:
-        known = self._known.get(phrase)
-        if known is None:
-            known = self._compute(phrase)
-            if len(self._known) >= _REMEMBERED:
-                self._known.clear()
-            self._known[phrase] = known
-        return known
 
     def _compute(self, phrase: str) -> Float32[np.ndarray, " d"]:
         if not phrase.strip():
