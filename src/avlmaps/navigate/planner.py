@@ -43,43 +43,34 @@ class CellGraph:
     @classmethod
     def of(cls, mask: Bool[np.ndarray, "nx ny"], cost: Float[np.ndarray, "nx ny"]) -> "CellGraph":
         """Join the true cells of a mask."""
-        number, cells = np.where(mask, np.cumsum(mask).reshape(mask.shape) - 1, -1), np.argwhere(mask)
-        around, numbers = np.pad(cost, 2), np.pad(number, 2, constant_values=-1)
-        pairs: list[np.ndarray] = []
-        weights: list[np.ndarray] = []
-        for step, passed in _STEPS.items():
-            pair = _joined(numbers, cells, step)
-            at = cells[pair[:, 0]] + 2
-            mean = 0.5 * (around[tuple(at.T)] + around[tuple((at + step).T)])
+        grid, around = np.pad(mask, 2), np.pad(cost, 2).ravel()
+        at, number = np.flatnonzero(grid), np.full(grid.size, -1, np.int32)
+        number[at] = np.arange(len(at))
+        near, weight = np.empty((len(at), 2 * len(_STEPS)), np.int32), np.empty((len(at), 2 * len(_STEPS)))
+        for column, (step, passed) in enumerate([*_STEPS.items()] * 2):
+            sign = 1 if column < len(_STEPS) else -1
+            there, *between = (at + sign * (x * grid.shape[1] + y) for x, y in (step, *passed))
+            mean = 0.5 * (around[at] + around[there])
             if 2 in np.abs(step):
-                mean = 0.5 * mean + 0.25 * sum(around[tuple((at + by).T)] for by in passed)
-            pairs.append(pair)
-            weights.append(np.hypot(*step) * mean)
-        one, other = np.concatenate(pairs).T
-        ends = np.concatenate([one, other]), np.concatenate([other, one])
-        return cls(
-            number, cells, csr_array((np.tile(np.concatenate(weights), 2), ends), shape=(len(cells), len(cells)))
-        )
+                mean = 0.5 * mean + 0.25 * sum(around[one] for one in between)
+            is_open = np.all([number[one] >= 0 for one in (there, *between)], axis=0)
+            near[:, column], weight[:, column] = np.where(is_open, number[there], -1), np.hypot(*step) * mean
+        joined = near >= 0
+        ends = np.concatenate([[0], np.cumsum(joined.sum(axis=1))]).astype(np.int32)
+        weights = csr_array((weight[joined], near[joined], ends), shape=(len(at), len(at)))
+        return cls(number.reshape(grid.shape)[2:-2, 2:-2], np.argwhere(mask), weights)
 
     def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"]:
         """Return the cells of the cheapest path between two cells of one connected part."""
         start, end = int(self.number[tuple(first)]), int(self.number[tuple(last)])
-        _, before = csgraph.dijkstra(self.weights, indices=start, return_predecessors=True)
+        limit, before = 2.0 * float(np.hypot(*(last - first))), np.full(len(self.cells), -1)
+        while before[end] < 0 and end != start:  # near goals need not the whole floor; a cell costs 1 at least
+            _, before = csgraph.dijkstra(self.weights, indices=start, return_predecessors=True, limit=limit)
+            limit *= 2.0
         nodes = [end]
         while nodes[-1] != start:
             nodes.append(int(before[nodes[-1]]))
         return self.cells[nodes[::-1]]
-
-
-def _joined(
-    around: Int[np.ndarray, "px py"], cells: Int[np.ndarray, "n 2"], step: tuple[int, int]
-) -> Int[np.ndarray, "k 2"]:
-    """Return the pairs of cells that are one step apart, over numbered cells alone; the grid has a margin of two."""
-    reached = around[tuple((cells + 2 + step).T)]
-    is_open = reached >= 0
-    for by in _STEPS[step]:
-        is_open &= around[tuple((cells + 2 + by).T)] >= 0
-    return np.column_stack([np.flatnonzero(is_open), reached[is_open]])
 
 
 def rooms(

@@ -11,6 +11,7 @@ def dijkstra(
     indices: ArrayLike | None = None,
     *,
     return_predecessors: Literal[True],
+    limit: float = ...,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]: ...
 @overload
 def dijkstra(
