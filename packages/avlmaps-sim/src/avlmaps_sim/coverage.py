@@ -23,21 +23,14 @@ _SWAY_M = 0.05
 
 @dataclass(frozen=True, slots=True)
 class FloorCoverage:
-    """How much of a floor was recorded.
+    """How much of a floor was recorded."""
 
-    Attributes:
-        footprint_m2: area of the box round the building, top-down.
-        walkable_m2: floor on which the robot's middle can stand.
-        reached_share: how much of that is connected with the drive.
-        driven_share: how much of it lies within 0.5 m of the drive.
-        seen_share: how much of it lies within 4 m of a frame's camera, inside its field of view, with nothing at the
-            camera's height between.
-    """
-
-    footprint_m2: float
-    walkable_m2: float
-    reached_share: float
-    driven_share: float
+    footprint_m2: float  # area of the box round the building, top-down
+    walkable_m2: float  # floor on which the robot's middle can stand
+    reached_share: float  # how much of that is connected with the drive
+    driven_share: float  # how much of it lies within 0.5 m of the drive
+    # How much of it lies within 4 m of a frame's camera, inside its field of view, with nothing at the camera's height
+    # between.
     seen_share: float
 
     def to_json(self) -> dict[str, float]:

@@ -11,41 +11,25 @@ _LOOK_S = 0.5  # a thing that was in the picture for this long has been seen
 
 @dataclass(frozen=True, slots=True)
 class WalkSettings:
-    """How the robot is driven.
+    """How the robot is driven."""
 
-    Attributes:
-        rate_hz: poses a second.
-        speed_m_s: when nothing slows it.
-        turn_rad_s: fastest turn.
-        turn_rad_s2: how fast a turn begins and ends.
-        camera_height_m: lowest and highest height of the camera above the floor; fixed during a walk.
-        pitch_down_rad: how far the camera looks down, on average.
-        pitch_sway_rad: how far that slowly varies to either side.
-        glance_rad: how far it looks to the sides of its way while driving.
-        reach_m: from how far a thing counts as seen.
-        radius_m: of the robot.
-        look_around: whether it stops and turns to what did not come into the picture while driving.
-        max_frames: thins a longer walk evenly to this number of poses.
-        floor: which floor, counted from the lowest; the one with most room where it is not said.
-        every_floor: walk every floor that stairs join to that one, from the lowest, and the stairs between them.
-        stairs_m_s: when it climbs.
-    """
-
-    rate_hz: float = 10.0
-    speed_m_s: float = 0.5
-    turn_rad_s: float = np.deg2rad(45.0)
-    turn_rad_s2: float = np.deg2rad(120.0)
+    rate_hz: float = 10.0  # poses a second
+    speed_m_s: float = 0.5  # when nothing slows it
+    turn_rad_s: float = np.deg2rad(45.0)  # fastest turn
+    turn_rad_s2: float = np.deg2rad(120.0)  # how fast a turn begins and ends
+    # Lowest and highest height of the camera above the floor; fixed during a walk.
     camera_height_m: tuple[float, float] = (1.2, 1.5)
-    pitch_down_rad: float = np.deg2rad(10.0)
-    pitch_sway_rad: float = np.deg2rad(4.0)
-    glance_rad: float = np.deg2rad(30.0)
-    reach_m: float = 3.0
-    radius_m: float = 0.22
-    look_around: bool = True
-    max_frames: int | None = None
-    floor: int | None = None
+    pitch_down_rad: float = np.deg2rad(10.0)  # how far the camera looks down, on average
+    pitch_sway_rad: float = np.deg2rad(4.0)  # how far that slowly varies to either side
+    glance_rad: float = np.deg2rad(30.0)  # how far it looks to the sides of its way while driving
+    reach_m: float = 3.0  # from how far a thing counts as seen
+    radius_m: float = 0.22  # of the robot
+    look_around: bool = True  # whether it stops and turns to what did not come into the picture while driving
+    max_frames: int | None = None  # thins a longer walk evenly to this number of poses
+    floor: int | None = None  # which floor, counted from the lowest; the one with most room where it is not said
+    # Walk every floor that stairs join to that one, from the lowest, and the stairs between them.
     every_floor: bool = False
-    stairs_m_s: float = 0.3
+    stairs_m_s: float = 0.3  # when it climbs
 
 
 @dataclass(frozen=True, slots=True, eq=False)

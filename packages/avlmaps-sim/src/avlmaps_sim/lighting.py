@@ -35,27 +35,17 @@ _STRUCTURE = frozenset({"wall", "floor", "ceiling", "column", "stairs", "railing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightMap:
-    """Light on every surface of a scene, in the order of its triangles.
+    """Light on every surface of a scene, in the order of its triangles."""
 
-    Attributes:
-        sample: (t, 3) samples at the corners; or -1 in the first column, and in the second the patch.
-        turned: (t,) True where side 0 of its samples is the triangle's back.
-        first: (g,) first sample of each patch.
-        axes: (g, 2) axes of the world along which the patch's rows and columns run.
-        low: (g, 2) lattice numbers of the first sample.
-        columns: (g,) samples in a row of the patch.
-        light: (s, 2, 3) linear RGB falling on both sides; 1 shows a white surface as white.
-        step_m: step of the lattice.
-    """
-
+    # (t, 3) samples at the corners; or -1 in the first column, and in the second the patch.
     sample: Int32[np.ndarray, "t 3"]
-    turned: Bool[np.ndarray, " t"]
-    first: Int[np.ndarray, " g"]
-    axes: Int[np.ndarray, "g 2"]
-    low: Int[np.ndarray, "g 2"]
-    columns: Int[np.ndarray, " g"]
-    light: Float32[np.ndarray, "s 2 3"]
-    step_m: float = _TEXEL_M
+    turned: Bool[np.ndarray, " t"]  # (t,) True where side 0 of its samples is the triangle's back
+    first: Int[np.ndarray, " g"]  # (g,) first sample of each patch
+    axes: Int[np.ndarray, "g 2"]  # (g, 2) axes of the world along which the patch's rows and columns run
+    low: Int[np.ndarray, "g 2"]  # (g, 2) lattice numbers of the first sample
+    columns: Int[np.ndarray, " g"]  # (g,) samples in a row of the patch
+    light: Float32[np.ndarray, "s 2 3"]  # (s, 2, 3) linear RGB falling on both sides; 1 shows a white surface as white
+    step_m: float = _TEXEL_M  # step of the lattice
 
 
 @dataclass(frozen=True, slots=True, eq=False)

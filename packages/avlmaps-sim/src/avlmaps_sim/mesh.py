@@ -15,46 +15,32 @@ _CORNER = np.arange(3)[None, :, None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
-    """The look of a surface.
+    """The look of a surface."""
 
-    Attributes:
-        colour: sRGB in [0, 1]; multiplied with the texture where there is one.
-        texture: picture, or None. It repeats.
-        texture_size_m: how many metres of (u, v) the picture covers; for meshes whose uv already run from 0 to 1
-            over the picture (glTF, a painting in its frame) this is (1, 1).
-        emission: light that the surface gives off itself, in [0, 1]: lamps, screens, windows by day.
-        gloss: 0 for matt, 1 for a mirror-like surface; a depth sensor may see nothing on very glossy or clear ones.
-        opacity: 1 for solid; window panes and glass have less and are drawn as solid by the depth image.
-        mirror: whether it reflects like a looking glass, for a renderer that draws reflections; others show its colour.
-    """
-
-    colour: Triple = (0.7, 0.7, 0.7)
-    texture: UInt8[np.ndarray, "h w 3"] | None = None
+    colour: Triple = (0.7, 0.7, 0.7)  # sRGB in [0, 1]; multiplied with the texture where there is one
+    texture: UInt8[np.ndarray, "h w 3"] | None = None  # picture, which repeats
+    # How many metres of (u, v) the picture covers; for meshes whose uv already run from 0 to 1 over the picture (glTF,
+    # a painting in its frame) this is (1, 1).
     texture_size_m: tuple[float, float] = (1.0, 1.0)
-    emission: float = 0.0
+    emission: float = 0.0  # light that the surface gives off itself, in [0, 1]: lamps, screens, windows by day
+    # 0 for matt, 1 for a mirror-like surface; a depth sensor may see nothing on very glossy or clear ones.
     gloss: float = 0.1
-    opacity: float = 1.0
+    opacity: float = 1.0  # 1 for solid; window panes and glass have less and are drawn as solid by the depth image
+    # Whether it reflects like a looking glass, for a renderer that draws reflections; others show its colour.
     mirror: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """A set of triangles, seen from both sides.
+    """A set of triangles, seen from both sides."""
 
-    Attributes:
-        vertex: (v, 3) places, metres.
-        triangle: (t, 3) rows of ``vertex``.
-        uv: (t, 3, 2) place on the material's picture of each corner of each triangle, metres on the surface (or
-            fractions of the picture where the material's ``texture_size_m`` is 1).
-        material: (t,) index into ``materials``.
-        materials: what the surfaces look like.
-    """
-
-    vertex: Float32[np.ndarray, "v 3"]
-    triangle: Int32[np.ndarray, "t 3"]
+    vertex: Float32[np.ndarray, "v 3"]  # (v, 3) places, metres
+    triangle: Int32[np.ndarray, "t 3"]  # (t, 3) rows of ``vertex``
+    # (t, 3, 2) place on the material's picture of each corner of each triangle, metres on the surface (or fractions of
+    # the picture where the material's ``texture_size_m`` is 1).
     uv: Float32[np.ndarray, "t 3 2"]
-    material: Int32[np.ndarray, " t"]
-    materials: tuple[Material, ...]
+    material: Int32[np.ndarray, " t"]  # (t,) index into ``materials``
+    materials: tuple[Material, ...]  # what the surfaces look like
 
     def __post_init__(self) -> None:
         t = len(self.triangle)

@@ -23,22 +23,15 @@ _MOST_LEVELS = 12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Atlas:
-    """Pictures by material.
+    """Pictures by material."""
 
-    Attributes:
-        texel: all pictures, row by row, red in the lowest byte, then green and blue.
-        table: (m, levels, 4) by material and level: first texel in ``texel``, width, height, and in level 0 how
-            many levels there are (0: no picture).
-        mean: (m, 3) mean colour with the material's own, linear.
-        colour: (m, 3) the material's own colour, linear.
-        per_unit: (m, 2) repeats of the picture per unit of (u, v).
-    """
-
-    texel: UInt32[np.ndarray, " n"]
+    texel: UInt32[np.ndarray, " n"]  # all pictures, row by row, red in the lowest byte, then green and blue
+    # (m, levels, 4) by material and level: first texel in ``texel``, width, height, and in level 0 how many levels
+    # there are (0: no picture).
     table: Int64[np.ndarray, "m levels 4"]
-    mean: Float32[np.ndarray, "m 3"]
-    colour: Float32[np.ndarray, "m 3"]
-    per_unit: Float[np.ndarray, "m 2"]
+    mean: Float32[np.ndarray, "m 3"]  # (m, 3) mean colour with the material's own, linear
+    colour: Float32[np.ndarray, "m 3"]  # (m, 3) the material's own colour, linear
+    per_unit: Float[np.ndarray, "m 2"]  # (m, 2) repeats of the picture per unit of (u, v)
 
 
 def _halvings(picture: UInt8[np.ndarray, "h w 3"]) -> list[UInt8[np.ndarray, "..."]]:
@@ -214,21 +207,14 @@ _Corners = tuple[Float32[np.ndarray, "t 9"], ...]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """The view of one camera.
+    """The view of one camera."""
 
-    Attributes:
-        rgb: sRGB.
-        depth_m: z-depth at the pixels' centres, metres; 0 where nothing is.
-        instance: index into the scene's ``objects``; -1 where nothing is.
-        category: index into the scene's ``categories``; -1 where nothing is.
-        strength: how much of the light that a depth sensor sends out comes back, in 1/255 of what a matt white wall
-            does that faces it at the same distance: less from slanted, dark, glossy and clear surfaces.
-    """
-
-    rgb: UInt8[np.ndarray, "h w 3"]
-    depth_m: Float32[np.ndarray, "h w"]
-    instance: Int32[np.ndarray, "h w"]
-    category: Int32[np.ndarray, "h w"]
+    rgb: UInt8[np.ndarray, "h w 3"]  # sRGB
+    depth_m: Float32[np.ndarray, "h w"]  # z-depth at the pixels' centres, metres; 0 where nothing is
+    instance: Int32[np.ndarray, "h w"]  # index into the scene's ``objects``; -1 where nothing is
+    category: Int32[np.ndarray, "h w"]  # index into the scene's ``categories``; -1 where nothing is
+    # How much of the light that a depth sensor sends out comes back, in 1/255 of what a matt white wall does that faces
+    # it at the same distance: less from slanted, dark, glossy and clear surfaces.
     strength: UInt8[np.ndarray, "h w"]
 
 

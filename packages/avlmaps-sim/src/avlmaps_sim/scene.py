@@ -63,14 +63,10 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """A small lamp.
+    """A small lamp."""
 
-    Attributes:
-        position: world, metres.
-        colour: linear RGB of its power; (1, 1, 1) lights a white wall at 2 m to about half of full white.
-    """
-
-    position: Triple
+    position: Triple  # world, metres
+    # Linear RGB of its power; (1, 1, 1) lights a white wall at 2 m to about half of full white.
     colour: Triple = (1.0, 1.0, 1.0)
 
 

@@ -23,27 +23,20 @@ class DepthFaults:
     baseline_m: float = 0.0
     """Distance between projector and camera (or between both cameras); 0 measures depth without any of what follows
     from it. Behind near things a stripe that only one of them sees stays empty: right of them if it is positive."""
-    noise_px: float = 0.0
-    """Standard deviation of the measured shift, pixels of a picture 640 wide."""
-    step_px: float = 0.0
-    """The shift is rounded to multiples of this, pixels of a picture 640 wide; 0 rounds nothing."""
+    noise_px: float = 0.0  # standard deviation of the measured shift, pixels of a picture 640 wide
+    step_px: float = 0.0  # the shift is rounded to multiples of this, pixels of a picture 640 wide; 0 rounds nothing
     jitter_px: float = 0.0
     """Standard deviation of where in the picture a depth was really measured, pixels: it frays edges."""
     edge_ratio: float = 0.0
     """Pixels whose neighbour is nearer or farther by more than this share of their depth may stay empty; 0: none."""
-    edge_loss: float = 0.5
-    """Probability that such a pixel stays empty."""
+    edge_loss: float = 0.5  # probability that such a pixel stays empty
     weakest: float = 0.0
     """A pixel stays empty where less than this comes back, of what a matt white wall at 1 m sends back. What comes
     back falls with distance, slant, darkness, gloss and clearness."""
-    min_m: float = 0.0
-    """Nothing nearer is measured."""
-    max_m: float = np.inf
-    """Nothing farther is measured."""
-    blobs: float = 0.0
-    """Mean number of patches in a picture that stay empty for no reason that one sees."""
-    blob_px: float = 4.0
-    """Mean radius of such a patch, pixels."""
+    min_m: float = 0.0  # nothing nearer is measured
+    max_m: float = np.inf  # nothing farther is measured
+    blobs: float = 0.0  # mean number of patches in a picture that stay empty for no reason that one sees
+    blob_px: float = 4.0  # mean radius of such a patch, pixels
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.min_m < self.max_m:
@@ -58,21 +51,15 @@ class DepthFaults:
 class ColourFaults:
     """How the colour picture differs from what is there."""
 
-    exposure_stops: float = 0.0
-    """Standard deviation of the exposure, in stops (one stop doubles the light)."""
-    white_balance: float = 0.0
-    """Standard deviation of the gain of red and of blue against green."""
+    exposure_stops: float = 0.0  # standard deviation of the exposure, in stops (one stop doubles the light)
+    white_balance: float = 0.0  # standard deviation of the gain of red and of blue against green
     drift_frames: float = 0.0
     """Frames after which exposure and white balance have changed by about as much as they ever do, in a sequence
     of `shifts`; 0 draws them again for each frame."""
-    noise: float = 0.0
-    """Standard deviation of the noise in mid grey, 8-bit values; it grows with the root of the light."""
-    blur_px: float = 0.0
-    """Mean length of motion blur, pixels; its direction is any."""
-    defocus_px: float = 0.0
-    """Standard deviation of the lens's blur, pixels."""
-    vignetting: float = 0.0
-    """Share of the light that is missing in the corners."""
+    noise: float = 0.0  # standard deviation of the noise in mid grey, 8-bit values; it grows with the root of the light
+    blur_px: float = 0.0  # mean length of motion blur, pixels; its direction is any
+    defocus_px: float = 0.0  # standard deviation of the lens's blur, pixels
+    vignetting: float = 0.0  # share of the light that is missing in the corners
     jpeg_quality: int = 100
     """Quality of the JPEG that the picture went through, 1 to 100; at 100 it did not go through one."""
 
@@ -95,8 +82,7 @@ class OdometryFaults:
     """Standard deviation of the error of the heading, radians after one metre, growing likewise."""
     heading_per_rad: float = 0.01
     """Standard deviation of the error of the heading, radians after one radian turned, growing likewise."""
-    scale: float = 0.005
-    """Standard deviation of an error of scale that is constant during a drive."""
+    scale: float = 0.005  # standard deviation of an error of scale that is constant during a drive
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,9 +90,7 @@ class SensorSettings:
     """The faults of a simulated RGB-D camera."""
 
     depth: DepthFaults = DepthFaults()
-    """Depth."""
     colour: ColourFaults = ColourFaults()
-    """Colour."""
 
 
 SensorName = Literal["clean", "kinect", "realsense"]

@@ -17,23 +17,15 @@ _TRIES = 10  # candidates drawn for each view
 
 @dataclass(frozen=True, slots=True)
 class Stance:
-    """Where cameras are and how they look.
+    """Where cameras are and how they look."""
 
-    Attributes:
-        height_m: least and greatest height above the floor.
-        pitch_deg: mean and standard deviation of the pitch of views that look at nothing in particular.
-        pitch_limits_deg: least and greatest pitch of all.
-        roll_deg: standard deviation of the roll.
-        aimed: the share of views that look towards an object.
-        aimed_m: how near and how far that is.
-    """
-
-    height_m: tuple[float, float] = (0.5, 1.8)
+    height_m: tuple[float, float] = (0.5, 1.8)  # least and greatest height above the floor
+    # Mean and standard deviation of the pitch of views that look at nothing in particular.
     pitch_deg: tuple[float, float] = (-10.0, 11.0)
-    pitch_limits_deg: tuple[float, float] = (-35.0, 15.0)
-    roll_deg: float = 2.0
-    aimed: float = 0.5
-    aimed_m: tuple[float, float] = (_NEAR_M, 4.5)
+    pitch_limits_deg: tuple[float, float] = (-35.0, 15.0)  # least and greatest pitch of all
+    roll_deg: float = 2.0  # standard deviation of the roll
+    aimed: float = 0.5  # the share of views that look towards an object
+    aimed_m: tuple[float, float] = (_NEAR_M, 4.5)  # how near and how far that is
 
 
 ON_A_ROBOT = Stance()

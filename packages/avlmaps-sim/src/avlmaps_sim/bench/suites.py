@@ -23,35 +23,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class SuiteInputs:
-    """The inputs of a suite.
+    """The inputs of a suite."""
 
-    Attributes:
-        sounds: folder of clips with an index.csv, for the suites of sound.
-        clips: the same, for ``sounds``: clips that are queried by name, dry and in rooms.
-        scenes: recordings with poses, for ``locate``, ``recordings`` and ``live``.
-        nyuv2: folder of labelled frames, for ``frames``.
-        profile: the models that are measured.
-        models: other backends than the profile's, ``module=backend[@model]``.
-        seed: of what is drawn at random.
-        indexing: what the suites on scenes other than ``navigation`` are run on; its own defaults if None.
-        navigation: what the suite ``navigation`` is run on; its own defaults if None.
-        change: what the suite ``change`` is run on, and over how many days; its own defaults if None.
-        live: laps and kills of the suite ``live``; its own defaults if None.
-        sources: what the suite ``sources`` is run on; its own defaults if None.
-    """
-
-    sounds: Path | None = None
-    clips: Path | None = None
-    scenes: tuple[Path, ...] = ()
-    nyuv2: Path | None = None
-    profile: str = "embedded"
-    models: tuple[str, ...] = ()
-    seed: int = 0
+    sounds: Path | None = None  # folder of clips with an index.csv, for the suites of sound
+    clips: Path | None = None  # the same, for ``sounds``: clips that are queried by name, dry and in rooms
+    scenes: tuple[Path, ...] = ()  # recordings with poses, for ``locate``, ``recordings`` and ``live``
+    nyuv2: Path | None = None  # folder of labelled frames, for ``frames``
+    profile: str = "embedded"  # the models that are measured
+    models: tuple[str, ...] = ()  # other backends than the profile's, ``module=backend[@model]``
+    seed: int = 0  # of what is drawn at random
+    # What the suites on scenes other than ``navigation`` are run on; its own defaults if None.
     indexing: "IndexingSettings | None" = None
-    navigation: "NavigationSettings | None" = None
+    navigation: "NavigationSettings | None" = None  # what the suite ``navigation`` is run on; its own defaults if None
+    # What the suite ``change`` is run on, and over how many days; its own defaults if None.
     change: "tuple[SceneSettings, int] | None" = None
-    live: "LiveBench | None" = None
-    sources: "SourcesBench | None" = None
+    live: "LiveBench | None" = None  # laps and kills of the suite ``live``; its own defaults if None
+    sources: "SourcesBench | None" = None  # what the suite ``sources`` is run on; its own defaults if None
 
 
 def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:

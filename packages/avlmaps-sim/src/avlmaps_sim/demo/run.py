@@ -143,21 +143,14 @@ MARKER = ".avlmaps-demo"
 
 @dataclass(frozen=True, slots=True)
 class DemoSettings:
-    """How large the demonstration is.
+    """How large the demonstration is."""
 
-    Attributes:
-        frames: limit of frames that are recorded.
-        size: columns and rows of the pictures.
-        sounds: number of sounds, if the walk has room for them; None places one for every twelve seconds.
-        workers: processes that draw; 0 takes as many as there are cores.
-        moments: of the walk that the report shows.
-    """
-
-    frames: int = 560
-    size: tuple[int, int] = (320, 240)
+    frames: int = 560  # limit of frames that are recorded
+    size: tuple[int, int] = (320, 240)  # columns and rows of the pictures
+    # Number of sounds, if the walk has room for them; None places one for every twelve seconds.
     sounds: int | None = None
-    workers: int = 0
-    moments: int = 24
+    workers: int = 0  # processes that draw; 0 takes as many as there are cores
+    moments: int = 24  # of the walk that the report shows
 
 
 def run_demo(

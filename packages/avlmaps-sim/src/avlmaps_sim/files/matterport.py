@@ -32,23 +32,16 @@ _HEADER = "ASCII 1.1"
 
 @dataclass(slots=True)
 class House:
-    """The content of a ``.house`` file.
+    """The content of a ``.house`` file."""
 
-    Attributes:
-        region: by index: letter, lowest corner, highest corner.
-        surface: by index: its region.
-        outline: by surface: its corners.
-        category: by index: the annotator's word and the one of forty.
-        thing: by index: region and category of an object.
-        segment: by id: its object.
-    """
-
+    # By index: letter, lowest corner, highest corner.
     region: dict[int, tuple[str, np.ndarray, np.ndarray]] = field(default_factory=dict)
-    surface: dict[int, int] = field(default_factory=dict)
-    outline: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
+    surface: dict[int, int] = field(default_factory=dict)  # by index: its region
+    outline: dict[int, list[tuple[float, float]]] = field(default_factory=dict)  # by surface: its corners
+    # By index: the annotator's word and the one of forty.
     category: dict[int, tuple[str, str]] = field(default_factory=dict)
-    thing: dict[int, tuple[int, int]] = field(default_factory=dict)
-    segment: dict[int, int] = field(default_factory=dict)
+    thing: dict[int, tuple[int, int]] = field(default_factory=dict)  # by index: region and category of an object
+    segment: dict[int, int] = field(default_factory=dict)  # by id: its object
 
 
 def load_matterport(path: Path) -> Scene:

@@ -57,21 +57,14 @@ _HIGHEST = 0.89  # −1 dB
 
 @dataclass(frozen=True, slots=True)
 class AcousticSettings:
-    """How the track is made.
+    """How the track is made."""
 
-    Attributes:
-        rate_hz: samples a second.
-        loudness_db: of a sound of middling kind at 1 m in the open, RMS of its loud frames against full scale.
-        snr_db: how far the room's noise lies below that.
-        step_s: how often the robot's place counts again; between two the responses are cross-faded.
-        rt60_s: how long every room takes to fall by 60 dB; as its surfaces say if None.
-    """
-
-    rate_hz: int = 22_050
+    rate_hz: int = 22_050  # samples a second
+    # Of a sound of middling kind at 1 m in the open, RMS of its loud frames against full scale.
     loudness_db: float = -24.0
-    snr_db: float = 30.0
-    step_s: float = 0.25
-    rt60_s: float | None = None
+    snr_db: float = 30.0  # how far the room's noise lies below that
+    step_s: float = 0.25  # how often the robot's place counts again; between two the responses are cross-faded
+    rt60_s: float | None = None  # how long every room takes to fall by 60 dB; as its surfaces say if None
 
 
 def acoustic(

@@ -60,16 +60,11 @@ _STEP_S = 0.002
 
 @dataclass(eq=False)
 class Acoustics:
-    """A building prepared for impulse responses.
+    """A building prepared for impulse responses."""
 
-    Attributes:
-        scene: the building.
-        rate_hz: samples a second.
-        rt60_s: how long every room takes to fall by 60 dB at middling frequencies; as its surfaces say if None.
-    """
-
-    scene: Scene
-    rate_hz: int
+    scene: Scene  # the building
+    rate_hz: int  # samples a second
+    # How long every room takes to fall by 60 dB at middling frequencies; as its surfaces say if None.
     rt60_s: float | None = None
     _floors: dict[float, tuple[Air, Rooms]] = field(default_factory=dict, init=False)
 

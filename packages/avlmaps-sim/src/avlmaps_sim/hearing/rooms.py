@@ -38,20 +38,13 @@ _WIDE_M = 1.6  # an opening wider than this has no lintel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rooms:
-    """The rooms of a floor as vessels of sound, by octave band.
+    """The rooms of a floor as vessels of sound, by octave band."""
 
-    Attributes:
-        areas: the rooms.
-        volume_m3: (r,) their volumes.
-        surface_m2: (r,) their walls, floors and ceilings.
-        absorbing_m2: (b, r) their equivalent absorption areas, air included.
-        joint_m2: (b, r, r) area through which two rooms pass sound to one another; a wall counts with what it lets by.
-    """
-
-    areas: tuple[Area, ...]
-    volume_m3: Float[np.ndarray, " r"]
-    surface_m2: Float[np.ndarray, " r"]
-    absorbing_m2: Float[np.ndarray, "b r"]
+    areas: tuple[Area, ...]  # the rooms
+    volume_m3: Float[np.ndarray, " r"]  # (r,) their volumes
+    surface_m2: Float[np.ndarray, " r"]  # (r,) their walls, floors and ceilings
+    absorbing_m2: Float[np.ndarray, "b r"]  # (b, r) their equivalent absorption areas, air included
+    # (b, r, r) area through which two rooms pass sound to one another; a wall counts with what it lets by.
     joint_m2: Float[np.ndarray, "b r r"]
 
     @classmethod

@@ -129,19 +129,14 @@ _STEP_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class ScheduleRule:
-    """How sounds share the time of a walk.
+    """How sounds share the time of a walk."""
 
-    Attributes:
-        pause_s: least silence between two; negative lets them overlap by as much.
-        distance_m: least distance between any two places at which the robot records different sounds, as in the paper,
-            and between any two sources.
-        twins_m: least distance between two sources of one kind.
-        reach_m: a source that the robot passes at no less than this (mean over the sound) does not play at all.
-    """
-
-    pause_s: float = 1.0
+    pause_s: float = 1.0  # least silence between two; negative lets them overlap by as much
+    # Least distance between any two places at which the robot records different sounds, as in the paper, and between
+    # any two sources.
     distance_m: float = 2.0
-    twins_m: float = 4.0
+    twins_m: float = 4.0  # least distance between two sources of one kind
+    # A source that the robot passes at no less than this (mean over the sound) does not play at all.
     reach_m: float = 4.0
 
 

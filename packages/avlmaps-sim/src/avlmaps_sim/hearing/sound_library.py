@@ -16,23 +16,15 @@ ANYWHERE = ("*",)
 
 @dataclass(frozen=True, slots=True)
 class SoundKind:
-    """A kind of sound and where a home has it.
+    """A kind of sound and where a home has it."""
 
-    Attributes:
-        names: what clips of it are called; the first is ours.
-        objects: categories of objects that make it, the likeliest first.
-        floor: kinds of rooms in which it is also heard where nothing that makes it stands; ``("*",)``: in any.
-        height_m: height over the floor there.
-        level_db: loudness at 1 m against other kinds.
-        indoors: whether homes make it; sounds from outdoors come in by the windows and only on request.
-    """
-
-    names: tuple[str, ...]
-    objects: tuple[str, ...] = ()
+    names: tuple[str, ...]  # what clips of it are called; the first is ours
+    objects: tuple[str, ...] = ()  # categories of objects that make it, the likeliest first
+    # Kinds of rooms in which it is also heard where nothing that makes it stands; ``("*",)``: in any.
     floor: tuple[str, ...] = ()
-    height_m: float = 1.0
-    level_db: float = 0.0
-    indoors: bool = True
+    height_m: float = 1.0  # height over the floor there
+    level_db: float = 0.0  # loudness at 1 m against other kinds
+    indoors: bool = True  # whether homes make it; sounds from outdoors come in by the windows and only on request
 
 
 # Height over the floor where nothing that makes it stands, metres, and loudness at 1 m against other kinds, dB.

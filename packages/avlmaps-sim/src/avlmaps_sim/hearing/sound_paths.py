@@ -23,40 +23,26 @@ _THICKEST_M = 0.35  # two faces that are closer together are one wall's
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """How sound gets from a source to the microphone.
+    """How sound gets from a source to the microphone."""
 
-    Attributes:
-        straight_m: distance as the crow flies.
-        clear: whether no wall lies between.
-        walls: how many do.
-        round_m: length of the shortest path through the air; inf where there is none.
-        corner: the place on the plan from which that path goes straight to the microphone, None where it is straight.
-    """
-
-    straight_m: float
-    clear: bool
-    walls: int
-    round_m: float
+    straight_m: float  # distance as the crow flies
+    clear: bool  # whether no wall lies between
+    walls: int  # how many do
+    round_m: float  # length of the shortest path through the air; inf where there is none
+    # The place on the plan from which that path goes straight to the microphone, None where it is straight.
     corner: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Air:
-    """The plan of one floor; cell (i, j) begins at origin + (i, j) cells.
+    """The plan of one floor; cell (i, j) begins at origin + (i, j) cells."""
 
-    Attributes:
-        solid: (nx, ny) where a wall is.
-        room: (nx, ny) index into ``areas`` of the room that each cell belongs to, −1 for outdoors.
-        areas: the rooms of this floor.
-        origin: (2,) lowest corner.
-        floor_m: height of the floor.
-    """
-
-    solid: Bool[np.ndarray, "nx ny"]
+    solid: Bool[np.ndarray, "nx ny"]  # (nx, ny) where a wall is
+    # (nx, ny) index into ``areas`` of the room that each cell belongs to, −1 for outdoors.
     room: Int[np.ndarray, "nx ny"]
-    areas: tuple[Area, ...]
-    origin: Float[np.ndarray, "2"]
-    floor_m: float
+    areas: tuple[Area, ...]  # the rooms of this floor
+    origin: Float[np.ndarray, "2"]  # (2,) lowest corner
+    floor_m: float  # height of the floor
     cell_m: float = _CELL_M
 
     @classmethod

@@ -16,25 +16,16 @@ _UNDERFOOT_M = 0.08
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Side:
-    """One side of a room, seen from inside.
+    """One side of a room, seen from inside."""
 
-    Attributes:
-        a: where it begins, on the face of the wall.
-        along: unit vector along it.
-        inward: unit normal into the room.
-        length_m: how long it is.
-        closed: intervals (from, to, lower, upper) along it and in height that must stay free: doors, windows, gaps.
-        windows: the windows among them.
-        outer: it is an outside wall.
-    """
-
-    a: Float[np.ndarray, "2"]
-    along: Float[np.ndarray, "2"]
-    inward: Float[np.ndarray, "2"]
-    length_m: float
+    a: Float[np.ndarray, "2"]  # where it begins, on the face of the wall
+    along: Float[np.ndarray, "2"]  # unit vector along it
+    inward: Float[np.ndarray, "2"]  # unit normal into the room
+    length_m: float  # how long it is
+    # Intervals (from, to, lower, upper) along it and in height that must stay free: doors, windows, gaps.
     closed: list[tuple[float, float, float, float]]
-    windows: list[tuple[float, float, float, float]]
-    outer: bool
+    windows: list[tuple[float, float, float, float]]  # the windows among them
+    outer: bool  # it is an outside wall
 
     @property
     def heading_rad(self) -> float:
@@ -88,16 +79,11 @@ class Footprint:
 
 @dataclass
 class Ground:
-    """The floor of one room while it is furnished.
+    """The floor of one room while it is furnished."""
 
-    Attributes:
-        polygon: inside its walls.
-        sides: what furniture stands against.
-        must_m: (m, 2) places that have to stay connected: in front of doors and in the middle of gaps.
-    """
-
-    polygon: Float[np.ndarray, "k 2"]
-    sides: list[Side]
+    polygon: Float[np.ndarray, "k 2"]  # inside its walls
+    sides: list[Side]  # what furniture stands against
+    # (m, 2) places that have to stay connected: in front of doors and in the middle of gaps.
     must_m: Float[np.ndarray, "m 2"]
     _corner: list[np.ndarray] = field(default_factory=list)
     _height: list[tuple[float, float]] = field(default_factory=list)

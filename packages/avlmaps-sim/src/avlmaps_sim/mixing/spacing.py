@@ -37,17 +37,12 @@ class Walk:
 
 @dataclass(frozen=True, slots=True)
 class Spacing:
-    """The rule for sounds on a walk.
+    """The rule for sounds on a walk."""
 
-    Attributes:
-        pause_s: least silence between two sounds.
-        distance_m: least distance between two sounds.
-        measure: ``straight``: in a straight line between any two places where the robot was while they sounded,
-            the paper's rule; ``walked``: along the walk, between the places where each was half over.
-    """
-
-    pause_s: float
-    distance_m: float
+    pause_s: float  # least silence between two sounds
+    distance_m: float  # least distance between two sounds
+    # ``straight``: in a straight line between any two places where the robot was while they sounded, the paper's rule;
+    # ``walked``: along the walk, between the places where each was half over.
     measure: Measure = "straight"
 
 

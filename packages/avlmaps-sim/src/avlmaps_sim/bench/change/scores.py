@@ -14,8 +14,7 @@ from avlmaps_sim.mesh import Triple
 from avlmaps_sim.rearranged import Change
 from avlmaps_sim.scene import SceneObject
 
-REACH_M = 0.5
-"""A place is right within this of a thing's box, horizontally."""
+REACH_M = 0.5  # a place is right within this of a thing's box, horizontally
 KINDS = ("appeared", "gone", "moved")
 _SAID = {"new": "appeared", "gone": "gone", "moved": "moved"}
 _TRUE = {"added": "appeared", "removed": "gone", "moved": "moved"}

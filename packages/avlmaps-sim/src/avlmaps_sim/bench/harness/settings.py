@@ -131,43 +131,27 @@ class Recorded:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneSettings:
-    """Which scenes a benchmark runs on, and how they are recorded and mapped.
+    """Which scenes a benchmark runs on, and how they are recorded and mapped."""
 
-    Attributes:
-        scenes: names of scenes.
-        profile: the models that map them.
-        models: other backends than the profile's, ``module=backend[@model]``.
-        rules: how they are mapped and queried: ``ours``, or the ``paper``'s (``avlmaps.query.settings``).
-        hearing: how sounds reach the microphone; a sound's place is the robot's (``overlay``) or its source's.
-        sounds: folder of clips; made by rule if None.
-        clips: ``unheard``: those of the folder that the shipped sound encoder was not trained on; ``all``.
-        sensor: whose faults colour and depth have.
-        frames: limit of frames a scene.
-        sources: limit of sounds a scene.
-        ambiguous: how many kinds of sound play in several places.
-        places: in how many.
-        jobs: scenes side by side; 0 takes as many as there are cores.
-        seed: of walks, sounds and all queries.
-        load: tasks to use instead of making new ones; how the scenes were recorded comes from the file.
-        save: where to write the tasks.
-    """
-
-    scenes: tuple[str, ...]
-    profile: str = "embedded"
-    models: tuple[str, ...] = ()
-    rules: Rules = "ours"
+    scenes: tuple[str, ...]  # names of scenes
+    profile: str = "embedded"  # the models that map them
+    models: tuple[str, ...] = ()  # other backends than the profile's, ``module=backend[@model]``
+    rules: Rules = "ours"  # how they are mapped and queried: ``ours``, or the ``paper``'s (``avlmaps.query.settings``)
+    # How sounds reach the microphone; a sound's place is the robot's (``overlay``) or its source's.
     hearing: Literal["overlay", "acoustic"] = "overlay"
-    sounds: Path | None = None
+    sounds: Path | None = None  # folder of clips; made by rule if None
+    # ``unheard``: those of the folder that the shipped sound encoder was not trained on; ``all``.
     clips: Clips = "unheard"
-    sensor: Literal["clean", "kinect", "realsense"] = "clean"
-    frames: int = 600
-    sources: int = 14
-    ambiguous: int = 2
-    places: int = 3
-    jobs: int = 0
-    seed: int = 0
+    sensor: Literal["clean", "kinect", "realsense"] = "clean"  # whose faults colour and depth have
+    frames: int = 600  # limit of frames a scene
+    sources: int = 14  # limit of sounds a scene
+    ambiguous: int = 2  # how many kinds of sound play in several places
+    places: int = 3  # in how many
+    jobs: int = 0  # scenes side by side; 0 takes as many as there are cores
+    seed: int = 0  # of walks, sounds and all queries
+    # Tasks to use instead of making new ones; how the scenes were recorded comes from the file.
     load: Path | None = None
-    save: Path | None = None
+    save: Path | None = None  # where to write the tasks
 
     @property
     def recorded(self) -> Recorded:

@@ -222,16 +222,11 @@ _QUERYING = 7  # raised when they are queried by other rules
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IndexingSettings(SceneSettings):
-    """The settings of the benchmark.
+    """The settings of the benchmark."""
 
-    Attributes:
-        scenes: held-out homes by default, or recordings with ``objects.json``.
-        tasks_a_scene: limit of tasks a scene and table.
-        sizes: limit of tasks a table, over all scenes; taken from the scenes in turn. None: all that they offer.
-    """
-
-    scenes: tuple[str, ...] = DEFAULT_SCENES
-    tasks_a_scene: int = 20
+    scenes: tuple[str, ...] = DEFAULT_SCENES  # held-out homes by default, or recordings with ``objects.json``
+    tasks_a_scene: int = 20  # limit of tasks a scene and table
+    # Limit of tasks a table, over all scenes; taken from the scenes in turn. None: all that they offer.
     sizes: Mapping[TaskKind, int] | None = field(default_factory=lambda: dict(PAPER_SIZES))
 
     def __post_init__(self) -> None:

@@ -29,29 +29,20 @@ class TaskKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One question with its truth.
+    """One question with its truth."""
 
-    Attributes:
-        name: unique: scene, kind and number.
-        kind: which table it belongs to.
-        scene: the scene's name, such as ``house:1000000:held-out``.
-        category: what is sought: an object, or a sound (``object-sound``).
-        context: the part that says which one: an area, an object, a sound; for a photo the name in the answer lists.
-        targets: the boxes that are right; for an area all things of the category in it, for a sound the places of the
-            robot while it was heard.
-        rivals: the number of other things of the category that the recording shows, or of other places of the sound.
-        place: where the sound was heard or came from, or the photo was taken, metres, world; None for an area.
-        photo: ``world_from_camera`` of the photo, row by row; None without one.
-    """
-
-    name: str
-    kind: TaskKind
-    scene: str
-    category: str
-    context: str
+    name: str  # unique: scene, kind and number
+    kind: TaskKind  # which table it belongs to
+    scene: str  # the scene's name, such as ``house:1000000:held-out``
+    category: str  # what is sought: an object, or a sound (``object-sound``)
+    context: str  # the part that says which one: an area, an object, a sound; for a photo the name in the answer lists
+    # The boxes that are right; for an area all things of the category in it, for a sound the places of the robot while
+    # it was heard.
     targets: tuple[Box, ...]
-    rivals: int
+    rivals: int  # the number of other things of the category that the recording shows, or of other places of the sound
+    # Where the sound was heard or came from, or the photo was taken, metres, world; None for an area.
     place: Triple | None = None
+    # ``world_from_camera`` of the photo, row by row; None without one.
     photo: tuple[tuple[float, float, float, float], ...] | None = None
 
     def __post_init__(self) -> None:

@@ -132,19 +132,13 @@ _Rows = list[list[object]]
 
 @dataclass(frozen=True, slots=True)
 class LiveBench:
-    """What can be chosen.
+    """What can be chosen."""
 
-    Attributes:
-        laps: how often each recording is driven at its own pace; 0 measures kills alone.
-        kills: how many processes are killed; those that a folder of work holds, of the same package, are not repeated.
-        rate: how many times faster than it was recorded a recording is driven.
-        ends: whether its end is compared with the build, and it is also driven as fast as the map takes it.
-    """
-
-    laps: int = 2
+    laps: int = 2  # how often each recording is driven at its own pace; 0 measures kills alone
+    # How many processes are killed; those that a folder of work holds, of the same package, are not repeated.
     kills: int = 40
-    rate: float = 1.0
-    ends: bool = True
+    rate: float = 1.0  # how many times faster than it was recorded a recording is driven
+    ends: bool = True  # whether its end is compared with the build, and it is also driven as fast as the map takes it
 
 
 def run_live(

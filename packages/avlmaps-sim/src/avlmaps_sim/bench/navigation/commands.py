@@ -140,20 +140,14 @@ BY_SOUND, BY_IMAGE, BY_AREA, SOUND_BY = "object by sound", "object by image", "o
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """One command to be filled.
+    """One command to be filled."""
 
-    Attributes:
-        command: the sentence; ``{0}`` is what the first part is called.
-        parts: what it is filled with.
-        relation: what becomes of the parts: ``""``: each is a goal; ``between``, ``left``, ``right``, ``north`` ...:
-            one spot; ``face``: the first is a goal, then the second is to be faced; ``turn``: only a heading.
-        distance_m: from the edge, for a side.
-    """
-
-    command: str
-    parts: tuple[str, ...]
+    command: str  # the sentence; ``{0}`` is what the first part is called
+    parts: tuple[str, ...]  # what it is filled with
+    # What becomes of the parts: ``""``: each is a goal; ``between``, ``left``, ``right``, ``north`` ...: one spot;
+    # ``face``: the first is a goal, then the second is to be faced; ``turn``: only a heading.
     relation: str = ""
-    distance_m: float = BESIDE_M
+    distance_m: float = BESIDE_M  # from the edge, for a side
 
 
 COMMANDS = (

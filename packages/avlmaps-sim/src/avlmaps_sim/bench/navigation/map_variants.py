@@ -31,19 +31,13 @@ Sense = Literal["ours", "weak", "true", "none"]
 
 @dataclass(frozen=True, slots=True)
 class Senses:
-    """Where each modality's heat comes from.
+    """Where each modality's heat comes from."""
 
-    Attributes:
-        objects: ``ours``, ``true`` or ``none``.
-        sounds: ``ours``, ``weak`` (a plainer ear), ``true`` or ``none``.
-        images: ``ours``, ``weak`` (the most alike keyframe's place, nothing matched), ``true`` or ``none``.
-        areas: ``ours``, ``true`` or ``none``.
-    """
-
-    objects: Sense = "ours"
-    sounds: Sense = "ours"
+    objects: Sense = "ours"  # ``ours``, ``true`` or ``none``
+    sounds: Sense = "ours"  # ``ours``, ``weak`` (a plainer ear), ``true`` or ``none``
+    # ``ours``, ``weak`` (the most alike keyframe's place, nothing matched), ``true`` or ``none``.
     images: Sense = "ours"
-    areas: Sense = "ours"
+    areas: Sense = "ours"  # ``ours``, ``true`` or ``none``
 
 
 @dataclass(frozen=True, eq=False)

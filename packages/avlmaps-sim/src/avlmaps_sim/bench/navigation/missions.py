@@ -35,27 +35,18 @@ class GoalKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """One subgoal with its truth. Any of the right things will do.
+    """One subgoal with its truth. Any of the right things will do."""
 
-    Attributes:
-        kind: how it is named.
-        said: how a command names it; ``{photo 0}`` stands for the file of the mission's first photo.
-        program: the line of a program that goes there.
-        boxes: right things; the distance is horizontal, to the nearest point of a box.
-        places: right places: where a sound was heard or came from, where a photo was taken, a spot; metres, world.
-        rooms: corners of right rooms, top-down; 0 m away inside.
-        heading_rad: where the robot is to look, counter-clockwise from +x; None where that does not matter.
-        context: the part that says which one is meant, if ambiguous: ``object``, ``sound``, ``image``, ``area``.
-    """
-
-    kind: GoalKind
-    said: str
-    program: str
-    boxes: tuple[Box, ...] = ()
+    kind: GoalKind  # how it is named
+    said: str  # how a command names it; ``{photo 0}`` stands for the file of the mission's first photo
+    program: str  # the line of a program that goes there
+    boxes: tuple[Box, ...] = ()  # right things; the distance is horizontal, to the nearest point of a box
+    # Right places: where a sound was heard or came from, where a photo was taken, a spot; metres, world.
     places: tuple[Triple, ...] = ()
-    rooms: tuple[tuple[Corner, ...], ...] = ()
+    rooms: tuple[tuple[Corner, ...], ...] = ()  # corners of right rooms, top-down; 0 m away inside
+    # Where the robot is to look, counter-clockwise from +x; None where that does not matter.
     heading_rad: float | None = None
-    context: str = ""
+    context: str = ""  # the part that says which one is meant, if ambiguous: ``object``, ``sound``, ``image``, ``area``
 
     def __post_init__(self) -> None:
         if not (self.boxes or self.places or self.rooms or self.heading_rad is not None):
@@ -153,27 +144,17 @@ class Series(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """One or several subgoals in one command.
+    """One or several subgoals in one command."""
 
-    Attributes:
-        name: unique: scene, series and number.
-        series: which experiment it belongs to.
-        scene: the scene's name, such as ``house:1000001:held-out``.
-        start: x and y in metres and heading in radians, counter-clockwise from +x.
-        goals: in the order in which they are to be reached.
-        command: a sentence with ``{0}``, ``{1}`` ... for what the goals are called; ``""`` names one after another.
-        photos: ``world_from_camera`` of every photo, row by row.
-        form: of a list's command before it was filled.
-    """
-
-    name: str
-    series: Series
-    scene: str
-    start: tuple[float, float, float]
-    goals: tuple[Goal, ...]
+    name: str  # unique: scene, series and number
+    series: Series  # which experiment it belongs to
+    scene: str  # the scene's name, such as ``house:1000001:held-out``
+    start: tuple[float, float, float]  # x and y in metres and heading in radians, counter-clockwise from +x
+    goals: tuple[Goal, ...]  # in the order in which they are to be reached
+    # A sentence with ``{0}``, ``{1}`` ... for what the goals are called; ``""`` names one after another.
     command: str = ""
-    photos: tuple[tuple[Row, ...], ...] = ()
-    form: str = ""
+    photos: tuple[tuple[Row, ...], ...] = ()  # ``world_from_camera`` of every photo, row by row
+    form: str = ""  # of a list's command before it was filled
 
     def __post_init__(self) -> None:
         if not self.goals:
