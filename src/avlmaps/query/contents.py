@@ -394,10 +394,17 @@ class Whereabouts:
     @cached_property
     def numbered(self) -> dict[str, int]:
         """The region of each room that shares its name with others, by the name with its number."""
-        from avlmaps.query.edits import plain_name
-
         rooms = zip(self.names, self.rooms, strict=True)
         return {plain_name(name): room.region for name, room in rooms if name != room.name}
+
+
+_POSSESSIVES = ("the ", "a ", "an ", "my ", "your ", "our ")
+
+
+def plain_name(name: str) -> str:
+    """Return a name in lower case without the words before it: "My charging dock" is "charging dock"."""
+    word = " ".join(name.casefold().split())
+    return next((word.removeprefix(one) for one in _POSSESSIVES if word.startswith(one)), word)
 
 
 def _plain(asked: str) -> str:
@@ -415,8 +422,6 @@ def region_named(avlmap: "AVLMap", phrase: str) -> int | None:
     """Return the region of the room that a phrase names with its number; None where a person called something so."""
     if not _NUMBERED.search(phrase) or avlmap.edited.knows(phrase):
         return None
-    from avlmaps.query.edits import plain_name
-
     return _numbered(avlmap).get(plain_name(phrase))
 
 

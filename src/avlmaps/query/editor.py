@@ -12,7 +12,8 @@ from avlmaps.core.numbers import checked
 from avlmaps.core.poses import plain_point
 from avlmaps.core.wording import option, place_text
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, EditedSpot, World, append_edit, in_force, read_edits
-from avlmaps.query.edits import Edited, means, plain_name, said
+from avlmaps.query.contents import plain_name
+from avlmaps.query.edits import Edited, means, said
 from avlmaps.query.places import is_place, place_given
 from avlmaps.query.schema import EditAnswer, row_of
 

@@ -14,6 +14,7 @@ from avlmaps.core.poses import plain_point
 from avlmaps.core.question import Part
 from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import Edit, EditedSpot, World, in_force
+from avlmaps.query.contents import Thing, plain_name, thing_of
 from avlmaps.query.factors import NearAnchors, NearThings
 from avlmaps.query.objects import Instances, colour_in, colour_share
 from avlmaps.query.settings import FOUND_AT, HeatSettings
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from avlmaps.maps.obstacles import ForbiddenArea
     from avlmaps.maps.store.life import Life
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.contents import Room, Thing
+    from avlmaps.query.contents import Room
     from avlmaps.query.rooms import RoomField
 
 # Share of two boxes together that both hold: perhaps one thing. Chosen on maps of two simulated homes and four rebuilds
@@ -39,7 +40,6 @@ _SAME_ROOM = 0.25
 _HALF = 0.5  # of its voxels: then a thing is in the claim
 _SPECK = 0.05  # share of a thing; smaller pieces belong to the nearest larger one
 _AT_M = 1e-3
-_POSSESSIVES = ("the ", "a ", "an ", "my ", "your ", "our ")
 _DONE = {"rename": "named", "rename room": "named", "merge": "made one thing", "split": "split", "pin": "named",
          "forbid": "forbidden"}  # fmt: skip
 
@@ -75,12 +75,6 @@ class LostEdit:
 def said(edit: Edit) -> str:
     """Return who did what and when: ``named by a person on 2026-11-26``."""
     return f"{_DONE[edit.does]} by {edit.by or 'a person'} on {edit.day}"
-
-
-def plain_name(name: str) -> str:
-    """Return a name in lower case without the words before it: "My charging dock" is "charging dock"."""
-    word = " ".join(name.casefold().split())
-    return next((word.removeprefix(one) for one in _POSSESSIVES if word.startswith(one)), word)
 
 
 def means(asked: str) -> Callable[[str], bool]:
@@ -384,8 +378,6 @@ class Edited:
         """Return a list of things as people corrected it, most confident first."""
         if not self.edits or not (self.claims or self.pins):
             return found
-        from avlmaps.query.contents import Thing, thing_of
-
         taken = self._voxels(self.claims)
         things = [one for one in found if not len(one.rows) or taken[one.rows].mean() < _HALF]
         wanted = None if names is None else [means(name) for name in names]
