@@ -11,6 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AvlmapsError, LanguageError
+from avlmaps.language import intents as act
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import Clarify, Go, If, Pick, Refuse, Return, StopAt, Target, TargetKind, targets_of
 from avlmaps.language.program import parse_program
@@ -138,6 +139,8 @@ NEAREST_SOFA = Go(thing("sofa", Pick.NEAREST))
         ("unless there is a sofa, go to the kitchen", If(thing("sofa"), (), (Go(KITCHEN),))),
         ("go to the kitchen unless there is no sofa", If(thing("sofa"), (Go(KITCHEN),))),
         ("go to the sofa if there is one, else come back", If(thing("sofa"), (Go(thing("sofa")),), (Return(),))),
+        ("go halfway to the sofa if there is one",
+         If(thing("sofa"), (act.Between((Target(TargetKind.HERE), thing("sofa"))),))),
         ("Check whether we have a sofa and if so go to it", If(thing("sofa"), (NEAREST_SOFA,))),
         ("If the map contains a sofa, approach it to within half a metre; if not, go to the kitchen instead.",
          If(thing("sofa"), (StopAt(thing("sofa", Pick.NEAREST), 0.5),), (Go(KITCHEN),))),

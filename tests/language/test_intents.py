@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from avlmaps.language import intents as act
 from avlmaps.language.intents import Clarify, Go, Intent, Refuse, Side, Target, TargetKind, Wait, paths_in, row_of
 from avlmaps.language.program import parse_program
 from avlmaps.language.program.writing import write_program
@@ -44,6 +45,18 @@ VALUES = {"to": SOFA, "of": SOFA, "metres": 2.0, "degrees": 30.0, "heading": 45.
           "views": 3, "body": (Wait(),), "otherwise": (Go(SOFA),)}  # fmt: skip
 CLASSES = {one.do: one for one in get_args(Intent) if one not in (Refuse, Clarify)}
 ROWS = table("intents")["row"]
+
+
+@pytest.mark.parametrize("intent", [act.VisitEach(HERE), act.If(HERE, (Go(SOFA),)), act.Turn(), Clarify()])
+def test_an_intent_that_is_no_program_is_refused(intent: Intent) -> None:
+    with pytest.raises(ValueError, match=r"has no row|cannot look up where"):
+        write_program((intent,))
+
+
+def test_a_place_that_a_loop_looked_up_has_its_name_behind_it_and_one_of_a_condition_has_none() -> None:
+    looked_up = (act.VisitEach(SOFA), Go(SOFA))
+    assert write_program((act.Repeat(2, looked_up), Go(SOFA))).endswith("\nrobot.move_to_object(sofa)\n")
+    assert write_program((act.If(LAMP, looked_up), Go(SOFA))).endswith("\nrobot.move_to_object(sofa2)\n")
 
 
 def test_every_intent_has_a_row() -> None:

@@ -55,7 +55,10 @@ def test_the_page_names_every_function() -> None:
     assert all(f"`{name}" in text for name in BUILTINS)
 
 
-def test_which_skills_move_the_robot_is_told_from_what_they_return() -> None:
-    moving = {name for name, skill in skills().items() if skill.moves}
-    words = ("move", "face", "turn", "with_object", "wait")
-    assert moving == {name for name in skills() if name.startswith(words)}
+def test_programs_call_these_skills_and_no_other_method_of_the_robot() -> None:
+    moving = """move_to move_to_object move_in_between move_to_left move_to_right move_behind move_north move_south
+        move_east move_west face turn turn_absolute move_forward with_object_on_left with_object_on_right wait"""
+    looking = """load_image load_sound get_major_map get_map get_max_pos_3d get_pos get_nearest_pos get_all_pos
+        get_nth_pos exists get_distance get_contour current_pos"""
+    assert {name for name, skill in skills().items() if skill.moves} == set(moving.split())
+    assert set(skills()) == {*moving.split(), *looking.split()}

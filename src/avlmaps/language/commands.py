@@ -96,7 +96,9 @@ def _branched(text: str, given: Attachments | None) -> Command | None:
         return replace(stopped, notes=notes)
     before, then, otherwise = (read.intents for read in reads)
     if thing is None:  # "go to the piano if there is one"
-        thing = next((target for step in then for target in act.targets_of(step)), None)
+        thing = next(
+            (one for step in then for one in act.targets_of(step) if one.kind is not act.TargetKind.HERE), None
+        )
     if thing is None:
         return None
     if bool(parts.get("none")) != bool(parts.get("unless")):

@@ -366,7 +366,10 @@ def _rows() -> Sequence[Row]:
 
 def row_of(intent: Intent) -> Row:
     """Return the row of an intent that is no refusal and no question."""
-    return next(row for row in _rows() if row.do == intent.do and row.fits(intent))
+    for row in _rows():
+        if row.do == intent.do and row.fits(intent):
+            return row
+    raise ValueError(f"{intent!r} has no row in intents.toml")
 
 
 def facts_of(intent: Intent) -> list[str]:

@@ -66,14 +66,15 @@ class _Writer(act.Filled):
                 if inner is None:
                     self.add(self.vformat(line, (), values))
                 else:
+                    named = dict(self.names)
                     self.indented(inner)
+                    if program.startswith("if"):  # what is looked up in a block that may not run has no name behind it
+                        self.names = named
 
     def indented(self, intents: Sequence[Intent]) -> None:
-        """Write a block; what it looks up has no name behind it."""
-        named, indent = dict(self.names), self.indent
         self.indent += "    "
         self.block(intents)
-        self.names, self.indent = named, indent
+        self.indent = self.indent[:-4]
 
     def get_value(self, key: int | str, args: Sequence[Any], kwargs: Any) -> Any:
         if key not in kwargs:
@@ -89,7 +90,6 @@ class _Writer(act.Filled):
         return forms.get(format_spec, self.value)(value)
 
     def way(self, target: Target) -> str:
-        """Return the movement to a target."""
         value = self.value(target)
         if target.kind is TargetKind.OBJECT and not target.near:
             return f"robot.move_to_object({value})"
@@ -123,7 +123,6 @@ class _Writer(act.Filled):
         return self.query(target)
 
     def query(self, target: Target) -> str:
-        """Return the phrase of a thing, or the variable or expression of a heatmap."""
         if target.kind is TargetKind.OBJECT and not target.near:
             return _quoted(target.name)
         factors = [
@@ -148,5 +147,7 @@ def _quoted(text: str) -> str:
 
 
 def _argument(target: Target) -> str:
+    if target.kind is TargetKind.HERE:
+        raise ValueError("a program cannot look up where the robot stands")
     at = "" if target.at is None else f', at="{target.at}"'
     return _ARGUMENTS[target.kind].format(_quoted(target.name)) + at
