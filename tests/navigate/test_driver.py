@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core import poses
+from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, wrap_angle
 from avlmaps.maps.obstacles import BodyShape, CellState, Obstacles
 from avlmaps.navigate.controller import bearing
@@ -314,8 +315,8 @@ class Odd(FreeBody):
         match self.odd:
             case "nan":
                 return Moved(GroundPose(float("nan"), y, heading))
-            case "nothing":
-                return Moved(None)  # pyright: ignore[reportArgumentType]
+            case "nothing" | "bare":
+                return moved.pose if self.odd == "bare" else Moved(None)  # pyright: ignore[reportArgumentType]
             case "gone":
                 raise OSError("connection reset")
             case "jumps":
@@ -336,6 +337,7 @@ class Odd(FreeBody):
     [
         ("nan", "failed to move (ValueError"),
         ("nothing", "failed to move (TypeError"),
+        ("bare", "failed to move (AttributeError"),
         ("gone", "failed to move (OSError: connection reset)"),
         ("jumps", "the body moved by 3.2"),
     ],
@@ -347,6 +349,13 @@ def test_a_body_that_fails_or_does_something_else_is_stopped(odd, says):
         assert not arrival.reached and says in arrival.note
         assert np.isfinite(arrival.path).all() and body.count <= 6
         assert odd == "jumps" or body.stops
+
+
+def test_a_body_whose_pose_is_no_pose_is_refused():
+    body = FreeBody(START)
+    body.pose = Moved(START)
+    with pytest.raises(NavigationError, match=r"say where it is .*Moved is no GroundPose"):
+        MapDriver(MAP, body)
 
 
 def test_a_body_that_says_it_is_at_the_goal_at_once_is_not_there():

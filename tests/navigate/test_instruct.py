@@ -13,7 +13,7 @@ from avlmaps.language.sentence import Attachments
 from avlmaps.language.translator import LearnedTranslator, Translation
 from avlmaps.maps.store.edits import Edit, EditedSpot, World
 from avlmaps.navigate.driver import Arrival
-from avlmaps.navigate.instruct import Outcome, instruct
+from avlmaps.navigate.instruct import InstantDriver, Outcome, instruct, rehearse
 from helpers.kinematic import KinematicDriver
 from query.query_fakes import asked, furnished_map, sounds_of
 
@@ -67,6 +67,13 @@ def test_a_translator_that_knows_no_map_is_given_this_one() -> None:
     assert "I will go to where dog was heard." in lines
     fixed, _ = told(said, LearnedTranslator(Attachments(at="robot")))
     assert fixed.ok and fixed.notes == () and fixed.program == outcome.program
+
+
+def test_a_place_far_off_the_map_is_not_reached_in_a_rehearsal() -> None:
+    program = "robot.move_to(robot.current_pos() * 1000000000000)\n"
+    m = furnished_map()
+    outcome = rehearse("go", Translation(program), m, InstantDriver(m, GroundPose(3.0, 2.0)))
+    assert not outcome.ok and outcome.moves[0].note == "the place is off the map"
 
 
 def test_a_forbidden_area_that_the_map_does_not_know_is_told_before_the_robot_moves() -> None:

@@ -122,7 +122,7 @@ class MapDriver:
     def __init__(self, obstacles: Obstacles, body: Body, shape: BodyShape = BASE) -> None:
         self.obstacles, self.body, self.shape = obstacles, body, shape
         self.contacts = ContactMap(obstacles, shape.radius_m)
-        self._last = self._of_body("say where it is", lambda: body.pose)
+        self._last = self._of_body("say where it is", lambda: _posed(body.pose))
         self.contacts.mark_free(self._last)
         self.held: Callable[[], str] = lambda: ""
         self._planner: Planner | None = None  # of the obstacles known by now; None where one came since
@@ -130,7 +130,7 @@ class MapDriver:
     @property
     def pose(self) -> GroundPose:
         """Where the body is; ``NavigationError`` where it fails to say so."""
-        self._last = self._of_body("say where it is", lambda: self.body.pose)
+        self._last = self._of_body("say where it is", lambda: _posed(self.body.pose))
         return self._last
 
     @property
@@ -235,10 +235,7 @@ class MapDriver:
         return self._moved_by(stopped)
 
     def _moved_by(self, movement: Callable[[_Trip], Arrival]) -> Arrival:
-        """Return the result of a movement; a body that fails is stopped, and is where it was seen last.
-
-        It is stopped as well where a movement ends by anything else, such as Ctrl-C.
-        """
+        """A body that fails is stopped, and is where it was seen last; Ctrl-C stops it as well."""
         trip = _Trip([(self._last.x_m, self._last.y_m)])
         whole = False
         try:
@@ -256,11 +253,7 @@ class MapDriver:
 
     def _of_body(self, do: str, call: Callable[[], T]) -> T:
         try:
-            answer = call()
-            pose = getattr(answer, "pose", answer)
-            if not isinstance(pose, GroundPose):
-                raise TypeError(f"{type(pose).__name__} is no GroundPose")
-            return answer
+            return call()
         except Exception as fault:
             why = f"{type(fault).__name__}: {printable(fault, 200)}"
             raise NavigationError(f"The body failed to {do} ({why}); it may still move: use its own stop.") from fault
@@ -369,7 +362,7 @@ class MapDriver:
             trip.fault = why
             return False
         before = self.pose
-        moved = self._of_body("move", lambda: self.body.act(action))
+        moved = self._of_body("move", lambda: _moved(self.body.act(action)))
         trip.actions.append(action)
         return self._noted(trip, before, before.after(action), moved)
 
@@ -398,3 +391,14 @@ class MapDriver:
         if planned_m and self.contacts.mark_contact(before, planned, moved.pose):
             self._planner = None
         return False
+
+
+def _posed(pose: GroundPose) -> GroundPose:
+    if not isinstance(pose, GroundPose):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise TypeError(f"{type(pose).__name__} is no GroundPose")
+    return pose
+
+
+def _moved(moved: Moved) -> Moved:
+    _posed(moved.pose)
+    return moved

@@ -268,23 +268,27 @@ class InstantDriver:
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
         """Be there, looking where it looked before."""
         x_m, y_m, _ = (float(value) for value in self._space.level(place))
-        return self._at(replace(self.pose, x_m=x_m, y_m=y_m))
+        return self._at(lambda: replace(self.pose, x_m=x_m, y_m=y_m))
 
     def turn(self, angle_rad: float) -> Arrival:
         """Look there."""
-        return self._at(self.pose.turned(angle_rad))
+        return self._at(lambda: self.pose.turned(angle_rad))
 
     def forward(self, distance_m: float) -> Arrival:
         """Be straight ahead."""
-        return self._at(self.pose.ahead(distance_m))
+        return self._at(lambda: self.pose.ahead(distance_m))
 
     def stop(self) -> Arrival:
         """Stand."""
-        return self._at(self.pose)
+        return self._at(lambda: self.pose)
 
-    def _at(self, pose: GroundPose) -> Arrival:
-        self.pose = pose
-        return Arrival(True, pose, (), np.array([[pose.x_m, pose.y_m]]))
+    def _at(self, pose_after: Callable[[], GroundPose]) -> Arrival:
+        note = ""
+        try:
+            self.pose = pose_after()
+        except ValueError:  # a `GroundPose` lies within 1e9 m
+            note = "the place is off the map"
+        return Arrival(not note, self.pose, (), np.array([[self.pose.x_m, self.pose.y_m]]), note)
 
 
 def rehearse(
