@@ -66,14 +66,14 @@ def test_without_rclpy_one_sentence_says_what_to_source_and_what_does_without():
         open_ros_driver("move_base", "native")
 
 
-@pytest.mark.parametrize("namespace", ["robot 1", "a//b", "/x/$(y)", "1robot"])
+@pytest.mark.parametrize("namespace", ["robot 1", "a//b", "/x/$(y)", "1robot", None])
 def test_no_namespace_is_refused(namespace):
     with pytest.raises(NavigationError, match="not a ROS namespace"):
         RosSettings(namespace=namespace)
 
 
 @pytest.mark.parametrize("name", ["goal_timeout_s", "speed_m_s", "reached_m"])
-@pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf"), True, "0.3", None])
 def test_no_setting_is_refused(name, bad):
     with pytest.raises(NavigationError, match="it is a number from"):
         RosSettings(**{name: bad})

@@ -1,5 +1,10 @@
 """The server of maps: HTTP for programs and browsers, the Model Context Protocol for agents.
 
+    from avlmaps.serve.app import create_app
+    from avlmaps.serve.service import Service
+    from avlmaps.serve.settings import ServeSettings
+    from avlmaps.serve.shelf import named_maps
+
     service = Service.open(named_maps(["home.avlmap"]), ServeSettings())
     app = create_app(service)
 

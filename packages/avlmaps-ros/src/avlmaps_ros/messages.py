@@ -46,11 +46,11 @@ class Incoming(msgspec.Struct):
     op: _Name
     id: _Name | None = None
     topic: _Name = ""
-    msg: msgspec.Raw = msgspec.Raw(b"null")
-    values: msgspec.Raw = msgspec.Raw(b"null")
+    msg: msgspec.Raw = msgspec.Raw(b"null")  # a published message; the text of a status message
+    values: msgspec.Raw = msgspec.Raw(b"null")  # the result of a goal or a call; a sentence where it failed
     status: int | None = None
-    result: bool = True
-    level: _Name = ""
+    result: bool = True  # whether the bridge could do what was requested
+    level: _Name = ""  # of a status message: error, warning, info or none
 
 
 class _Time(msgspec.Struct):

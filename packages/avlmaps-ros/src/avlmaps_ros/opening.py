@@ -51,7 +51,7 @@ def open_ros_driver(
 
     Raises:
         NavigationError: nobody answers there, or the robot does not know where it is.
-        BackendError: roslibpy, or ROS 2's rclpy, is not installed.
+        BackendError: autobahn and twisted, or ROS 2's rclpy, are not installed.
     """
     frames, settings = frames or Frames(), settings or RosSettings()
     token = token or os.environ.get("AVLMAPS_ROS_TOKEN") or None

@@ -139,7 +139,7 @@ _RANGES: Mapping[str, tuple[float, float]] = {
 
 
 class RosSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The settings that differ from robot to robot."""
+    """The settings that differ from robot to robot; ``msgspec.structs.replace`` changes some."""
 
     namespace: str = ""  # of the robot's actions (``/robot1`` for ``/robot1/navigate_to_pose``)
     tf_namespace: str = ""  # of its transforms, where they are not on /tf and /tf_static
@@ -165,13 +165,13 @@ class RosSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         namespace, topic = ("namespace", "robot1"), ("topic", "map")
         for name, (word, such) in {"namespace": namespace, "tf_namespace": namespace, "map_topic": topic}.items():
             given = getattr(self, name)
-            bare = given.strip("/")
+            bare = given.strip("/") if isinstance(given, str) else "?"
             if bare and not all(part.isascii() and part.isidentifier() for part in bare.split("/")):
                 raise NavigationError(f"{name} is {given!r}, which is not a ROS {word}; write it as /{such}.")
             msgspec.structs.force_setattr(self, name, f"/{bare}" if bare else "")
         for name, (least, most) in _RANGES.items():
             value = getattr(self, name)
-            if not least <= value <= most:
+            if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
                 raise NavigationError(f"{name} is {value!r}; it is a number from {least:g} to {most:g}.")
 
     @classmethod
@@ -201,8 +201,10 @@ class _RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True)
         except NavigationError as fault:
             raise NavigationError(f"In the settings of {path}, {fault}") from None
         except (OSError, ValueError, RecursionError) as fault:
-            raise _unreadable(path, fault) from None
+            is_setting = str(fault).endswith("`$.settings`")
+            known = f"; the settings are {', '.join(RosSettings.__struct_fields__)}" if is_setting else ""
+            raise _unreadable(path, f"{fault}{known}") from None
 
 
-def _unreadable(path: Path | str, fault: Exception) -> NavigationError:
+def _unreadable(path: Path | str, fault: Exception | str) -> NavigationError:
     return NavigationError(f"The robot's file {path} cannot be read ({fault}); write it as docs/robots.md shows.")
