@@ -219,7 +219,11 @@ def test_a_name_that_nothing_knows_is_a_question() -> None:
     sentence = Sentence("go to the frobnicator")
     for read in learned_reader().command(sentence.tokens):
         checked = weighed(read, NameResolver(sentence))
-        assert stopped(checked.intents) or not any(target.name for target in targets_of(checked.intents))
+        assert (
+            read.probability < 0.01
+            or stopped(checked.intents)
+            or not any(target.name for target in targets_of(checked.intents))
+        )
     known = Sentence("go to the frobnicator", Attachments(knows=lambda _: True))
     assert any(
         not stopped(weighed(read, NameResolver(known)).intents) for read in learned_reader().command(known.tokens)

@@ -19,7 +19,7 @@ UNDERSTOOD = {
     "the chair near where the dog barking can be heard": [("object", "chair"), ("sound", "dog barking")],
     "the chair where you heard the dog bark": [("object", "chair"), ("sound", "dog bark")],
     "the chair where I heard the sound of rain": [("object", "chair"), ("sound", "rain")],
-    "the chair near the sound of typing on a keyboard": [("object", "chair"), ("sound", "typing on keyboard")],
+    "the chair near the sound of typing on a keyboard": [("object", "chair"), ("sound", "typing on a keyboard")],
     "the cup on the table": [("object", "cup"), ("object", "table")],
     "where a baby was heard crying": [("sound", "baby crying")],
     "go to the barking of a dog": [("sound", "dog barking")],

@@ -15,12 +15,12 @@ from avlmaps.language.intents import (
     Beside,
     Clarify,
     Face,
+    If,
     Inquiry,
     Intent,
     Pick,
     RefusalReason,
     Refuse,
-    Repeat,
     Return,
     Side,
     Target,
@@ -205,22 +205,26 @@ def _renamed(kind: TargetKind, name: str, new: str, target: Target) -> Target:
 
 
 def _each(meaning: Any, change: Any) -> Any:
-    if isinstance(meaning, tuple):
-        return tuple(
-            replace(one, body=_each(one.body, change)) if isinstance(one, Repeat) else change(one) for one in meaning
-        )
-    return meaning
+    if not isinstance(meaning, tuple):
+        return meaning
+    held = [{name: getattr(one, name) for name in ("body", "otherwise") if hasattr(one, name)} for one in meaning]
+    return tuple(
+        replace(one, **{name: _each(steps, change) for name, steps in has.items()}) if has else change(one)
+        for one, has in zip(meaning, held, strict=True)
+    )
 
 
 def _flat(meaning: Any) -> list[Intent]:
-    if not isinstance(meaning, tuple):
-        return []
-    return [part for one in meaning for part in (_flat(one.body) if isinstance(one, Repeat) else [one])]
+    found: list[Intent] = []
+    _each(meaning, lambda one: found.append(one) or one)
+    return found
 
 
 def mirrored(example: Example) -> Example:
     """Return an example with left for right, where each side that is said is one that is meant."""
     sided = 0
+    if any(target.pick in (Pick.LEFT, Pick.RIGHT) for target in targets_of(example.meaning)):
+        return example
     for one in _flat(example.meaning):
         sided += isinstance(one, Turn) and one.degrees is not None and abs(one.degrees) != 180.0
         sided += isinstance(one, Beside | Face) and one.side in (Side.LEFT, Side.RIGHT)
@@ -273,6 +277,8 @@ def joinable(example: Example) -> bool:
         return False
     if isinstance(meaning[0], Refuse):
         return meaning[0].reason in (RefusalReason.MANIPULATION, RefusalReason.HARM, RefusalReason.FLYING)
+    if any(isinstance(one, If) for one in meaning):
+        return False
     if any(target.pick is Pick.OTHER or target.is_file for target in targets_of(meaning)):
         return False
     return "\n" not in example.say

@@ -14,6 +14,7 @@ from onnx import TensorProto, helper, numpy_helper
 from torch import Tensor, nn
 from training.language.network import Network
 
+from avlmaps.language.learned.english import WIDTH
 from avlmaps.language.learned.features import MOST_PIECES, columns
 from avlmaps.language.learned.linear import SYMBOLS
 from avlmaps.perception.embedded.words import words_checksum
@@ -53,8 +54,10 @@ class _Begin(nn.Module):
         self.encoders = nn.ModuleList(network.encoder for network in networks)
         self.starts = nn.ModuleList(network.decoder.start for network in networks)
 
-    def forward(self, meaning: Tensor, words: Tensor, pieces: Tensor, marks: Tensor) -> tuple[Tensor, Tensor]:
-        states = [encoder(meaning, words, pieces, marks) for encoder in self.encoders]
+    def forward(
+        self, meaning: Tensor, words: Tensor, pieces: Tensor, marks: Tensor, context: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        states = [encoder(meaning, words, pieces, marks, context) for encoder in self.encoders]
         begins = [torch.tanh(start(one.mean(1)))[None] for start, one in zip(self.starts, states, strict=True)]
         return torch.cat(states, -1), torch.cat(begins, -1)
 
@@ -66,10 +69,11 @@ def write(networks: Sequence[Network], vocabulary: dict[str, int], folder: Path,
     wide, deep = 2 * size.state * len(networks), size.decoder * len(networks)
     n = 7
     inputs = (torch.zeros(1, n, 128), torch.zeros(1, n, dtype=torch.long),
-              torch.zeros(1, n, MOST_PIECES, dtype=torch.long), torch.zeros(1, n, len(columns())))  # fmt: skip
-    _graph(_Begin(networks), inputs, folder / "words.onnx", ["meaning", "words", "pieces", "marks"],
-           ["states", "begin"],
-           {name: {1: "n"} for name in ("meaning", "words", "pieces", "marks", "states")})  # fmt: skip
+              torch.zeros(1, n, MOST_PIECES, dtype=torch.long), torch.zeros(1, n, len(columns())),
+              torch.zeros(1, n, WIDTH))  # fmt: skip
+    names = ["meaning", "words", "pieces", "marks", "context"]
+    _graph(_Begin(networks), inputs, folder / "words.onnx", names, ["states", "begin"],
+           {name: {1: "n"} for name in (*names, "states")})  # fmt: skip
     step = (
         torch.zeros(3, 1, dtype=torch.long),
         torch.zeros(1, n, wide),

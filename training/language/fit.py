@@ -49,6 +49,7 @@ def fitted(
         lost = noise.random(arrays["words"].shape)
         arrays["words"][lost < _UNKNOWN] = 0
         arrays["meaning"][lost < _NO_MEANING] = 0.0
+        arrays["context"][noise.random(lost.shape) < _NO_MEANING] = 0.0
         batch = {name: torch.from_numpy(array) for name, array in arrays.items()}
         loss = network.loss(batch)
         optimiser.zero_grad()

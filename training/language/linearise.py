@@ -57,7 +57,7 @@ def _line(intent: Intent, at: Pointers) -> list[Symbol]:
     for row in (row for row in ROWS if _writes(row, intent)):
         try:
             # a body takes its amounts before "twice" takes one
-            last = sorted(row.fields, key=lambda name: row.fields[name] is not Slot.BODY)
+            last = sorted(row.fields, key=lambda name: row.fields[name] not in (Slot.BODY, Slot.STEPS))
             written = {name: _field(row.fields[name], getattr(intent, name), at) for name in last}
             return [*row.symbols, *(symbol for name in row.fields for symbol in written[name])]
         except MalformedError as missing:  # "turn" by a clock direction that is not said
@@ -89,7 +89,7 @@ def _field(field: Any, value: Any, at: Pointers) -> list[Symbol]:
         return [symbol for each in value for symbol in _target(each, at)]
     if field is Slot.TARGET:
         return _target(value, at)
-    if field is Slot.BODY:
+    if isinstance(field, Slot):
         return [*(symbol for each in value for symbol in _line(each, at)), "close"]
     return []
 
@@ -108,8 +108,9 @@ def _target(target: Target, at: Pointers, *, joint: str = "near") -> list[Symbol
     line: list[Symbol] = [str(target.kind)]
     if target.kind is not TargetKind.HERE:
         line += at.words(target.name, target.kind)
-    if target.pick and target.pick is not Pick.NEAREST:
+    if target.pick and (target.pick is not Pick.NEAREST or target.number > 1):
         line.append(f"pick_{target.pick}")
+        line += [] if target.number == 1 else [f"number_{target.number}"]
     for near in target.near:
         line += [joint, *_target(near, at, joint="inside")]
     return line

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from avlmaps.language.learned.english import WIDTH
 from avlmaps.language.learned.features import BUCKETS, columns
 from avlmaps.language.learned.linear import SYMBOLS
 
@@ -18,6 +19,7 @@ class Size:
     letters: int = 24
     marks: int = 80
     meaning: int = 80
+    context: int = 96
     state: int = 112
     decoder: int = 144
     symbol: int = 64
@@ -32,16 +34,17 @@ class Encoder(nn.Module):
         self.letters = nn.Embedding(BUCKETS, size.letters, padding_idx=0)
         self.marks = nn.Linear(len(columns()), size.marks)
         self.meaning = nn.Linear(128, size.meaning)
-        width = size.own + size.letters + size.marks + size.meaning
+        self.context = nn.Linear(WIDTH, size.context)
+        width = size.own + size.letters + size.marks + size.meaning + size.context
         self.first = nn.GRU(width, size.state, batch_first=True, bidirectional=True)
         self.second = nn.GRU(2 * size.state, size.state, batch_first=True, bidirectional=True)
         self.drop = nn.Dropout(0.25)
         self.norm = nn.LayerNorm(width)
 
-    def forward(self, meaning: Tensor, words: Tensor, pieces: Tensor, marks: Tensor) -> Tensor:
+    def forward(self, meaning: Tensor, words: Tensor, pieces: Tensor, marks: Tensor, context: Tensor) -> Tensor:
         """Return states (b, n, 2 state); all sentences of a batch have the same length."""
         letters = self.letters(pieces).sum(2) * 0.3
-        x = torch.cat([self.own(words), letters, self.marks(marks), self.meaning(meaning)], -1)
+        x = torch.cat([self.own(words), letters, self.marks(marks), self.meaning(meaning), self.context(context)], -1)
         x = self.drop(self.norm(x))
         y = self.first(x)[0]
         z = self.second(self.drop(y))[0]
@@ -107,7 +110,7 @@ class Network(nn.Module):
 
     def loss(self, batch: dict[str, Tensor]) -> Tensor:
         """Return the mean loss of a symbol; a pointer may point at any token of the same word."""
-        states = self.encoder(batch["meaning"], batch["words"], batch["pieces"], batch["marks"])
+        states = self.encoder(*(batch[name] for name in ("meaning", "words", "pieces", "marks", "context")))
         said, _, _ = self.decoder(batch["lines"], states, batch["mask"])
         right = torch.logsumexp(said.masked_fill(~batch["goal"], -1e4), -1)
         weight = batch["real"] * batch["weight"][:, None]

@@ -18,9 +18,11 @@ from avlmaps.language.intents import (
     Clarify,
     Face,
     Go,
+    If,
     Inquiry,
     Intent,
     Move,
+    Pick,
     Return,
     Side,
     StopAt,
@@ -45,6 +47,17 @@ _FILES = ("view", "photo", "img_0231", "./a", "shots/hall", "/tmp/p_1", "kitchen
 _THESE = ("this", "this", "the attached", "that")
 _COLOURS = ("red", "green", "blue", "yellow", "white", "black", "grey", "brown", "orange", "purple", "pink")
 _PARTS = ("leg", "door", "handle", "top", "corner", "edge", "drawer", "end", "foot", "back")
+_ORDINALS = {2: ("second", "2nd"), 3: ("third", "3rd"), 4: ("fourth", "4th"), 5: ("fifth", "5th"), 6: ("sixth",)}
+_CLOSEST = {Pick.NEAREST: ("nearest", "closest"), Pick.FARTHEST: ("farthest", "furthest")}
+_ENDS = (Pick.LEFT, Pick.RIGHT, Pick.NORTH, Pick.SOUTH, Pick.EAST, Pick.WEST)
+_HAS = ("if there is {a}", "if there's {a}", "if you have {a} on your map", "if you know of {a}", "should there be {a}",
+        "if the map has {a}", "in case there is {a}", "provided there is {a}", "if you can find {a}",
+        "assuming there is {a}", "if {a} is there", "when there is {a}")  # fmt: skip
+_UNLESS = ("unless there is {a}", "unless there's {a}", "if there is no {b}", "if there isn't {a}",
+           "if you have no {b}", "if you don't know {a}", "failing {a}", "unless you find {a}")  # fmt: skip
+_ELSE = (", otherwise ", ", or else ", ", else ", "; if not, ", ". If not, ", ", failing that ", ". Otherwise ",
+         " otherwise ", " and if not ", ", if there is none ", ", in any other case ")  # fmt: skip
+_SPELLED = {2: "two", 3: "three", 4: "four", 5: "five", 10: "ten", 15: "fifteen", 20: "twenty", 30: "thirty"}
 _SALAD = 0.05
 
 
@@ -53,6 +66,9 @@ def plain(count: int, names: Names, draw: random.Random) -> list[Example]:
     made = _Maker(names, draw)
     kinds = draw.choices((made.command, made.question, made.with_files), (60, 30, 10), k=count)
     return [make() for make in kinds]
+
+
+_COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 
 
 class _Maker:
@@ -65,6 +81,8 @@ class _Maker:
         count = self.draw.choices((1, 2, 3, 4, 5, 6), (3, 4, 4, 3, 2, 1))[0]
         if self.draw.random() < 0.3:
             return self._list(max(2, count))
+        if self.draw.random() < 0.1:
+            return self._condition()
         said, meant = zip(*(self._order() for _ in range(count)), strict=True)
         joint = self.draw.choice(_THEN) if self.draw.random() < 0.5 else None
         text = said[0]
@@ -114,6 +132,13 @@ class _Maker:
                 first, second = f"{near} {this_clip}", this_photo
             return self._of_files(f"{said} {first} {joint} {second}", meant, image, clip)
         lacks = not image and not clip
+        if not lacks and self.draw.random() < 0.4:  # the other place is in words
+            words, named = self._of(TargetKind.SOUND if image else TargetKind.OBJECT)
+            places = [(this_photo, photo) if image else (this_clip, sound), (words, named)]
+            self.draw.shuffle(places)
+            (one, first), (other, second) = places
+            joint = self.draw.choice((" and ", f" and {near} ", f", {near} ", f" {near} "))
+            return self._of_files(f"{said} {near} {one}{joint}{other}", target.with_near(first, second), image, clip)
         place, meant = self.draw.choice((
             (f"where {this_photo} was taken", photo), (f"the place in {this_photo}", photo),
             (f"{said} {near} {this_photo}", target.with_near(photo)),
@@ -152,6 +177,45 @@ class _Maker:
             text = self.draw.choice(("first ", "First ", "please ")) + text
         return self._example(text, tuple(Go(target) for _, target in parts))
 
+    def _condition(self) -> Example:
+        """Return a command whose steps depend on whether the map has a thing."""
+        name = self._of(TargetKind.OBJECT)[1].name
+        thing = Target(TargetKind.OBJECT, name)
+        a = f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
+        (do, meant), (other, instead) = self._order(), self._order()
+        if self.draw.random() < 0.5:
+            do, meant = f"{self.draw.choice(_GO)} {self.draw.choice(('it', 'that', f'the {name}'))}", Go(thing)
+        if self.draw.random() < 0.3:
+            has, does = self.draw.choice(_UNLESS).format(a=a, b=name), If(thing, (), (instead,))
+            return self._example(self.draw.choice((f"{has}, {other}", f"{other} {has}")), (does,))
+        has, joint = self.draw.choice(_HAS).format(a=a), self.draw.choice((", ", ", then ", " "))
+        if self.draw.random() < 0.4:
+            return self._example(self.draw.choice((f"{has}{joint}{do}", f"{do} {has}")), (If(thing, (meant,), ()),))
+        text = self.draw.choice((f"{has}{joint}{do}", f"{do} {has}")) + self.draw.choice(_ELSE) + other
+        return self._example(text, (If(thing, (meant,), (instead,)),))
+
+    def _counted(self) -> tuple[str, Target]:
+        """Return a thing that is counted from an end of its row, or from the nearest."""
+        name = self._of(TargetKind.OBJECT)[1].name
+        number = self.draw.choice((1, 2, 2, 2, 3, 3, 4, 5, 6))
+        nth = "" if number == 1 else self.draw.choice(_ORDINALS[number])
+        if self.draw.random() < 0.4 and number > 1:
+            pick = self.draw.choice(list(_CLOSEST))
+            order = self.draw.choice(_CLOSEST[pick])
+            said = self.draw.choice((f"the {nth} {order} {name}", f"the {nth}-{order} {name}"))
+            return said, Target(TargetKind.OBJECT, name, (), pick, number)
+        pick = self.draw.choice(_ENDS)
+        end = self.draw.choice((f"the {pick}", f"the {pick}", f"the {pick} end", f"{pick}"))
+        if number == 1:
+            most = f"{pick}most" if pick in (Pick.LEFT, Pick.RIGHT) else f"{pick}ernmost"
+            said = self.draw.choice((f"the {most} {name}", f"the first {name} from {end}", f"the {name} at {end}"))
+        else:
+            said = self.draw.choice((
+                f"the {nth} {name} from {end}", f"{nth} {name} from {end}", f"the {name} that is {nth} from {end}",
+                f"the {nth} {name}, counting from {end}", f"the {name}, {nth} from {end}",
+            ))  # fmt: skip
+        return said, Target(TargetKind.OBJECT, name, (), pick, number)
+
     def _order(self) -> tuple[str, Intent]:
         orders: tuple[Callable[[], tuple[str, Intent]], ...] = (
             self._go, self._go, self._go, self._turn, self._move, self._face, self._between, self._beside, self._stop,
@@ -160,7 +224,7 @@ class _Maker:
         return self.draw.choice(orders)()
 
     def _go(self) -> tuple[str, Intent]:
-        said, target = self._place()
+        said, target = self._place() if self.draw.random() < 0.9 else self._counted()
         if self.draw.random() < 0.08:
             return self.draw.choice((("come back", Return()), ("return to the start", Return())))
         if self.draw.random() < 0.06 and target.kind is TargetKind.OBJECT and not target.near:
@@ -172,6 +236,12 @@ class _Maker:
         word = "left" if side < 0 else "right"
         degrees = self.draw.choice((30, 45, 60, 90, self.draw.randint(1, 179)))
         unit = self.draw.choice((" degrees", " degrees", " deg", "°"))
+        if self.draw.random() < 0.25:
+            heading = self.draw.randrange(0, 360, 45)
+            point = _COMPASS[heading // 45].replace("-", self.draw.choice(("", "-", " ")))
+            return f"{self.draw.choice(('turn', 'turn to the', 'face', 'look', 'head'))} {point}", Turn(
+                None, float(heading)
+            )
         return self.draw.choice((
             (f"turn {word}", Turn(90.0 * side)), (f"turn {word} {degrees}{unit}", Turn(float(degrees * side))),
             (f"turn {degrees}{unit} {word}", Turn(float(degrees * side))),
@@ -196,7 +266,7 @@ class _Maker:
         return text, Move(metres if forward else -metres)
 
     def _face(self) -> tuple[str, Intent]:
-        said, target = self._place()
+        said, target = self._place() if self.draw.random() < 0.93 else self._counted()
         return f"{self.draw.choice(('face', 'look at', 'turn to', 'turn towards'))} {said}", Face(target)
 
     def _between(self) -> tuple[str, Intent]:
@@ -224,8 +294,15 @@ class _Maker:
         return f"{self.draw.choice(('circle', 'drive around', 'go around', 'go round'))} {said}", Circle(target)
 
     def _wait(self) -> tuple[str, Intent]:
-        seconds = self.draw.choice((2, 5, 10, 20, 30, self.draw.randint(1, 59)))
-        return f"wait {self.draw.choice(('', 'for '))}{seconds} seconds", Wait(float(seconds))
+        verb = self.draw.choice(("wait", "wait", "wait", "wait here", "pause", "stay there", "hold on"))
+        count, unit = self.draw.choice((2, 5, 10, 20, 30, self.draw.randint(1, 59))), self.draw.choice((1.0, 1.0, 60.0))
+        names = ("second", "sec", "s") if unit == 1.0 else ("minute", "minute", "min")
+        number = self.draw.choice((str(count), str(count), _SPELLED.get(count, str(count))))
+        if self.draw.random() < 0.15:
+            count, number = 1, "a" if unit > 1.0 else "one"
+        name = self.draw.choice(names)
+        ending = "s" if count > 1 and len(name) > 1 else ""
+        return f"{verb} {self.draw.choice(('', 'for '))}{number} {name}{ending}", Wait(count * unit)
 
     def _place(self) -> tuple[str, Target]:
         """Return a target in words, with or without what it is near."""

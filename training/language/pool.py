@@ -12,10 +12,11 @@ from training.language.augment import joinable, names_of, variant, with_manners
 from training.language.plain import plain
 from training.language.rows import Example, examples_of, lists
 
-from avlmaps.language.intents import Clarify
+from avlmaps.language.intents import Clarify, RefusalReason, Refuse
+from avlmaps.language.learned.english import WIDTH
 from avlmaps.language.learned.features import features, seen_as
 from avlmaps.language.learned.linear import INDEX, SYMBOLS
-from avlmaps.language.sentence import Sentence
+from avlmaps.language.sentence import Sentence, chosen_things, forms
 from avlmaps.language.verbalise import strange_word
 
 _MOST_TOKENS = 70
@@ -47,6 +48,7 @@ class Item:
     Attributes:
         words: its words, numbers of the pool.
         marks: packed bits.
+        context: the state of each word, of a model of English, half precision.
         line: numbers of symbols; a pointer at token i is ``len(SYMBOLS) + i``.
         places: for each pointer all tokens of that word, for each symbol itself.
         start: the symbol that the line begins with.
@@ -56,6 +58,7 @@ class Item:
 
     words: np.ndarray
     marks: np.ndarray
+    context: np.ndarray
     line: np.ndarray
     places: list[list[int]]
     start: int
@@ -95,14 +98,27 @@ class _Words:
         start = INDEX["start_question" if one.is_question else "start_command"]
         voices = frozenset({one.example.voice, *one.example.also})
         return Item(
-            np.array(numbers, np.int32), np.packbits(seen.marks > 0, axis=1), line, places, start, voices, weight
-        )
+            np.array(numbers, np.int32), np.packbits(seen.marks > 0, axis=1), seen.context.astype(np.float16), line,
+            places, start, voices, weight,
+        )  # fmt: skip
 
 
 def collected() -> list[Example]:
     """Return every row, each with what it means most likely."""
     found = [one for paths in lists().values() for path in paths for one in examples_of(path) if one.row]
-    return [one for one in found if not _names_nonsense(one)]
+    return [one for one in found if not _names_nonsense(one) and not _is_contradicted(one)]
+
+
+def _is_contradicted(example: Example) -> bool:
+    """Return whether rows of `rewrites.toml` give a meaning to a sentence that its list, which is older, refuses."""
+    first = example.meaning[0] if isinstance(example.meaning, tuple) and example.meaning else None
+    if not isinstance(first, Clarify) and first != Refuse(RefusalReason.CONDITION):
+        return False
+    tokens = Sentence(example.say).tokens
+    said = " ".join(token.text for token in tokens)
+    delayed = tokens[:1] and tokens[0].text == "wait" and not example.say.lower().startswith("wait")
+    depends = any(says.fullmatch(said) for says, _ in forms("condition", said))
+    return bool(delayed or depends or any(chosen_things(said)))
 
 
 def _names_nonsense(example: Example) -> bool:
@@ -183,12 +199,14 @@ def collated(items: Sequence[Item], pool: Pool, to_known: np.ndarray, columns: i
     base, size = len(SYMBOLS), len(items)
     words = np.full((size, n), -1, np.int64)
     marks = np.zeros((size, n, columns), np.float32)
+    context = np.zeros((size, n, WIDTH), np.float32)
     lines = np.zeros((size, m), np.int64)
     goal = np.zeros((size, m, base + n), bool)
     real = np.zeros((size, m), bool)
     for b, item in enumerate(items):
         words[b, : len(item.words)] = item.words
         marks[b, : len(item.words)] = np.unpackbits(item.marks, axis=1)[:, :columns]
+        context[b, : len(item.words)] = item.context
         lines[b, 0] = item.start
         lines[b, 1 : len(item.line)] = item.line[:-1]
         real[b, : len(item.line)] = True
@@ -200,6 +218,6 @@ def collated(items: Sequence[Item], pool: Pool, to_known: np.ndarray, columns: i
     return {
         "meaning": meaning, "words": to_known[safe] * mask,
         "pieces": pool.pieces[safe].astype(np.int64) * mask[:, :, None],
-        "marks": marks, "mask": mask, "lines": lines, "goal": goal, "real": real,
+        "marks": marks, "context": context, "mask": mask, "lines": lines, "goal": goal, "real": real,
         "weight": np.array([i.weight for i in items], np.float32),
     }  # fmt: skip

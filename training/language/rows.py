@@ -15,6 +15,7 @@ from avlmaps.language.intents import (
     Clarify,
     Face,
     Go,
+    If,
     Inquiry,
     Intent,
     Move,
@@ -68,12 +69,10 @@ def target_of(said: Any) -> Target:
     """Return a target of its JSON."""
     if isinstance(said, str):
         said = {"object": said}
-    if "number" in said:
-        raise ValueError("rows of `rewrites.toml` read what is counted, not the networks")
     kind = next(kind for kind in TargetKind if str(kind) in said)
     name = "" if kind is TargetKind.HERE else str(said[str(kind)])
     near = tuple(target_of(one) for one in said.get("near", ()))
-    return Target(kind, name, near, Pick(said.get("pick", "")))
+    return Target(kind, name, near, Pick(said.get("pick", "")), int(said.get("number", 1)))
 
 
 def intent_of(said: Mapping[str, Any]) -> Intent:  # noqa: C901
@@ -110,7 +109,8 @@ def intent_of(said: Mapping[str, Any]) -> Intent:  # noqa: C901
         case "refuse":
             return Refuse(RefusalReason(said.get("reason") or "unknown"))
         case "if":
-            raise ValueError("rows of `rewrites.toml` read conditions, not the networks")
+            then, otherwise = (tuple(intent_of(one) for one in said.get(key, ())) for key in ("body", "otherwise"))
+            return If(target_of(to), then, otherwise)
         case _:
             return Clarify()
 
@@ -118,8 +118,10 @@ def intent_of(said: Mapping[str, Any]) -> Intent:  # noqa: C901
 def meanings(row: Mapping[str, Any]) -> "list[tuple[Intent, ...] | Inquiry | None]":
     """Return what a row means, and what else it may mean."""
     if "question" in row:
-        readings = (one for one in (row["question"], *row.get("also", ())) if isinstance(one, dict))
-        return [_inquiry(one) for one in readings if one["ask"] != "list"]  # patterns read those, not the networks
+        readings = [one for one in (row["question"], *row.get("also", ())) if isinstance(one, dict)]
+        # Some lists are older than the lists of a map: what they refuse is answered now.
+        readings.sort(key=lambda one: one["ask"] != "list")
+        return [_listed(one) if one["ask"] == "list" else _inquiry(one) for one in readings if not _by_rows(one)]
     return [tuple(intent_of(one) for one in each) for each in (row["intents"], *row.get("also", ()))]
 
 
@@ -127,6 +129,25 @@ def _inquiry(said: Mapping[str, Any]) -> Inquiry | None:
     if said["ask"] in ("refuse", "clarify"):
         return None
     return Inquiry(Ask(said["ask"]), tuple(target_of(one) for one in said["of"]))
+
+
+_LISTED = {
+    ("rooms", "biggest"): Ask.LARGEST_ROOM, ("rooms", "smallest"): Ask.SMALLEST_ROOM,
+    ("sounds", "first"): Ask.FIRST_SOUND, ("sounds", "last"): Ask.LAST_SOUND,
+    **{("names", name): Ask(name) for name in ("rooms", "sounds", "things")},
+    **{("counts", name): Ask(f"count_{name}") for name in ("rooms", "sounds", "things")},
+}  # fmt: skip
+_LISTED_OF = {"in": Ask.CONTENTS, "near": Ask.BESIDE, "room_of": Ask.ROOM_OF}
+
+
+def _listed(said: Mapping[str, Any]) -> Inquiry:
+    ((key, of),) = ((key, of) for key, of in said.items() if key != "ask")
+    return Inquiry(_LISTED_OF[key], (target_of(of),)) if key in _LISTED_OF else Inquiry(_LISTED[key, of], ())
+
+
+def _by_rows(said: Mapping[str, Any]) -> bool:
+    """Return whether rows of `list_questions.toml` read a question, not the networks."""
+    return said["ask"] == "list" and not ({"rooms", "sounds", "names", "counts", *_LISTED_OF} & set(said))
 
 
 def examples_of(path: Path) -> Iterator[Example]:

@@ -148,11 +148,11 @@ def unmet(
 
 def unmet_by(tokens: Sequence[Token], inquiry: act.Inquiry, used: frozenset[int]) -> str | None:
     """Return the question back for what a question claims and its reading leaves out; None where it does all."""
-    about = inquiry.of[0]
     targets = [each for one in inquiry.of for each in (one, *one.near)]
     marked = _Marked(tokens, used, _kinds(targets))
     facts = {str(inquiry.ask), *_facts_of_targets(targets)} | ({"several"} if len(inquiry.of) > 1 else set())
-    if about.kind in (act.TargetKind.SOUND, act.TargetKind.CLIP):
+    about = inquiry.of[0] if inquiry.of else None
+    if about is not None and about.kind in (act.TargetKind.SOUND, act.TargetKind.CLIP):
         facts |= {"sound"} | ({"heard sound"} if _HEARD & {token.text for token in tokens} else set())
         facts |= {"no sound"} if "heard sound" not in facts and not _sounds(about.name) else set()
     facts |= {token.kind for token in tokens if token.kind in ("clip", "image")}
@@ -183,6 +183,9 @@ def in_direction(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tupl
     def turned(intent: act.Intent) -> act.Intent:
         if isinstance(intent, act.Repeat):
             return replace(intent, body=tuple(map(turned, intent.body)))
+        if isinstance(intent, act.If):
+            then, otherwise = (tuple(map(turned, steps)) for steps in (intent.body, intent.otherwise))
+            return replace(intent, body=then, otherwise=otherwise)
         return replace(intent, way=next(left)) if isinstance(intent, act.Circle) else intent
 
     return tuple(map(turned, intents))
@@ -203,6 +206,8 @@ def _facts_of_targets(targets: Sequence[act.Target]) -> Iterator[str]:
     for target in targets:
         if target.pick:
             yield str(target.pick)
+        if target.number > 1:
+            yield "number"
         if target.near:
             yield from ("near", "room near") if target.kind is act.TargetKind.AREA else ("near",)
         if target.kind is act.TargetKind.SOUND:
@@ -221,6 +226,10 @@ def _facts(intents: Sequence[act.Intent], targets: Sequence[act.Target]) -> Iter
     yield from _facts_of_targets(targets)
     if len({one for intent in intents for one in act.targets_of(intent) if one.kind is act.TargetKind.OBJECT}) < 2:
         yield "one thing"
+    for intent in intents:
+        if isinstance(intent, act.If):
+            alive = claimed_words("persons") | claimed_words("living") | claimed_words("passing")
+            yield from ("if", "if alive") if intent.of.name.split()[-1:] in [[word] for word in alive] else ("if",)
     steps = act.steps_of(intents)
     if len(steps) == 1:
         yield "one step"

@@ -113,6 +113,8 @@ def _thing(what: str, given: Attachments | None) -> act.Target | None:
     except QueryError:
         return None
     alive = claimed_words("persons") | claimed_words("living") | claimed_words("passing")
+    if inquiry.ask.of_map:
+        return None
     thing = inquiry.of[0]
     is_thing = thing.kind in (act.TargetKind.OBJECT, act.TargetKind.AREA) and what.startswith(thing.name)
     alone = inquiry.ask is act.Ask.EXISTS and len(inquiry.of) == 1 and thing.name.split()[-1] not in alive
@@ -201,7 +203,10 @@ def _picked(intents: Sequence[act.Intent], said: str) -> tuple[act.Intent, ...]:
             return target
         return replace(target, pick=act.Pick.NEAREST)
 
-    return tuple(act.on_targets(intent, nearest) for intent in intents)
+    def of_any(intent: act.Intent) -> act.Intent:  # "if there is a chair": whichever
+        return replace(intent, of=replace(intent.of, pick=act.Pick.ANY)) if isinstance(intent, act.If) else intent
+
+    return tuple(of_any(act.on_targets(intent, nearest)) for intent in intents)
 
 
 def _back(intent: act.Intent, stand: StandIns) -> act.Intent:

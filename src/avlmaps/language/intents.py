@@ -378,16 +378,39 @@ def facts_of(intent: Intent) -> list[str]:
 
 
 class Ask(StrEnum):
-    """The kind of a question about a target."""
+    """The kind of a question: about a target, or (`of_map`) about the whole map."""
 
     WHERE = "where"
     HOW_MANY = "how_many"
     EXISTS = "exists"
+    ROOM_OF = "room_of"
+    CONTENTS = "contents"
+    BESIDE = "beside"
+    LARGEST_ROOM = "largest_room"
+    SMALLEST_ROOM = "smallest_room"
+    FIRST_SOUND = "first_sound"
+    LAST_SOUND = "last_sound"
+    ROOMS = "rooms"
+    SOUNDS = "sounds"
+    THINGS = "things"
+    COUNT_ROOMS = "count_rooms"
+    COUNT_SOUNDS = "count_sounds"
+    COUNT_THINGS = "count_things"
+
+    @property
+    def is_listed(self) -> bool:
+        """Whether the lists of a map answer it."""
+        return self not in (Ask.WHERE, Ask.HOW_MANY, Ask.EXISTS)
+
+    @property
+    def of_map(self) -> bool:
+        """Whether no target is asked about."""
+        return self.is_listed and self not in (Ask.ROOM_OF, Ask.CONTENTS, Ask.BESIDE)
 
 
 @dataclass(frozen=True, slots=True)
 class Inquiry:
-    """A question to the map; of several targets ("where can I sit?") any answers it."""
+    """A question to the map: of several targets ("where can I sit?") any answers it, of the whole map none is given."""
 
     ask: Ask
     of: tuple[Target, ...]

@@ -12,6 +12,7 @@ from functools import cache
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.language.intents import Ask, Inquiry, TargetKind
 from avlmaps.language.lexer import without_spoken_end
 from avlmaps.language.names import mended, sounding_words
 from avlmaps.language.sentence import OwnName, stand_ins
@@ -58,6 +59,34 @@ class ListQuestion:
     # another sound, or ``in`` the room of that name; of ``BESIDE`` ``rooms`` where these are sought.
     how: str = ""
     other: str = ""  # the other sound, or the other of two things between which all are sought
+
+
+_ASKED = {
+    Ask.LARGEST_ROOM: ListQuestion(Listed.ROOM_BY_SIZE),
+    Ask.SMALLEST_ROOM: ListQuestion(Listed.ROOM_BY_SIZE, first=True),
+    Ask.FIRST_SOUND: ListQuestion(Listed.SOUND_BY_TIME, first=True),
+    Ask.LAST_SOUND: ListQuestion(Listed.SOUND_BY_TIME),
+    Ask.ROOM_OF: ListQuestion(Listed.ROOM_OF),
+    Ask.CONTENTS: ListQuestion(Listed.CONTENTS),
+    Ask.BESIDE: ListQuestion(Listed.BESIDE),
+    **{Ask(name): ListQuestion(Listed.NAMES, name) for name in ("rooms", "sounds", "things")},
+    **{Ask(f"count_{name}"): ListQuestion(Listed.NAMES, name, counts=True) for name in ("rooms", "sounds", "things")},
+}
+
+
+def list_question(inquiry: Inquiry) -> ListQuestion | None:
+    """Return the question to the lists that the networks read; None for another one."""
+    if not inquiry.ask.is_listed:
+        return None
+    listed = _ASKED[inquiry.ask]
+    if not inquiry.of:
+        return listed
+    about = inquiry.of[0]
+    if about.kind is TargetKind.IMAGE and inquiry.ask is Ask.ROOM_OF:
+        return replace(listed, name="this photo")
+    if about.is_file or about.near or len(inquiry.of) > 1:
+        return None
+    return replace(listed, name=f"sound of {about.name}" if about.kind is TargetKind.SOUND else about.name)
 
 
 _TABLE = "list_questions"

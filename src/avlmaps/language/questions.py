@@ -42,7 +42,7 @@ class AskedSentence:
 
     @property
     def questions(self) -> tuple[Question, ...]:
-        """One question for each target; any of them answers."""
+        """One question for each target; any of them answers. None where the lists of a map do."""
         return tuple(question_of(target) for target in self.inquiry.of)
 
 
@@ -136,7 +136,8 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> A
 def _likely(reads: Sequence[Read], sentence: Sentence, limits: ReadingLimits) -> Inquiry:
     best = reads[0].meaning
     assert isinstance(best, Inquiry)
-    alike = sum(one.probability for one in reads if isinstance(one.meaning, Inquiry) and one.meaning.of == best.of)
+    others = [(one.meaning, one.probability) for one in reads if isinstance(one.meaning, Inquiry)]
+    alike = sum(likely for one, likely in others if one.of == best.of and (best.of or one.ask is best.ask))
     if alike < (limits.question_doubtful if is_doubtful(sentence.tokens, reads[0].used) else limits.question):
         raise QueryError(f"{sentence.text.strip()[:80]!r} is not understood; say it like: {_EXAMPLE}.")
     back = unmet_by(sentence.tokens, best, reads[0].used)

@@ -7,6 +7,7 @@ import itertools
 import re
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING
@@ -15,7 +16,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.errors import AskError
+from avlmaps.core.errors import AskError, QueryError
 from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
@@ -31,6 +32,7 @@ from avlmaps.query.modalities import Attachment, Photo, read_picture
 from avlmaps.query.places import distance_m, lies_between, place_given
 
 if TYPE_CHECKING:
+    from avlmaps.language.list_questions import ListQuestion
     from avlmaps.language.questions import AskedSentence
     from avlmaps.language.sentence import OwnName
     from avlmaps.maps.storeys import Storeys
@@ -277,15 +279,23 @@ def _of_sources(asking: _Asking) -> Answer | None:
 
 
 def _of_lists(asking: _Asking) -> Answer | None:
-    from avlmaps.language.list_questions import read_list
-
-    avlmap, asked = asking.avlmap, asking.asked
-    listed = read_list(asked.sentence, own_names(avlmap, asked.sentence))
-    if listed is None:
-        return None
     from avlmaps.query.lists import answer_list
 
-    return answer_list(avlmap, listed, asked.top, partial(_about, asking), asked.at)
+    listed, asked = _read_list(asking), asking.asked
+    return listed and answer_list(asking.avlmap, listed, asked.top, partial(_about, asking), asked.at)
+
+
+def _read_list(asking: _Asking) -> "ListQuestion | None":
+    from avlmaps.language.list_questions import list_question, read_list
+
+    asked, own = asking.asked, own_names(asking.avlmap, asking.asked.sentence)
+    by_rows = read_list(asked.sentence, own)
+    if by_rows is not None or not asked.sentence.strip():
+        return by_rows
+    at = None if asked.at_by_words else "robot"
+    with suppress(QueryError):  # `_read` says why a sentence is not understood
+        return list_question(_read_words(asked.sentence, asked.image, asked.clip, own, at).inquiry)
+    return None
 
 
 def _about(asking: _Asking, words: str) -> Answer:
@@ -324,6 +334,9 @@ def _of_claims(asking: _Asking) -> Answer | None:
 def _read(asking: _Asking) -> Answer:
     asked, avlmap = asking.asked, asking.avlmap
     questions, notes, counted = _questions(asked, own_names(avlmap, asked.sentence))
+    listed = None if questions else _of_lists(asking)  # "the largest room" in another question
+    if listed is not None:
+        return listed
     answers: list[tuple[Question, Answer]] = []
     for question in (_placed(one, asked.at) for one in questions):
         if asked.primary is not None:

@@ -48,6 +48,10 @@ DANGERS = (
 )
 _SMALL_WORDS = frozenset({"a", "an", "one", "some", "first", "second", "half", "couple", "few", "several"})
 _WORTH_ASKING = 0.1
+_MEANT: dict[type[Intent], tuple[str, ...]] = {
+    act.Wait: ("wait",),
+    act.If: ("if", "unless", "otherwise", "not", "whether", "instead"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +165,9 @@ def weighed(read: Read, names: NameResolver) -> Weighed:
         intents, stop = (intents, turned) if isinstance(turned, Clarify) else (turned, None)
     if stop is not None:
         return Weighed((refusal_of(stop, tokens),), read.probability)
-    doubtful = is_doubtful(tokens, read.used, waits=any(isinstance(one, act.Wait) for one in intents))
+    doubtful = is_doubtful(tokens, read.used, frozenset(word for one in intents for word in _MEANT.get(type(one), ())))
+    if doubtful and any(isinstance(one, act.If) for one in intents):  # a condition of which half was read
+        return Weighed((refusal_of(unclear(tokens), tokens),), read.probability)
     return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(names.notes)))
 
 
@@ -183,12 +189,11 @@ def _too_much(intents: Sequence[Intent]) -> Clarify | None:
             return Clarify("Between which two things? Name two different ones.")
         if isinstance(one, act.Turn) and one.degrees is not None and abs(one.degrees) > 360.0 * _LONG_TIMES:
             return Clarify(f"{one.degrees:g} degrees is too far to turn.")
-        if isinstance(one, act.Repeat):
-            if one.times > _LONG_TIMES:
-                return Clarify(f"{one.times} times is too often; say up to {_LONG_TIMES}.")
-            inner = _too_much(one.body)
-            if inner is not None:
-                return inner
+        if isinstance(one, act.Repeat) and one.times > _LONG_TIMES:
+            return Clarify(f"{one.times} times is too often; say up to {_LONG_TIMES}.")
+        inner = _too_much(act.blocks_of(one))
+        if inner is not None:
+            return inner
     return None
 
 
@@ -278,15 +283,15 @@ def _flat_near(target: Target) -> list[Target]:
     return [part for one in target.near for part in (replace(one, near=()), *_flat_near(one))]
 
 
-def is_doubtful(tokens: Sequence[Token], used: frozenset[int], *, waits: bool = False) -> bool:
+def is_doubtful(tokens: Sequence[Token], used: frozenset[int], meant: frozenset[str] = frozenset()) -> bool:
     """Return whether a reading leaves a number or a name unread, or a word that can turn a command round is said.
 
     Args:
         tokens: the sentence.
         used: the tokens that the reading points at.
-        waits: whether the reading has a wait in it, so that "wait" is no "no, wait".
+        meant: words that belong to the reading though nothing points at them: of a wait "wait", no "no, wait".
     """
-    if any(token.text in claimed_words("turning") and not (waits and token.text == "wait") for token in tokens):
+    if any(token.text in claimed_words("turning") - meant for token in tokens):
         return True
     covered = {at for start in used for at in range(start, max(start + 1, amount_end(tokens, start)))}
     said = {tokens[at].text for at in covered}

@@ -14,6 +14,7 @@ from avlmaps.core.arrays import Float32, Int64
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.words import singulars_of
 from avlmaps.language import lexer
+from avlmaps.language.learned.english import english
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import also_things, describing_words, sounding_words
 from avlmaps.language.word_classes import listed, load_word_classes
@@ -41,6 +42,7 @@ class Features(NamedTuple):
     words: Int64[np.ndarray, " n"]  # number in the reader's vocabulary, 0 for others
     pieces: Int64[np.ndarray, "n p"]  # of the runs of letters, filled up with 0
     marks: Float32[np.ndarray, "n f"]  # which classes begin at and hold a token
+    context: Float32[np.ndarray, "n 384"]  # state of the token in its sentence, of a model of English
 
 
 def features(tokens: Sequence[Token], vocabulary: Mapping[str, int]) -> Features:
@@ -51,6 +53,7 @@ def features(tokens: Sequence[Token], vocabulary: Mapping[str, int]) -> Features
         np.array([vocabulary.get(seen_as(token), 0) for token in tokens], np.int64).reshape(-1),
         np.array(list(map(_pieces, spoken)), np.int64).reshape(-1, MOST_PIECES),
         _marked(list(tokens)),
+        english().states([token.text if token.kind not in ("image", "clip") else "file" for token in tokens]),
     )
 
 

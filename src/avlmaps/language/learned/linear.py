@@ -8,8 +8,8 @@ A target is its kind, its words, a pick, and what it is near; an amount stands b
 
 `ROWS` is the table of the intents: a row is one way to write an intent, the symbols that begin it and its fields in the
 order in which they are written. Lines are read by it here, and written by it in `training.language.linearise`. A new
-intent is a new row, its words (`verbalise`) and its program (`program.writing`). The networks know `SYMBOLS` by their
-numbers, so another order needs other networks.
+intent is a new row here, and rows of `intents.toml`. The networks know `SYMBOLS` by their numbers, so another order
+needs other networks.
 """
 
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
@@ -27,7 +27,8 @@ class Slot(Enum):
     """What is written in a place of a line that is no amount."""
 
     TARGET = auto()
-    BODY = auto()
+    BODY = auto()  # intents, one or more
+    STEPS = auto()  # intents, or none
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,17 +130,19 @@ ROWS = (
     _row("wait", intents.Wait, seconds=Amount("seconds", optional=True)),
     _row("return", intents.Return),
     _row("repeat", intents.Repeat, times=Amount("count", TIMES), body=Slot.BODY),
+    _row("if", intents.If, of=Slot.TARGET, body=Slot.STEPS, otherwise=Slot.STEPS),
     *(_row(f"refuse_{reason}", intents.Refuse, reason=reason) for reason in intents.RefusalReason),
     _row("clarify", intents.Clarify),
 )
 ASKS = {f"ask_{ask}": ask for ask in intents.Ask}
 KINDS = tuple(str(kind) for kind in intents.TargetKind)
-PICKS = {f"pick_{pick}": pick for pick in (Pick.NEAREST, Pick.FARTHEST, Pick.OTHER)}
+PICKS = {f"pick_{pick}": pick for pick in Pick if pick}
+NUMBERS = {f"number_{number}": number for number in range(2, 7)}  # "the second nearest", "third from the left"
 STOPS = tuple(row.symbols[0] for row in ROWS if row.ends)
 STARTS = tuple(dict.fromkeys(row.symbols[0] for row in ROWS if not row.ends))
 SYMBOLS = (
     "start_command", "start_question", "end", *STARTS, "close", *STOPS, "refuse", "purpose", *ASKS, *KINDS, *PICKS,
-    "near", "inside", "left", "right", *DEGREES, *HEADINGS, *TIMES, *VIEWS, *BIT,
+    *NUMBERS, "near", "inside", "left", "right", *DEGREES, *HEADINGS, *TIMES, *VIEWS, *BIT,
 )  # fmt: skip
 INDEX = {symbol: at for at, symbol in enumerate(SYMBOLS)}
 
@@ -227,6 +230,8 @@ class Pointable:
 
 Reading = Generator[Open, Symbol, T]  # says what may follow, takes a symbol, and returns what was read
 _STARTS = Open(frozenset(STARTS))
+_BODY = Open(frozenset(STARTS) - {"repeat", "if"})  # what is repeated holds no others
+_STEPS = Open(frozenset(STARTS) - {"repeat"} | {"close"})
 _END = Open(frozenset({"end"}))
 
 
@@ -281,7 +286,7 @@ class Grammar:
         symbol = yield from self._see(Open(frozenset((*ASKS, "refuse", "purpose"))))
         targets: list[Target] = []
         asks = ASKS.get(str(symbol))
-        yield from self._see(_END if asks is None else self.kinds)
+        yield from self._see(_END if asks is None or asks.of_map else self.kinds)
         while self.next != "end":
             targets.append((yield from self._target(self.kinds | _END)))
         return None if asks is None else Inquiry(asks, tuple(targets))
@@ -300,7 +305,9 @@ class Grammar:
             for each in of if isinstance(of, tuple) else (of,):
                 if isinstance(each, Amount | Slot):
                     del left[0]
-                    parts.append((yield from self._field(each, self._begin(left, after))))
+                    then = self._begin(left, after)
+                    some = Open(then.symbols - {"close"}, then.tokens) if left else then  # one of two blocks has steps
+                    parts.append((yield from self._field(each, then, some)))
                 else:
                     parts.append(each)
             values[name] = tuple(parts) if isinstance(of, tuple) else parts[0]
@@ -314,16 +321,20 @@ class Grammar:
         if isinstance(slot, Amount):
             found = Open(frozenset(slot.said), self.can.amounts(slot.of))
             return found | self._begin(slots[1:], after) if slot.optional else found
-        return self.kinds if slot is Slot.TARGET else Open(_STARTS.symbols - {"repeat"})
+        if slot is Slot.TARGET:
+            return self.kinds
+        return _STEPS if slot is Slot.STEPS else _BODY
 
-    def _field(self, of: Slot | Amount, after: Open) -> Reading[Any]:
+    def _field(self, of: Slot | Amount, after: Open, after_nothing: Open) -> Reading[Any]:
         if of is Slot.TARGET:
             return (yield from self._target(after))
-        if of is Slot.BODY:
+        if isinstance(of, Slot):
             body: list[Intent] = []
             while self.next != "close":
-                body.append((yield from self._intent(Open(_STARTS.symbols - {"repeat"} | {"close"}))))
-            yield from self._see(after)
+                body.append(
+                    (yield from self._intent(_STEPS if of is Slot.STEPS else _BODY | Open(frozenset({"close"}))))
+                )
+            yield from self._see(after if body else after_nothing)
             return tuple(body)
         assert isinstance(of, Amount)
         symbol, tokens = self.next, self.can.tokens
@@ -340,12 +351,16 @@ class Grammar:
         while isinstance((yield from self._see(may)), int):
             words.append(int(self.next))
             may = self._named(kind, words, after, in_near=in_near)
-        pick = PICKS.get(str(self.next), Pick.ANY)
+        pick, number = PICKS.get(str(self.next), Pick.ANY), 1
         if pick:
-            yield from self._see(Open(may.symbols - frozenset(PICKS)))
+            rest = Open(may.symbols - frozenset(PICKS))
+            yield from self._see(rest | Open(frozenset(NUMBERS) if pick is not Pick.OTHER else frozenset()))
+            if self.next in NUMBERS:
+                number = NUMBERS[str(self.next)]
+                yield from self._see(rest)
         name = " ".join(self.can.tokens[word].text for word in words)
         place = "source" if kind in ("sound", "clip") and self.at_source(words) else None
-        target = Target(TargetKind(kind), name, (), pick, at=place)
+        target = Target(TargetKind(kind), name, (), pick, number, at=place)
         while self.next == ("inside" if in_near else "near"):
             yield from self._see(self.kinds)
             target = target.with_near((yield from self._target(after, in_near=True)))

@@ -106,7 +106,13 @@ def _asked(sentence: str, given: Attachments) -> dict[str, Any]:
 
     ``QueryError``: the sentence is not understood.
     """
-    from avlmaps.language.list_questions import read_list, said_alternatives, said_number, speaks_of_photo
+    from avlmaps.language.list_questions import (
+        list_question,
+        read_list,
+        said_alternatives,
+        said_number,
+        speaks_of_photo,
+    )
     from avlmaps.language.questions import read_question
     from avlmaps.language.said_places import asks_how_many_storeys, said_storeys
 
@@ -122,14 +128,19 @@ def _asked(sentence: str, given: Attachments) -> dict[str, Any]:
     if listed is not None and listed.of is Listed.ROOM_OF:
         if speaks_of_photo(listed.name) and given.image is not None:
             return {"ask": "list", "room_of": {"image": given.image}}
-        return {"ask": "list", "room_of": read_question(listed.name, given).inquiry.of[0].to_json()}
+        of = read_question(listed.name, given).inquiry.of
+        return {"ask": "list", "room_of": of[0].to_json()} if of else {"ask": "refuse"}
     if listed is not None:
         return {"ask": "list", **_list_json(listed)}
     if numbered is not None:
         number, what = numbered
         of = read_question(f"how many {what} are there", given).inquiry.to_json()["of"]
         return {"ask": "list", "at_least": number, "of": of[0]}
-    read = [read_question(words, given).inquiry.to_json() for words in said_alternatives(rest) or (rest,)]
+    alternatives = said_alternatives(rest)
+    if not alternatives and (listed := list_question(whole := read_question(rest, given).inquiry)) is not None:
+        told = {"room_of": whole.of[0].to_json()} if listed.of is Listed.ROOM_OF else _list_json(listed)
+        return {"ask": "list", **told}
+    read = [read_question(words, given).inquiry.to_json() for words in alternatives or (rest,)]
     return {"ask": read[0]["ask"], "of": [target for one in read for target in one["of"]]}
 
 

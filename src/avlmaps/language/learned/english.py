@@ -1,0 +1,75 @@
+"""Three layers of a model of English, as the gate and the reader take them.
+
+They are the first three of all-MiniLM-L6-v2, fitted to tell orders from what is no order (`training/language/gate`).
+The gate takes their verdict on a sentence, the reader the state of each word in its sentence.
+"""
+
+import json
+import re
+from collections.abc import Sequence
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from avlmaps.core.arrays import Float32
+from avlmaps.core.errors import BackendError
+from avlmaps.perception.embedded.words import WordPieces
+from avlmaps.perception.networks import open_network
+
+WIDTH = 384  # numbers of a state
+_MOST_PIECES = 78
+_WORD = re.compile(r"[a-z]+|\d+|[^\w\s]")
+
+
+class English:
+    """The layers, and the limit of the gate.
+
+    Attributes:
+        limit: from this probability of being no order on, a person is asked.
+    """
+
+    def __init__(self) -> None:
+        folder = files("avlmaps.language.learned").joinpath("weights")
+        try:
+            facts = json.loads(folder.joinpath("gate.json").read_text(encoding="utf-8"))
+            self._network = open_network(folder.joinpath("gate.onnx").read_bytes())
+        except (OSError, ValueError) as fault:
+            raise BackendError(f"The gate of commands lacks its files ({fault}); install the package again.") from fault
+        self._pieces, self.limit = WordPieces(facts["pieces"]), float(facts["limit"])
+
+    def no_order(self, text: str) -> float:
+        """Return how likely a sentence is no order; pictures in it say nothing."""
+        found = self._rows(text)[:_MOST_PIECES]
+        if not found:
+            return 0.0
+        (logit,) = self._run(found, "logit")
+        return float(1.0 / (1.0 + np.exp(-logit[0])))
+
+    def states(self, words: Sequence[str]) -> Float32[np.ndarray, "n 384"]:
+        """Return the state of each word in its sentence, the mean of its pieces'; 0 for words beyond the last piece."""
+        each = [self._rows(word) or [self._pieces.rows["[UNK]"]] for word in words]
+        owners = np.repeat(np.arange(len(each)), [len(rows) for rows in each])[:_MOST_PIECES]
+        found = [row for rows in each for row in rows][:_MOST_PIECES]
+        states = np.zeros((len(words), WIDTH), np.float32)
+        if found:
+            (inside,) = self._run(found, "states")
+            np.add.at(states, owners, inside[0, 1:-1])
+            states /= np.maximum(np.bincount(owners, minlength=len(words)), 1)[:, None]
+        return states
+
+    def _rows(self, text: str) -> list[int]:
+        plain = text.lower().replace("’", "'").encode("ascii", "ignore").decode()
+        unknown = [self._pieces.rows["[UNK]"]]
+        return [row for word in _WORD.findall(plain) for row in self._pieces.rows_of_word(word) or unknown]
+
+    def _run(self, found: list[int], output: str) -> list[np.ndarray]:
+        rows = self._pieces.rows
+        line = np.array([[rows["[CLS]"], *found, rows["[SEP]"]]], np.int64)
+        return [np.asarray(each) for each in self._network.run([output], {"pieces": line})]
+
+
+@cache
+def english() -> English:
+    """Return the layers that ship; they are loaded at the first call."""
+    return English()
