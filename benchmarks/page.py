@@ -194,14 +194,14 @@ ENTRIES = (
                r"fold 1.*first name right (\S+), own name says yes (\S+)",
                "first name right {1}, own name says yes {2}"),
         Figure("another hand: 85 more clips, first name right", "", r"more clips: first name right (\S+)", "{1}"),
-        Figure("another hand: another such writer, behind the gate", "",
-               r"another such writer.*right (\d+ %), asked back acceptably (\d+ %), asked back wrongly (\d+ %), "
-               r"misread (\d+ %).*driven (.+)",
-               "right {1}, asked back acceptably {2}, wrongly {3}, misread {4}; no orders, yet driven: {5}"),
-        Figure("another hand: a third, of conditions, things to avoid, things to count", "",
-               r"third writer.*right (\d+ %), asked back acceptably (\d+ %), asked back wrongly (\d+ %), "
-               r"misread (\d+ %).*driven (.+)",
-               "right {1}, asked back acceptably {2}, wrongly {3}, misread {4}; no orders, yet driven: {5}"),
+        Figure("another hand: a tenth writer, not learnt from", "",
+               r"not learnt from: commands (right .*? of 150); questions (right .*?) of 70; (.+)",
+               "{1}; 70 questions {2}; {3}"),
+        Figure("another hand: a third, with harder kinds", "",
+               r"third writer.*2026: right (\d+ %).*weights that ship.*: right (\d+ %), asked back acceptably (\d+ %), "
+               r"asked back wrongly (\d+ %), misread (\d+ %).*driven (.+)",
+               "at first use right {1}; now {2}, asked back acceptably {3}, wrongly {4}, misread {5}; "
+               "no orders, yet driven: {6}"),
         Figure("another hand: six more writers, 1,097 commands in 44 voices", "",
                r"six writers.*: right (\S+ %), asked back (\S+ %), misread (\S+ %); (.*)",
                "right {1}, asked back {2}, misread {3}; {4}"))),
