@@ -46,8 +46,14 @@ def test_the_length_and_sign_of_a_quaternion_do_not_matter(a: np.ndarray, scale:
 
 
 def test_a_quaternion_of_length_zero_is_no_rotation():
-    with pytest.raises(ValueError, match="zero norm"):
+    with pytest.raises(ValueError, match="norm 0"):
         poses.from_quaternion(np.zeros((1, 3)), np.zeros((1, 4)))
+
+
+def test_a_quaternion_of_nan_makes_that_pose_nan_and_none_make_none():
+    made = poses.from_quaternion(np.zeros((2, 3)), np.array([[0.0, 0.0, np.nan, 1.0], [0.0, 0.0, 0.0, 1.0]]))
+    assert np.isnan(made[0, :3, :3]).any() and np.array_equal(made[1], np.eye(4))
+    assert poses.from_quaternion(np.zeros((0, 3)), np.zeros((0, 4))).shape == (0, 4, 4)
 
 
 def test_quaternions_are_x_y_z_w():

@@ -104,10 +104,17 @@ def from_quaternion(
     translation: Float[np.ndarray, "*n 3"], quaternion_xyzw: Float[np.ndarray, "*n 4"]
 ) -> Float[np.ndarray, "*n 4 4"]:
     """Build poses from translations (metres) and quaternions x y z w of any positive norm (0: ``ValueError``)."""
-    from scipy.spatial.transform import Rotation
-
-    rotation = Rotation.from_quat(quaternion_xyzw.reshape(-1, 4)).as_matrix()
-    return from_rotation(rotation.reshape(*quaternion_xyzw.shape[:-1], 3, 3), translation)
+    # Not SciPy's, which refuses NaN and, in 1.14, that there is none.
+    norm = np.linalg.norm(quaternion_xyzw, axis=-1, keepdims=True)
+    if np.any(norm == 0.0):
+        raise ValueError("a quaternion has norm 0")
+    x, y, z, w = np.moveaxis(quaternion_xyzw / norm, -1, 0)
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+    )
+    return from_rotation(np.stack([np.stack(row, axis=-1) for row in rows], axis=-2), translation)
 
 
 def to_quaternion(b_from_a: Float[np.ndarray, "*n 4 4"]) -> Float[np.ndarray, "*n 4"]:
