@@ -1,5 +1,6 @@
 """Networks that onnxruntime runs, and what they said of pictures, remembered by its content."""
 
+import contextlib
 import hashlib
 import threading
 from collections import OrderedDict
@@ -22,11 +23,15 @@ def open_network(graph: bytes | str, most_threads: int = 1) -> Any:
     options.log_severity_level = 3
     # Threads that wait for the next frame leave the cores to decoding and fusion: a build takes 0.6 of the time.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    _share_arena()
+    with _SHARING:
+        _share_arena()
     options.add_session_config_entry("session.use_env_allocators", "1")
     network = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
     release_memory()  # the file and its nodes before they were joined: 77 MB of a network of 16 MB
     return network
+
+
+_SHARING = threading.Lock()  # `cache` has none
 
 
 @cache
@@ -35,7 +40,8 @@ def _share_arena() -> None:
     import onnxruntime as ort
 
     processor = ort.OrtMemoryInfo("Cpu", ort.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, ort.OrtMemType.DEFAULT)
-    ort.create_and_register_allocator(processor, ort.OrtArenaCfg({"arena_extend_strategy": 1}))
+    with contextlib.suppress(RuntimeError):  # a program registered one before
+        ort.create_and_register_allocator(processor, ort.OrtArenaCfg({"arena_extend_strategy": 1}))
 
 
 _MOST = 4096
