@@ -150,6 +150,12 @@ def test_an_answer_says_that_a_person_named_it() -> None:
     assert m.ask(object="chair").notes == ()
 
 
+def test_a_count_that_is_not_reached_says_who_corrected_what_there_is() -> None:
+    m = asked(STORED, edits=[STOOL])
+    answer = m.ask("are there three stools")
+    assert not answer.found and answer.notes == ("The stool was named by a person on 2026-11-26.",)
+
+
 def test_things_are_merged_and_split() -> None:
     one = asked(STORED, edits=[PAIR]).things(["chair"], 0.2)
     assert [sorted(each.rows.tolist()) for each in one] == [sorted([*A.rows.tolist(), *B.rows.tolist()])]

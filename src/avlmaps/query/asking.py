@@ -195,9 +195,11 @@ def _nearest_first(avlmap: "AVLMap", answer: Answer, place: Float[np.ndarray, " 
 
 
 def _with_corrections(avlmap: "AVLMap", answer: Answer) -> Answer:
-    # Says who corrected what the answer is about.
+    # Says who corrected what the answer is about: its goals, or those that are likely where it is not found as a whole
+    # ("are there three chairs" where there is one, "a and b" where b is missing).
     listed = [goal.name for goal in answer.goals if goal.name]
-    places = [goal.position for goal in answer.goals] if answer.found or listed else []
+    least = 0.0 if answer.found or listed else max(avlmap.settings.found_at, 1e-3)
+    places = [goal.position for goal in answer.goals if goal.probability >= least]
     named = {kind: [one.part.query for one in answer.parts if one.part.modality is kind] for kind in Modality}
     said = avlmap.edited.said_of(places, named[Modality.OBJECT], [*named[Modality.AREA], *listed])
     return replace(answer, notes=(*answer.notes, *said))
@@ -424,10 +426,9 @@ def _related(sentence: str, question: Question) -> Question:
 
 
 def _answered(avlmap: "AVLMap", question: Question, asked: Asked, *, counted: bool = False) -> Answer:
-    # Of what is counted in an area, the things that lists have in it count.
-    camera, question = asked.camera_of(question), _related(asked.sentence, question)
     camera, question = asked.camera_of(question), _related(asked.sentence, question)
     heats = [avlmap.heat(replace(part, relation=""), camera, asked.attachments) for part in question.parts]
+    # Of what is counted in an area, the things that lists have in it count.
     heat, factors = _fused(avlmap, question, heats, counted=counted)
     several, found = tuple(heat.goals(max(asked.top, _MOST_ALIKE))), heat.found
     goals, equal = several[: asked.top], alike(several, heat.found_at)
