@@ -219,6 +219,10 @@ def test_a_dry_run_says_of_the_map_what_the_drive_says(run, built: Path, in_room
     assert dry["notes"] == [one for one in told if "could stop" not in one and one != "the program moved nothing"]
 
 
+def test_a_dry_run_does_not_say_that_it_moved_nothing(answer, built: Path) -> None:
+    assert answer("go", built, "wait for 2 seconds", "--dry-run")["notes"] == []
+
+
 def test_things_that_fit_equally_are_asked_about(run, built: Path, in_room: None) -> None:
     status, out, _ = run("go", built, "go to the red thing", "--scene", "room", "--json")
     said = json.loads(out)

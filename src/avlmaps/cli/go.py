@@ -153,7 +153,7 @@ def _idle(verb: "Go", program: str) -> list[str]:
 def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None") -> dict[str, Any]:
     """Return the answer for a command that is read and not obeyed, with what a drive would report of its map."""
     from avlmaps.core.motion import GroundPose
-    from avlmaps.navigate.instruct import InstantDriver, Outcome, rehearse
+    from avlmaps.navigate.instruct import MOVED_NOTHING, InstantDriver, Outcome, rehearse
 
     told = Outcome(verb.sentence, (translation.program,), translation.notes, (), (), None, None, 0.0)
     if avlmap is not None:
@@ -164,7 +164,8 @@ def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None")
         told = replace(told, error=None, error_type=None)
     missing = None if told.error is None else error_answer(kind_named(told.error_type or ""), told.error)
     notes = [*told.notes, *([] if told.error is None else [told.error])]
-    return {"plan": translation.plan, **told.to_json(), "notes": list(dict.fromkeys(notes)), "missing": missing}
+    notes = [note for note in dict.fromkeys(notes) if note != MOVED_NOTHING]  # as it should be
+    return {"plan": translation.plan, **told.to_json(), "notes": notes, "missing": missing}
 
 
 def drive(

@@ -29,6 +29,7 @@ from avlmaps.query.sound_sources import no_sources
 
 _MOST_PROGRAMS = 6
 _NEAR_M = 1.0  # within this distance a goal counts as reached where the paper judges
+MOVED_NOTHING = "the program moved nothing"
 _ABSENT = (GoalNotFoundError.__name__, QueryError.__name__)
 NO_FILES = Readable((), ())
 """A program may load no file."""
@@ -235,7 +236,7 @@ class _Run:
     def judge(self) -> None:
         """Note what a person might take for more than it is."""
         if self.last is not None and self.last.error is None and not self.robot.moves:
-            self.note("the program moved nothing")
+            self.note(MOVED_NOTHING)
         for move in self.robot.moves:
             if move.reached and move.distance_m is not None and move.distance_m > _NEAR_M:
                 what = move.name or move.skill
