@@ -21,9 +21,10 @@ _END: Any = object()
 def run_ahead(items: Iterable[T], depth: int = 2) -> Generator[T]:
     """Yield the items in their order, made by a background thread that is at most ``depth`` items ahead.
 
-    An exception of the producer comes out here, where its item would have come. When the consumer stops early (an
-    exception, ``close``), the thread stops after the item at hand and is waited for; a generator that makes the items
-    is closed in that thread, so that producers may run ahead of one another in a row.
+    An exception of the producer comes out here, where its item would have come. A consumer that stops early has to
+    close this generator (``contextlib.closing``): the thread stops after the item at hand and is waited for, and a
+    generator that makes the items is closed in it, so that producers may run ahead of one another in a row; what that
+    raises comes out here too.
     """
     source = iter(items)
     with ThreadPoolExecutor(1, "avlmaps-ahead") as thread:
@@ -36,8 +37,12 @@ def run_ahead(items: Iterable[T], depth: int = 2) -> Generator[T]:
             for later in ahead:
                 later.cancel()
             if isinstance(source, Generator):
-                with contextlib.suppress(RuntimeError):  # Python ends, and takes no more work
-                    thread.submit(source.close)
+                try:
+                    closed = thread.submit(source.close)
+                except RuntimeError:  # Python ends, and takes no more work
+                    closed = None
+                if closed is not None:
+                    closed.result()
 
 
 def usable_cores() -> int:

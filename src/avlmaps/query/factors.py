@@ -200,8 +200,12 @@ class NearAnchors(Factor):
     flat: bool = field(default=True, init=False)
 
     def __post_init__(self) -> None:
+        if len(self.anchors) != len(self.scores) or len(self.anchors) != len(self.instance):
+            raise ValueError(f"{len(self.anchors)} anchors, {len(self.scores)} scores, {len(self.instance)} instances")
         if len(self.scores) and not (np.min(self.scores) >= 0.0 and np.max(self.scores) <= 1.0):
             raise ValueError("an anchor's score is outside [0, 1] or NaN")
+        if not 0.0 <= self.certainty <= 1.0:
+            raise ValueError(f"certainty is {self.certainty}; it must lie in [0, 1]")
 
     @cached_property
     def confidence(self) -> Float[np.ndarray, " i"]:  # pyright: ignore[reportIncompatibleVariableOverride]
