@@ -45,27 +45,46 @@ class LiveSettings:
 
 @dataclass(frozen=True, slots=True)
 class LiveStatus:
-    """How a live map fares at a moment."""
+    """How a live map fares at a moment.
 
-    frames_in: int  # that came, refused ones left out
-    fused: int  # frames that are in the map's sums
-    encoded: int  # of these, how many were given to the encoder; the others added their surface and colours
-    # frames that are not, by reason: ``late`` (others were waiting), ``still`` (the camera did not move), ``known`` (no
-    # new surface), ``wrong`` (an encoder failed on it)
+    Attributes:
+        frames_in: frames that came, refused ones left out.
+        fused: frames that are in the map's sums.
+        encoded: of these, how many were given to the encoder; the others added their surface and colours.
+        dropped: frames that are not, by reason: ``late`` (others were waiting), ``still`` (the camera did not move),
+            ``known`` (no new surface), ``wrong`` (an encoder failed on it).
+        refused: frames and pieces of sound that were no such thing, or out of order.
+        waiting: frames that wait.
+        frame_ms_p50: milliseconds from a frame's arrival until it is in the sums or dropped by a gate, median.
+        frame_ms_p95: 95 % are quicker.
+        voxels: of the last snapshot.
+        keyframes: of the last snapshot.
+        sounds: of the last snapshot.
+        snapshot_age_s: since what the last snapshot holds came; NaN without one.
+        saved_age_s: since what the last save holds came; NaN without one. It grows also while nothing new comes.
+        unsaved_s: since the oldest frame or sound came that a kill would lose now; 0 where there is none.
+        memory_mb: resident memory of the process; 0 where the system does not say.
+        sound_gaps: gaps in the sound, which are silent.
+        doubts: one sentence for each thing that is not as it should be.
+    """
+
+    frames_in: int
+    fused: int
+    encoded: int
     dropped: dict[str, int]
-    refused: int  # frames and pieces of sound that were no such thing, or out of order
-    waiting: int  # frames that wait
-    frame_ms_p50: float  # median from a frame's arrival until it is in the sums or dropped by a gate
-    frame_ms_p95: float  # 95 % are quicker
-    voxels: int  # of the last snapshot, as keyframes and sounds
+    refused: int
+    waiting: int
+    frame_ms_p50: float
+    frame_ms_p95: float
+    voxels: int
     keyframes: int
     sounds: int
-    snapshot_age_s: float  # since what the last snapshot holds came; NaN without one
-    saved_age_s: float  # since what the last save holds came; NaN without one; grows while nothing new comes
-    unsaved_s: float  # since the oldest frame or sound came that a kill would lose now; 0 where there is none
-    memory_mb: float  # resident memory of the process; 0 where the system does not say
-    sound_gaps: int  # which are silent
-    doubts: tuple[str, ...]  # one sentence for each thing that is not as it should be
+    snapshot_age_s: float
+    saved_age_s: float
+    unsaved_s: float
+    memory_mb: float
+    sound_gaps: int
+    doubts: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as JSON has it; what is not known is None."""

@@ -91,7 +91,7 @@ class Answer:
         return f"Answer({said}: {self.text!r})"
 
     def plot(self, path: str | Path | None = None, *, ax: "Axes | None" = None) -> "Path | Figure":
-        """Draw the answer's heat and goals, as ``Heatmap.plot`` does. ``QueryError``: a list has no heat."""
+        """Draw the answer's heat and goals, as ``Heatmap.plot``. ``QueryError``: there is no heat, or no such path."""
         if self.heat is None:
             raise QueryError("The answer comes from a list of the map, and has no heat to draw; plot the map instead.")
         top = max(len(self.goals), 1)

@@ -59,6 +59,8 @@ _INSIDE = ("as_edited_now", "forget_edits", "things_to_edit", "unedited_things",
 class AVLMap:
     """A map that can be queried. Heatmaps of one map multiply: ``m.object("chair", primary=True) * m.sound("dog")``.
 
+    ``primary``: whether a part (of a sound or a picture, its place) is what is sought rather than a mark near that; its
+    heat reaches 0.5 m, that of a mark 5 m.
     ``QueryError``: a word is empty or not understood. ``BackendError``: the map was made without the model needed.
     """
 
@@ -218,7 +220,10 @@ class AVLMap:
 
     @checked(QueryError)
     def sound_clip(self, clip: str | Path | Sound, primary: bool = False, *, at: HeardAt | None = None) -> Heatmap:
-        """Return the heat of sounds like a clip; see ``sound``. ``QueryError``: it is missing, unreadable or silent."""
+        """Return the heat of sounds like a clip; see ``sound``.
+
+        ``QueryError``: it is missing, unreadable or silent, or the map does not know where its sounds came from.
+        """
         if not isinstance(clip, str | Path | Sound):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise QueryError(
                 f"A clip is the path of a file or an avlmaps.Sound(samples, rate_hz), not {type(clip).__name__}."
@@ -446,7 +451,11 @@ class AVLMap:
     def contents(
         self, least_confidence: float = 0.5, names: Sequence[str] | None = None, structure: bool = False
     ) -> Contents:
-        """Return the things, sounds and rooms of the map; none of a kind that the map has no model for."""
+        """Return the things, sounds and rooms of the map; none of a kind that the map has no model for.
+
+        Things below ``least_confidence``, in [0, 1], are left out. ``QueryError``: it lies outside, or a name of
+        ``names`` is not known.
+        """
         from avlmaps.query.sound_sources import with_heard
 
         sees = self.has(Kind.PIXELS)
@@ -460,7 +469,7 @@ class AVLMap:
 
     @checked(QueryError)
     def sources(self, names: Sequence[str] = (), *, prior: bool = True, least: float = 0.0) -> "list[SoundSource]":
-        """Return the places that sounds came from; see ``sound_sources.list_sources``."""
+        """Return where sounds came from; see ``sound_sources.list_sources``. ``QueryError``: the map does not know."""
         from avlmaps.query.sound_sources import list_sources
 
         return list_sources(self, names, prior, least=least)
@@ -554,7 +563,10 @@ class AVLMap:
 
     @cached_property
     def room_field(self) -> "RoomField | None":
-        """How likely each place is each kind of room that the encoder knows or a person named; None without votes."""
+        """How likely each place is each kind of room that the encoder knows or a person named; None without votes.
+
+        ``BackendError``: there is no view encoder. ``MapError``: the map was built with another one.
+        """
         seen = self._rooms.field
         return None if seen is None else self._settled(seen)
 
@@ -578,7 +590,10 @@ class AVLMap:
     # Pictures and other libraries.
 
     def plot(self, path: str | Path | None = None, *, names: bool = True) -> "Path | Figure":
-        """Draw the map from above with its walk and sounds, and by default the names of its things and rooms."""
+        """Draw the map from above with its walk and sounds, and by default the names of its things and rooms.
+
+        ``QueryError``: the picture cannot be written to the path.
+        """
         from avlmaps.query.plots import draw_map, save
 
         things = self.things() if names and self.has(Kind.PIXELS) else ()

@@ -308,7 +308,10 @@ class Heatmap(Heat):
     @overload
     def plot(self, path: None = None, *, top: int = 3, ax: "Axes | None" = None) -> "Figure": ...
     def plot(self, path: str | Path | None = None, *, top: int = 3, ax: "Axes | None" = None) -> "Path | Figure":
-        """Draw the map from above, each factor's heat and the product, with the goals numbered, and return that."""
+        """Draw the map from above, each factor's heat and the product, with the goals numbered, and return the figure.
+
+        With a path the picture is written there, and the path returned. ``QueryError``: it cannot be.
+        """
         from avlmaps.query.plots import draw_heat, draw_heat_into, save
 
         if ax is not None:

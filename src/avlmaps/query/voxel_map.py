@@ -54,7 +54,8 @@ class VoxelMap:
 
         ``encoders``: the models that perceive; those of the profile ``embedded`` if None; ``Encoders()`` has none.
         ``up_in_world``: the direction that is up in the world of the poses; None finds it in the frames. ``settings``:
-        everything else about the map, as of ``build_map``. ``MapError``: the voxel size or up is none.
+        everything else about the map, as of ``build_map``; its voxel size does not count. ``MapError``: the voxel size
+        or up is none. ``BackendError``: there is no such profile.
         """
         edge_m = as_number(voxel_size_m)
         if edge_m is None:
@@ -172,7 +173,10 @@ class VoxelMap:
         return self.map.voxel_index
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> AVLMap:
-        """Write the map into a folder and open it; frames can be added on. ``MapError``: it cannot be written."""
+        """Write the map into a folder and open it; frames can be added on.
+
+        ``MapError``: it cannot be written, or the folder is something else, or a map and ``overwrite`` is not set.
+        """
         with self._lock:
             place = lasting_path(path)
             require_place(place, overwrite)

@@ -37,11 +37,13 @@ class RecordingWriter:
 
     Attributes:
         path: the folder to make; it must not exist, be empty, or hold an unfinished recording.
+        up_in_world: unit vector against gravity, None where it is not known.
         colour: ``png`` preserves every bit, ``jpg`` takes a tenth of the space.
         depth_units_per_m: units of the depth files in a metre; 1000 says millimetres.
         origin: what makes the recording, for its description.
         begins_s: what the clock said at time 0, seconds since 1970; 0 where nobody knows.
         trajectory: the poses at their own rate, from which a reader interpolates the frames'.
+        base_height: of the robot's base under the camera, metres; None where it is not known.
     """
 
     path: Path
@@ -127,6 +129,7 @@ class RecordingWriter:
     def set_audio(self, audio: Any, start_s: float = 0.0, microphones: Microphones | None = None) -> None:
         """Give the recording its sound track; an ``AudioTrack`` says its start and its microphones itself.
 
+        ``start_s``: the recording's time at which the track begins, seconds.
         A FLAC, WAV or OGG file is copied as it is; samples, and the sound of a video, are written as FLAC.
         RecordingError says that a file cannot be copied, AudioError that the track cannot be read, or is none.
         """
