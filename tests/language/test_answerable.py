@@ -106,9 +106,7 @@ def test_what_a_thing_did_is_refused_where_it_is_no_sound(thing: str, room: str,
     assert is_refused(f"did the {thing} in the {room} {did}")
 
 
-@pytest.mark.parametrize(
-    "heard", ["the dog bark", "a glass break", "the alarm go off", "the toilet flush"]
-)
+@pytest.mark.parametrize("heard", ["the dog bark", "a glass break", "the alarm go off", "the toilet flush"])
 def test_what_sounded_is_asked_for(heard: str) -> None:
     (target,) = read_question(f"did {heard}").inquiry.of
     assert target.kind == "sound"
