@@ -58,17 +58,11 @@ def injections(seed: int) -> Iterator[str]:
 
 @dataclass
 class Report:
-    """The counts of a campaign.
+    """The counts of a campaign."""
 
-    Attributes:
-        sent: strings by the way they came in.
-        statuses: answers by their status.
-        faults: what must not be.
-    """
-
-    sent: Counter[str] = field(default_factory=Counter)
-    statuses: Counter[str] = field(default_factory=Counter)
-    faults: list[str] = field(default_factory=list)
+    sent: Counter[str] = field(default_factory=Counter)  # strings by the way they came in
+    statuses: Counter[str] = field(default_factory=Counter)  # answers by their status
+    faults: list[str] = field(default_factory=list)  # what must not be
 
 
 def _json_rpc(name: str, arguments: dict[str, Any]) -> dict[str, Any]:
@@ -82,14 +76,7 @@ class Campaign:
     """Sends strings by every way in which foreign words reach a server."""
 
     def __init__(self, client: Any, map_name: str, photo: bytes, rename: Callable[[str], None]) -> None:
-        """Take a server.
-
-        Args:
-            client: of the server, with driving on.
-            map_name: of its map.
-            photo: a picture.
-            rename: gives the map's things, sounds and rooms a name.
-        """
+        """Take a server with driving on; ``rename`` gives its map's things, sounds and rooms a name."""
         self._client, self._map, self._photo, self._rename = client, map_name, photo, rename
         self.ways: dict[str, Callable[[str], Any]] = {
             "question": self._question, "part": self._part, "photo name": self._photo_name,

@@ -17,12 +17,7 @@ from avlmaps.serve.settings import ServeSettings
 
 @dataclass(frozen=True, slots=True)
 class Served:
-    """A page.
-
-    Attributes:
-        service: its maps.
-        url: where a browser finds it.
-    """
+    """A page, and where a browser finds it."""
 
     service: Service
     url: str

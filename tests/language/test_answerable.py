@@ -18,10 +18,9 @@ ROWS = read_list(LISTS / "kinds.jsonl")
 KINDS = sorted({str(row["kind"]) for row in ROWS})
 QUICK = {"or and not", "purposes", "stop", "direction", "paths", "third person", "parts", "languages", "left out"}
 # Of each kind, at most so many are asked back or harmless, and so many misread; 0 and 0 of the others.
-SHORT = {
-    "roboticist": (5, 1), "other voices": (1, 1), "states": (0, 1), "parts": (2, 0), "open names": (1, 0),
-    "order in time": (1, 0), "dictation": (1, 0), "who and sounds": (1, 1), "possessives and pointing": (1, 0),
-}  # fmt: skip
+SHORT = {"roboticist": (5, 1), "other voices": (1, 1), "states": (0, 1), "parts": (2, 0), "open names": (1, 0),
+         "order in time": (1, 0), "dictation": (1, 0), "who and sounds": (1, 1), "possessives and pointing": (1, 0),
+         }  # fmt: skip
 THINGS = st.sampled_from(["oven", "lamp", "washing machine", "heater", "tv", "printer"])
 ROOMS = st.sampled_from(["kitchen", "bathroom", "office", "hallway"])
 
@@ -128,9 +127,11 @@ def test_alternatives_may_have_prepositions_of_their_own(one: str, room: str) ->
     assert found == (f"is there a chair by the {one}", f"is there a chair in the {room}")
 
 
-@given(st.sampled_from(["milk", "water", "coffee", "space", "floor space"]), ROOMS)
+@given(st.sampled_from(["milk", "water", "coffee"]), ROOMS)
 def test_an_amount_is_no_number_of_things(stuff: str, room: str) -> None:
-    assert is_refused(f"how much {stuff} is there in the {room}?")
+    with pytest.raises(QueryError, match="how much"):
+        read_question(f"how much {stuff} is there in the {room}?")
+    assert is_refused(f"how much space is there in the {room}?")
     (chairs,) = read_question(f"how much chairs are there in the {room}?").inquiry.of
     assert chairs.name == "chairs"
 

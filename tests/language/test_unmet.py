@@ -5,10 +5,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import QueryError
+from avlmaps.language.claims import unmet
 from avlmaps.language.commands import Command, read_command
 from avlmaps.language.intents import (
     Clarify,
     Go,
+    If,
     Move,
     Pick,
     RefusalReason,
@@ -19,6 +21,7 @@ from avlmaps.language.intents import (
     Turn,
     Wait,
 )  # fmt: skip
+from avlmaps.language.lexer import tokenise
 from avlmaps.language.questions import read_question
 from avlmaps.language.sentence import Attachments
 from avlmaps.language.translator import command_to_program
@@ -266,3 +269,12 @@ def test_sixteen_points_of_the_compass_are_read(verb: str) -> None:
 def test_a_question_says_that_it_comes_from_no_place(question: str) -> None:
     assert any("No position is known" in note for note in read_question(question).notes)
     assert not read_question("the lamp nearest to the sofa").notes
+
+
+def test_who_comes_and_goes_is_no_condition_inside_another() -> None:
+    sofa, man = Target(TargetKind.OBJECT, "sofa"), Target(TargetKind.OBJECT, "man")
+    nested = If(sofa, (Go(sofa),), (If(man, (Go(man),)),))
+    said = tokenise("if there is a sofa go to it, else if there is a man go to him")
+    assert (
+        unmet(said, (nested,), frozenset()) is not None and unmet(said, (If(sofa, (Go(sofa),)),), frozenset()) is None
+    )

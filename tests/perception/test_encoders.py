@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import avlmaps
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
-from avlmaps.perception.encoders import MODULES, Encoders, encoders_of, profile
+from avlmaps.perception.encoders import MODULES, Encoders, encoders_of, profile, profiles
 from avlmaps.perception.protocols import PixelEncoder
 from helpers.walked_room import write_walk
 
@@ -34,7 +34,7 @@ class Words:
         return rows
 
 
-@pytest.mark.parametrize("name", ["colours", "light", "embedded", "synthetic", "trained", "foundation", "paper"])
+@pytest.mark.parametrize("name", [one.name for one in profiles() if one.name != "fake"])
 def test_a_profile_by_name_has_its_encoders_and_loads_none(name: str) -> None:
     used = Encoders.named(name)
     assert used.name == name and used == encoders_of(profile(name))

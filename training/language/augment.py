@@ -2,7 +2,7 @@
 
 import random
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from typing import Any
@@ -26,7 +26,9 @@ from avlmaps.language.intents import (
     Target,
     TargetKind,
     Turn,
+    every,
     on_targets,
+    within,
 )  # fmt: skip
 
 _BEFORE = (
@@ -204,20 +206,15 @@ def _renamed(kind: TargetKind, name: str, new: str, target: Target) -> Target:
     return replace(target, name=new) if (target.kind, target.name) == (kind, name) else target
 
 
-def _each(meaning: Any, change: Any) -> Any:
-    if not isinstance(meaning, tuple):
-        return meaning
-    held = [{name: getattr(one, name) for name in ("body", "otherwise") if hasattr(one, name)} for one in meaning]
-    return tuple(
-        replace(one, **{name: _each(steps, change) for name, steps in has.items()}) if has else change(one)
-        for one, has in zip(meaning, held, strict=True)
-    )
+def _each(meaning: Any, change: Callable[[Intent], Intent]) -> Any:
+    def changed(one: Intent) -> Intent:
+        return change(within(one, changed))
+
+    return tuple(map(changed, meaning)) if isinstance(meaning, tuple) else meaning
 
 
 def _flat(meaning: Any) -> list[Intent]:
-    found: list[Intent] = []
-    _each(meaning, lambda one: found.append(one) or one)
-    return found
+    return list(every(meaning)) if isinstance(meaning, tuple) else []
 
 
 def mirrored(example: Example) -> Example:

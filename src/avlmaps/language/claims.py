@@ -48,6 +48,12 @@ def claimed_words(name: str) -> frozenset[str]:
     return word_list("claims", name)
 
 
+def is_alive(name: str) -> bool:
+    """Return whether a name is of what comes and goes: a person, an animal, a vehicle."""
+    alive = claimed_words("persons") | claimed_words("living") | claimed_words("passing")
+    return not alive.isdisjoint(name.split()[-1:])
+
+
 @cache
 def reasons() -> Mapping[act.RefusalReason, frozenset[str]]:
     """Return for each reason of refusal the words of which one is said where it is the true one."""
@@ -181,11 +187,7 @@ def in_direction(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tupl
     left = iter(ways)
 
     def turned(intent: act.Intent) -> act.Intent:
-        if isinstance(intent, act.Repeat):
-            return replace(intent, body=tuple(map(turned, intent.body)))
-        if isinstance(intent, act.If):
-            then, otherwise = (tuple(map(turned, steps)) for steps in (intent.body, intent.otherwise))
-            return replace(intent, body=then, otherwise=otherwise)
+        intent = act.within(intent, turned)
         return replace(intent, way=next(left)) if isinstance(intent, act.Circle) else intent
 
     return tuple(map(turned, intents))
@@ -226,10 +228,9 @@ def _facts(intents: Sequence[act.Intent], targets: Sequence[act.Target]) -> Iter
     yield from _facts_of_targets(targets)
     if len({one for intent in intents for one in act.targets_of(intent) if one.kind is act.TargetKind.OBJECT}) < 2:
         yield "one thing"
-    for intent in intents:
+    for intent in act.every(intents):
         if isinstance(intent, act.If):
-            alive = claimed_words("persons") | claimed_words("living") | claimed_words("passing")
-            yield from ("if", "if alive") if intent.of.name.split()[-1:] in [[word] for word in alive] else ("if",)
+            yield from ("if", "if alive") if is_alive(intent.of.name) else ("if",)
     steps = act.steps_of(intents)
     if len(steps) == 1:
         yield "one step"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from avlmaps.core.errors import LanguageError, QueryError
 from avlmaps.language import intents as act
-from avlmaps.language.claims import claimed_words, forbidden
+from avlmaps.language.claims import claimed_words, forbidden, is_alive
 from avlmaps.language.gate import NoOrder, no_order
 from avlmaps.language.learned.decision import EXAMPLE, NameResolver, Weighed, decided, refusal_of, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
@@ -112,12 +112,11 @@ def _thing(what: str, given: Attachments | None) -> act.Target | None:
         inquiry = read_question(f"is there a {what}", given).inquiry
     except QueryError:
         return None
-    alive = claimed_words("persons") | claimed_words("living") | claimed_words("passing")
     if inquiry.ask.of_map:
         return None
     thing = inquiry.of[0]
     is_thing = thing.kind in (act.TargetKind.OBJECT, act.TargetKind.AREA) and what.startswith(thing.name)
-    alone = inquiry.ask is act.Ask.EXISTS and len(inquiry.of) == 1 and thing.name.split()[-1] not in alive
+    alone = inquiry.ask is act.Ask.EXISTS and len(inquiry.of) == 1 and not is_alive(thing.name)
     return thing if is_thing and alone else None
 
 
@@ -204,6 +203,7 @@ def _picked(intents: Sequence[act.Intent], said: str) -> tuple[act.Intent, ...]:
         return replace(target, pick=act.Pick.NEAREST)
 
     def of_any(intent: act.Intent) -> act.Intent:  # "if there is a chair": whichever
+        intent = act.within(intent, of_any)
         return replace(intent, of=replace(intent.of, pick=act.Pick.ANY)) if isinstance(intent, act.If) else intent
 
     return tuple(of_any(act.on_targets(intent, nearest)) for intent in intents)

@@ -305,6 +305,12 @@ def blocks_of(intent: Intent) -> tuple[Intent, ...]:
     return (*getattr(intent, "body", ()), *getattr(intent, "otherwise", ()))
 
 
+def within(intent: Intent, change: "Callable[[Intent], Intent]") -> Intent:
+    """Return an intent with each of those right inside it changed."""
+    blocks = {name: getattr(intent, name) for name in ("body", "otherwise") if hasattr(intent, name)}
+    return replace(intent, **{name: tuple(map(change, block)) for name, block in blocks.items()})
+
+
 def every(intents: Sequence[Intent]) -> Iterator[Intent]:
     """Yield intents, and behind each those inside it."""
     for intent in intents:

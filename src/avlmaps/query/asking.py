@@ -294,9 +294,8 @@ def _read_list(asking: _Asking) -> "ListQuestion | None":
     by_rows = read_list(asked.sentence, own)
     if by_rows is not None or not asked.sentence.strip():
         return by_rows
-    at = None if asked.at_by_words else "robot"
     with suppress(QueryError):  # `_read` says why a sentence is not understood
-        return list_question(_read_words(asked.sentence, asked.image, asked.clip, own, at).inquiry)
+        return list_question(_reading(asked, asked.sentence, own).inquiry)
     return None
 
 
@@ -387,12 +386,15 @@ def _questions(asked: Asked, own: "tuple[OwnName, ...]") -> tuple[tuple[Question
     from avlmaps.language.intents import Ask
     from avlmaps.language.list_questions import said_alternatives
 
-    at = None if asked.at_by_words else "robot"
     said = said_alternatives(asked.sentence) or (asked.sentence,)
-    read = [_read_words(words, asked.image, asked.clip, own, at) for words in said]
+    read = [_reading(asked, words, own) for words in said]
     questions = tuple(dict.fromkeys(question for one in read for question in one.questions))
     notes = tuple(dict.fromkeys(note for one in read for note in one.notes))
     return questions, notes, read[0].inquiry.ask is Ask.HOW_MANY
+
+
+def _reading(asked: Asked, words: str, own: "tuple[OwnName, ...]") -> "AskedSentence":
+    return _read_words(words, asked.image, asked.clip, own, None if asked.at_by_words else "robot")
 
 
 @lru_cache(maxsize=512)

@@ -23,11 +23,7 @@ _WORD = re.compile(r"[a-z]+|\d+|[^\w\s]")
 
 
 class English:
-    """The layers, and the limit of the gate.
-
-    Attributes:
-        limit: from this probability of being no order on, a person is asked.
-    """
+    """The layers, and the gate's ``limit``: from this probability of being no order on, a person is asked."""
 
     def __init__(self) -> None:
         folder = files("avlmaps.language.learned").joinpath("weights")

@@ -230,8 +230,10 @@ class Pointable:
 
 Reading = Generator[Open, Symbol, T]  # says what may follow, takes a symbol, and returns what was read
 _STARTS = Open(frozenset(STARTS))
-_BODY = Open(frozenset(STARTS) - {"repeat", "if"})  # what is repeated holds no others
-_STEPS = Open(frozenset(STARTS) - {"repeat"} | {"close"})
+_CLOSE = Open(frozenset({"close"}))
+_INSIDE = {  # what is repeated holds nothing that holds others
+    Slot.BODY: Open(frozenset(STARTS) - {"repeat", "if"}), Slot.STEPS: Open(frozenset(STARTS) - {"repeat"}),
+}  # fmt: skip
 _END = Open(frozenset({"end"}))
 
 
@@ -305,9 +307,7 @@ class Grammar:
             for each in of if isinstance(of, tuple) else (of,):
                 if isinstance(each, Amount | Slot):
                     del left[0]
-                    then = self._begin(left, after)
-                    some = Open(then.symbols - {"close"}, then.tokens) if left else then  # one of two blocks has steps
-                    parts.append((yield from self._field(each, then, some)))
+                    parts.append((yield from self._field(each, self._begin(left, after), is_last=not left)))
                 else:
                     parts.append(each)
             values[name] = tuple(parts) if isinstance(of, tuple) else parts[0]
@@ -323,18 +323,17 @@ class Grammar:
             return found | self._begin(slots[1:], after) if slot.optional else found
         if slot is Slot.TARGET:
             return self.kinds
-        return _STEPS if slot is Slot.STEPS else _BODY
+        return _INSIDE[slot] | (_CLOSE if slot is Slot.STEPS else Open())
 
-    def _field(self, of: Slot | Amount, after: Open, after_nothing: Open) -> Reading[Any]:
+    def _field(self, of: Slot | Amount, after: Open, *, is_last: bool) -> Reading[Any]:
         if of is Slot.TARGET:
             return (yield from self._target(after))
         if isinstance(of, Slot):
             body: list[Intent] = []
             while self.next != "close":
-                body.append(
-                    (yield from self._intent(_STEPS if of is Slot.STEPS else _BODY | Open(frozenset({"close"}))))
-                )
-            yield from self._see(after if body else after_nothing)
+                body.append((yield from self._intent(_INSIDE[of] | _CLOSE)))
+            # of two blocks one has steps
+            yield from self._see(after if body or is_last else Open(after.symbols - {"close"}, after.tokens))
             return tuple(body)
         assert isinstance(of, Amount)
         symbol, tokens = self.next, self.can.tokens
