@@ -110,10 +110,14 @@ def test_maps_of_one_network_are_not_those_of_the_pair(alone: EmbeddedPixels):
     assert EmbeddedPixels().card.checksum != alone.card.checksum
 
 
-def test_rooms_are_mixed_by_the_same_share(frame: Frame):
-    first, second = load_network().see(frame), load_network(SYNTHETIC_WEIGHTS).see(frame)
+@pytest.mark.parametrize("multiple", [32, 64], ids=["inputs of the first", "inputs of its own"])
+def test_rooms_are_mixed_by_the_same_share(frame: Frame, multiple: int):
+    ships = load_network(SYNTHETIC_WEIGHTS)
+    other = SceneNetwork(ships._read_weights, msgspec.structs.replace(ships.notes, multiple=multiple))
+    first, second = load_network().see(frame), other.see(frame)
     share = share_of_second(first.category, second.category, first.known)
-    np.testing.assert_allclose(load_pair().see(frame).room, mixed(first.room, second.room, share), atol=1e-6)
+    found = PairedNetworks(load_network(), other).see(frame).room
+    np.testing.assert_allclose(found, mixed(first.room, second.room, share), atol=1e-6)
 
 
 def test_the_view_of_a_frame_whose_pixels_were_seen_needs_no_second_look(

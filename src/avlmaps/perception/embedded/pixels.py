@@ -228,16 +228,16 @@ def open_trained(model: str = MODEL) -> SceneNetwork | PairedNetworks:
     """
     place = local_model(model, _HOW_TO_GET)
     if place.is_file():
-        return _read(place.parent, place.stem)
+        return read_network(place.parent, place.stem, _REMEDY)
     has_first, has_second = ((place / f"{name}.onnx").is_file() for name in (DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS))
     if not has_first and not has_second:
         raise BackendError(
             f"{place} holds neither {DEFAULT_WEIGHTS}.onnx nor {SYNTHETIC_WEIGHTS}.onnx; get them with: {_HOW_TO_GET}"
         )
     if not has_first:
-        return _read(place, SYNTHETIC_WEIGHTS)
-    first = _read(place, DEFAULT_WEIGHTS)
-    second = _read(place, SYNTHETIC_WEIGHTS) if has_second else load_network(SYNTHETIC_WEIGHTS)
+        return read_network(place, SYNTHETIC_WEIGHTS, _REMEDY)
+    first = read_network(place, DEFAULT_WEIGHTS, _REMEDY)
+    second = read_network(place, SYNTHETIC_WEIGHTS, _REMEDY) if has_second else load_network(SYNTHETIC_WEIGHTS)
     try:
         return PairedNetworks(first, second)
     except ValueError as fault:
@@ -246,7 +246,3 @@ def open_trained(model: str = MODEL) -> SceneNetwork | PairedNetworks:
             f"{place / DEFAULT_WEIGHTS}.onnx and the second network {beside} do not go together ({fault}) Give the "
             "file itself as the model, to use it alone."
         ) from fault
-
-
-def _read(folder: Path, name: str) -> SceneNetwork:
-    return read_network(folder, name, _REMEDY)

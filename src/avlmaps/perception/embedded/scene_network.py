@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from hashlib import sha256
-from itertools import product
+from itertools import product, starmap
 from pathlib import Path
 from typing import Any, Final
 
@@ -172,6 +172,25 @@ class Seen:
     room: Float32[np.ndarray, " r"]
 
 
+Inputs = tuple[dict[str, np.ndarray], Bool[np.ndarray, "h w"]]
+
+
+def inputs_of(frame: Frame, augmentation: Augmentation, notes: Notes) -> Inputs:
+    """Return what a network of these notes is fed, and which cells of its answer have a depth."""
+    import cv2
+
+    camera, depth_m, rgb = at_working_size(frame, round(augmentation.scale * notes.width_px), notes.fineness)
+    geometry = channels(depth_m, camera, *_ground_of(frame))
+    colour = rgb.astype(np.float32).transpose(2, 0, 1) / 127.5 - 1.0
+    if augmentation.mirrored:
+        geometry, colour = geometry[:, :, ::-1].copy(), colour[:, :, ::-1]
+        geometry[_ACROSS] *= -1.0
+    h, w = (depth_m.shape[0] + 1) // 2, (depth_m.shape[1] + 1) // 2
+    known = cv2.resize((depth_m > 0.0).astype(np.uint8), (w, h), interpolation=cv2.INTER_AREA) > 0
+    fed = {"geometry": _padded(geometry, notes.multiple), "colour": _padded(colour, notes.fineness * notes.multiple)}
+    return {name: picture[None] for name, picture in fed.items()}, known
+
+
 class SceneNetwork:
     """The network. Its weights are read for the first frame: a query in words needs its notes alone."""
 
@@ -194,26 +213,14 @@ class SceneNetwork:
                 f"({type(fault).__name__}); update onnxruntime, or install or train the weights again."
             ) from fault
 
-    def see(self, frame: Frame, augmentation: Augmentation = PLAIN) -> Seen:
-        """Encode a frame; its ``ground`` gives the up direction, where it is known."""
-        import cv2
-
-        multiple, fineness = self.notes.multiple, self.notes.fineness
-        camera, depth_m, rgb = at_working_size(frame, round(augmentation.scale * self.notes.width_px), fineness)
-        up, height_m = _ground_of(frame)
-        geometry = channels(depth_m, camera, up, height_m)
-        colour = rgb.astype(np.float32).transpose(2, 0, 1) / 127.5 - 1.0
-        if augmentation.mirrored:
-            geometry, colour = geometry[:, :, ::-1].copy(), colour[:, :, ::-1]
-            geometry[_ACROSS] *= -1.0
-        geometry, colour = _padded(geometry, multiple), _padded(colour, fineness * multiple)
-        scores = self._session.run(["category", "room"], {"geometry": geometry[None], "colour": colour[None]})
-        score, room = (np.asarray(output) for output in scores)
-        h, w = (depth_m.shape[0] + 1) // 2, (depth_m.shape[1] + 1) // 2
+    def see(self, frame: Frame, augmentation: Augmentation = PLAIN, inputs: Inputs | None = None) -> Seen:
+        """Encode a frame, of which ``inputs`` were made before; its ``ground`` gives the up direction, if known."""
+        fed, known = inputs or inputs_of(frame, augmentation, self.notes)
+        score, room = (np.asarray(output) for output in self._session.run(["category", "room"], fed))
+        h, w = known.shape
         category = score[0, :, :h, :w].transpose(1, 2, 0) + self._bias
         if augmentation.mirrored:
             category = category[:, ::-1]
-        known = cv2.resize((depth_m > 0.0).astype(np.uint8), (w, h), interpolation=cv2.INTER_AREA) > 0
         return Seen(_softmax(category / self.notes.temperature), known, _softmax(room[0] / self.notes.room_temperature))
 
 
@@ -234,21 +241,18 @@ def read_network(folder: Path, weights: str, remedy: str) -> SceneNetwork:
     def unusable(fault: object) -> BackendError:
         return BackendError(f"The embedded pixel encoder's weights cannot be read ({fault}); {remedy}.")
 
-    def read(end: str) -> bytes:
+    def read_weights() -> bytes:
         try:
-            return (folder / f"{weights}.{end}").read_bytes()
+            content = (folder / f"{weights}.onnx").read_bytes()
         except OSError as fault:
             raise unusable(fault) from fault
-
-    def read_weights() -> bytes:
-        content = read("onnx")
         if checksum_of(content, notes) != notes.checksum:
             raise unusable(f"{weights}.onnx and {weights}.json do not belong together")
         return content
 
     try:
-        notes = msgspec.json.decode(read("json"), type=Notes)
-    except (msgspec.MsgspecError, UnicodeDecodeError) as fault:
+        notes = msgspec.json.decode((folder / f"{weights}.json").read_bytes(), type=Notes)
+    except (OSError, msgspec.MsgspecError, UnicodeDecodeError) as fault:
         raise unusable(fault) from fault
     return SceneNetwork(read_weights, notes)
 
@@ -306,7 +310,7 @@ def _padded(picture: Float32[np.ndarray, "c h w"], multiple: int) -> Float32[np.
 
 def _softmax(score: Any) -> Float32[np.ndarray, "..."]:
     e = np.exp(score - score.max(axis=-1, keepdims=True))
-    return (e / e.sum(axis=-1, keepdims=True)).astype(np.float32)
+    return np.divide(e, e.sum(axis=-1, keepdims=True), out=e)
 
 
 # Agreement at which the second network begins to count, and from which on both count the same; in between its share
@@ -330,12 +334,16 @@ class PairedNetworks:
         if second.notes.rooms != first.notes.rooms:
             raise ValueError("The two networks know different kinds of room; train them with one list.")
         self._column = np.array([first.notes.categories.index(name) for name in second.notes.categories])
+        sizes = {(notes.width_px, notes.multiple, notes.fineness) for notes in (first.notes, second.notes)}
+        self._alike = len(sizes) == 1
         both = f"{first.checksum} {second.checksum} {NO_SAY} {SAME_SAY}"
         self.checksum = sha256(both.encode()).hexdigest()
 
     def see(self, frame: Frame, augmentation: Augmentation = PLAIN) -> Seen:
         """Encode a frame with both networks."""
-        seen, second = self._first.see(frame, augmentation), self._second.see(frame, augmentation)
+        inputs = inputs_of(frame, augmentation, self._first.notes)
+        seen = self._first.see(frame, augmentation, inputs)
+        second = self._second.see(frame, augmentation, inputs if self._alike else None)
         other = np.zeros_like(seen.category)
         other[..., self._column] = second.category
         share = share_of_second(seen.category, other, seen.known)
@@ -369,9 +377,7 @@ def load_pair() -> PairedNetworks:
 # Of one frame by itself, of which the first is as maps look and gives the grid: a network errs on other pixels of each,
 # so that the mean is right more often than any (multi-scale testing; Chen et al., "DeepLab", IEEE TPAMI 2018). Larger
 # pictures are worse by themselves. A map does it with its many views of each voxel (training/pixels/README.md).
-AUGMENTATIONS = tuple(
-    Augmentation(scale, mirrored) for scale, mirrored in product((PLAIN.scale, 1.2, 1.4), (PLAIN.mirrored, True))
-)
+AUGMENTATIONS = tuple(starmap(Augmentation, product((PLAIN.scale, 1.2, 1.4), (PLAIN.mirrored, True))))
 
 
 def see_multi_scale(network: SceneNetwork | PairedNetworks, frame: Frame) -> Seen:
