@@ -179,8 +179,8 @@ $(VENV)-docs/.ready: requirements/docs.txt
 fuzz: $(READY)  ## Break 10,000 recordings and maps in seeded ways (a night; goes on where it was stopped): fuzz_out/.
 	$(RUN)/python tests/fuzz/campaign.py --cases $(or $(CASES),10000) --wrong $(or $(WRONG),1000) --out fuzz_out
 
-bench: $(READY)  ## Measure speed and accuracy; writes docs/benchmarks.md and the table of the README (two nights).
-	$(RUN)/python benchmarks/report.py
+bench: $(READY)  ## Measure speed and accuracy (an afternoon; BENCH=--whole: two nights): docs/benchmarks.md, the README's table.
+	$(RUN)/python benchmarks/report.py $(BENCH)
 
 train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU, days, or a GPU; SOUNDS=folder of clips with an index.csv).
 	$(VENV)-training/bin/python -m training.words

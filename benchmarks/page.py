@@ -42,15 +42,15 @@ class Entry:
     Attributes:
         name: in docs/benchmarks.json, and of ``--only``.
         command: words; SOUNDS, RECORDING, NYUV2, HOUSE and ROOMS stand for folders of data, OUT for that of all
-            results. Of the entry ``outside`` there is none.
+            results, HOMES for held-out homes. Of the entry ``outside`` there is none.
         figures: the rows of the page.
-        hours: on two quiet cores without a GPU, estimated; 0 for minutes.
+        whole: words more of the paper's size, with all of the homes.
     """
 
     name: str
     command: str
     figures: tuple[Figure, ...]
-    hours: float = 0.0
+    whole: str = ""
 
     @property
     def is_suite(self) -> bool:
@@ -76,12 +76,8 @@ def _driven(table: str, label: str, in_a_row: int) -> Figure:
     return Figure(label, table, "ours", f"all {in_a_row} reached in {{{column}}} % of {{sequences}} ({{+{column}}})")
 
 
-def _missions(*ranges: int) -> tuple[Figure, ...]:
-    sounds = (_driven(f"Table I: four sounds, range {n}", f"Table I, four sounds, range {n}", 4) for n in ranges)
-    return (*sounds, _driven("Table VI", "Table VI, an ambiguous sound, then an ambiguous thing", 2))
-
-
-_HOMES = tuple(f"house:{1_000_000 + number}:held-out" for number in range(12))
+HOMES = tuple(f"house:{1_000_000 + number}:held-out" for number in range(12))
+FEW = 2  # of them, in the standing size
 ENTRIES = (
     Entry("fusion", "python benchmarks/fusion.py", (
         Figure("fusion alone, 640x480 depth, 512-d features, one core", "",
@@ -90,7 +86,7 @@ ENTRIES = (
     Entry("geometry", "python benchmarks/geometry.py --scenes house:4 house:5 HOUSE", (
         Figure("voxels within 5 cm of the true surface, Kinect, house:5", "",
                r"house:5 kinect before +\S+ +(\S+)[^\n]+\n +house:5 kinect after \(kinect\) +\S+ +(\S+)",
-               "{1} % as measured, {2} % with the sensor's model"),), 0.1),
+               "{1} % as measured, {2} % with the sensor's model"),)),
     Entry("corrected", "python benchmarks/corrected.py --scenes house:7", (
         Figure("corrected poses, submaps of 32 frames: voxels of a full rebuild that are there", "",
                r"graph +32 .*? (\S+%) +\S+% +(\S+%) +(\S+%)", "{1}; double walls {2} before, {3} after"),)),
@@ -103,7 +99,7 @@ ENTRIES = (
     Entry("scale", "python benchmarks/scale.py --folder OUT --voxels 1000000 5000000 10000000 --against decabd78", (
         Figure("a thing in a map of 10,000,000 voxels, opening included", "",
                r"10,000,000 voxels\n[^\n]+\n[^\n]+\n  object +\S+ +\S+ +\S+ +(\S+) +(\S+)",
-               "{1} s of the processor, {2} MB"),), 0.5),
+               "{1} s of the processor, {2} MB"),)),
     Entry("locating", "python benchmarks/locate.py RECORDING --elsewhere PHOTOS --photos 30", (
         Figure("photos of a real kitchen in a tenth of the light, located", "",
                r"dim and noisy +(\d+) +(\d+) +(\S+ to \S+) +\d+ +(\S+) +(\S+)",
@@ -121,9 +117,9 @@ ENTRIES = (
                "right {right}; misread {misread}"),
         Figure("questions, all lists, now (development)", "the same lists now", "all, questions",
                "right {right}; misread {misread}"))),
-    Entry("frames", "avlmaps bench frames --nyuv2 NYUV2 --out OUT", (
-        Figure("pixels of 795 real frames that trained the weights (no test)", "labelled frames", "795",
-               "{pixel accuracy} ({mean over frames, 95 %})"),), 0.2),
+    Entry("frames", "avlmaps bench frames --nyuv2 NYUV2 --frames 100 --out OUT", (
+        Figure("pixels of real frames that trained the weights (no test)", "labelled frames", "*",
+               "{pixel accuracy} of {frames} frames ({mean over frames, 95 %})"),), "--frames 795"),
     Entry("sounds", "avlmaps bench sounds --sounds SOUNDS --out OUT", (
         Figure("sounds by words, held out: ten kinds of ESC-10", "cross-validation: asked by words",
                "ESC-10 | dry | right name first among 50 names", "{hits} of {of}, {%} % ({95 %})"),
@@ -133,60 +129,56 @@ ENTRIES = (
                "{no to strangers %} % of {strangers}"))),
     Entry("segmentation", "avlmaps bench segmentation --sounds SOUNDS --out OUT", (
         Figure("sounds cut out of a track, pink noise, 20 dB", "sounds found", "folds 4 and 5 | pink | 20",
-               "{found %} % of {sounds} found ({95 %})"),), 0.3),
+               "{found %} % of {sounds} found ({95 %})"),)),
     Entry("recordings", "avlmaps bench recordings --scenes RECORDING --out OUT", (
         Figure("mistakes in recordings that nothing is said of", "mistakes by source", "all",
-               "{silent wrong} of {mistakes} ({silent wrong %: 95 %} %)"),), 0.2),
-    Entry("locate", "avlmaps bench locate --scenes RECORDING --out OUT", (
-        Figure("photos located, half of a real kitchen as the map", "photos located",
-               "every other frame | * | * | yes",
-               "{within 5 cm and 5° %} % of {photos} within 5 cm and 5°, median {median error cm} cm"),), 0.2),
+               "{silent wrong} of {mistakes} ({silent wrong %: 95 %} %)"),)),
     Entry("house", "avlmaps bench objects --scenes HOUSE --out OUT", (
-        Figure("things of an artist's house by name", "objects found", "*", "{first goal within 0.5 m}"),), 0.3),
+        Figure("things of an artist's house by name", "objects found", "*", "{first goal within 0.5 m}"),)),
     Entry("objects", "avlmaps bench objects --out OUT", (
         Figure("things of twelve held-out homes: first goal within 0.5 m", "objects found", "all 12",
                "{first goal within 0.5 m}"),
-        Figure("the same: true things that are listed", "objects found", "all 12", "{true things found}")), 1.0),
-    Entry("objects-lived-in", f"avlmaps bench objects --scenes {' '.join(f'{one}:lived-in' for one in _HOMES[:6])} "
-          "--out OUT", (
-        Figure("things among people, clothes and mirrors", "objects found", "all 6", "{first goal within 0.5 m}"),),
-          0.5),
+        Figure("the same: true things that are listed", "objects found", "all 12", "{true things found}"))),
+    Entry("objects-lived-in", "avlmaps bench objects --scenes HOMES:lived-in --out OUT", (
+        Figure("things among people, clothes and mirrors", "objects found", "all ", "{first goal within 0.5 m}"),)),
     Entry("rooms", "avlmaps bench rooms --out OUT", (
         Figure("rooms of twelve held-out homes with an IoU over 0.5", "rooms", "walls and doorways",
                "{IoU over 0.5 %} % of {true rooms} ({+IoU over 0.5 %})"),
         Figure("the same: named rightly", "rooms", "walls and doorways",
-               "{named rightly %} % ({+named rightly %})")), 1.0),
-    Entry("change", "avlmaps bench change --days 5 --frames 120 --jobs 2 --out OUT", (
-        Figure("changes over five days, any name: moved", "changes", "ours, any name | moved",
+               "{named rightly %} % ({+named rightly %})"))),
+    Entry("change", "avlmaps bench change --scenes HOMES --days 3 --frames 120 --out OUT", (
+        Figure("changes from day to day, any name: moved", "changes", "ours, any name | moved",
                "precision {precision (95 %)}, recall {recall (95 %)}"),
         Figure("the same with the right name: appeared", "changes", "ours | appeared",
-               "precision {precision (95 %)}, recall {recall (95 %)}")), 0.6),
-    Entry("live", "avlmaps bench live --scenes RECORDING --kills 40 --out OUT", (
-        Figure("a frame of a live map", "processor time", "redkitchen | its own", "{all} ms of the processor"),
+               "precision {precision (95 %)}, recall {recall (95 %)}")), "--days 5"),
+    Entry("live", "avlmaps bench live --scenes RECORDING --laps 1 --no-ends --kills 10 --out OUT", (
+        Figure("a frame of a live map", "processor time", "redkitchen | as fast",
+               "{all} ms of the processor"),
         Figure("kills at random moments: whole maps left", "kills", "*",
-               "{whole maps left} of {kills}; lost {lost s median} s (median), {most} s at most")), 0.5),
-    Entry("live-hour", "avlmaps bench live --scenes RECORDING --laps 108 --rate 4 --kills 0 --no-ends --out OUT", (
-        Figure("memory after an hour over one surface", "laps", "redkitchen | 108", "{MB} MB"),), 0.3),
-    Entry("sources", "avlmaps bench sources --rooms ROOMS --trials 4 --jobs 2 --out OUT", (
+               "{whole maps left} of {kills}; lost {lost s median} s (median), {most} s at most, on a busy machine")),
+          "--laps 2 --kills 40"),
+    Entry("sources", "avlmaps bench sources --scenes HOMES --rooms ROOMS --trials 0 --out OUT", (
         Figure("where sounds came from, four microphones (simulated)", "homes", "square4",
                "median {median error m} m ({+median error m})"),
         Figure("the same, one microphone", "homes", "mono", "median {median error m} m ({+median error m})"),
         Figure("the same, a measured room", "a measured room", "4 of 25",
-               "median {median error m} m ({+median error m})")), 0.5),
-    Entry("indexing", "avlmaps bench indexing --out OUT", _tables(""), 1.5),
-    Entry("indexing-clips", "avlmaps bench indexing --sounds SOUNDS --out OUT", _tables("; recorded sounds"), 2.5),
-    Entry("indexing-paper", "avlmaps bench indexing --rules paper --out OUT", (
+               "median {median error m} m ({+median error m})")), "--trials 12"),
+    Entry("indexing", "avlmaps bench indexing --scenes HOMES --out OUT", _tables("")),
+    Entry("indexing-clips", "avlmaps bench indexing --scenes HOMES --sounds SOUNDS --out OUT",
+          _tables("; recorded sounds")),
+    Entry("indexing-paper", "avlmaps bench indexing --scenes HOMES --rules paper --out OUT", (
         _paper("Table III", "+ sparse view map by the paper", "Table III by the paper's rules"),
         _paper("Table IV", "object + sound", "Table IV by the paper's rules"),
-        _paper("Table V", "object + image", "Table V by the paper's rules")), 1.5),
-    Entry("found", f"avlmaps bench found --scenes {' '.join(_HOMES)} HOUSE --out OUT", (
-        Figure("Is found true? Brier score", "found", "all", "{Brier score} ({95 %})", photos=True),
-        Figure("found, where no such thing is", "found", "all", "{none there: found}", photos=True)), 1.5),
-    Entry("navigation", "avlmaps bench navigation --out OUT", (
-        *_missions(1, 2, 3)[:3], _driven("Table II", "Table II, a photo, then two things", 3), _missions()[0]), 5.0),
-    Entry("navigation-clips",
-          "avlmaps bench navigation --sounds SOUNDS --series sounds-1 sounds-2 sounds-3 pairs --out OUT",
-          tuple(Figure(f"{one.label}; recorded sounds", one.table, one.row, one.form) for one in _missions(3)), 4.0),
+        _paper("Table V", "object + image", "Table V by the paper's rules"))),
+    Entry("found", "avlmaps bench found --scenes HOMES --out OUT", (
+        Figure("Is found true? Brier score", "found", "all", "{Brier score} of {queries} queries", photos=True),
+        Figure("found, where no such thing is", "found", "all", "{none there: found}", photos=True))),
+    Entry("navigation",
+          "avlmaps bench navigation --scenes HOMES --sequences 12 --series sounds-3 images pairs --out OUT", (
+        _driven("Table I: four sounds, range 3", "Table I, four sounds, range 3", 4),
+        _driven("Table II", "Table II, a photo, then two things", 3),
+        _driven("Table VI", "Table VI, an ambiguous sound, then an ambiguous thing", 2)),
+          "--sequences 200 --series sounds-1 sounds-2 sounds-3 images pairs commands spatial"),
     Entry("outside", "not of this repository", (
         Figure("another hand: NYUv2, 654 test frames: pixel accuracy, class accuracy, mean IoU", "",
                r"accuracy (\S+), class accuracy (\S+), mean IoU (\S+)", "{1}, {2}, {3}"),
@@ -211,16 +203,18 @@ README_ROWS = {"fusion": 1, "queries": 1, "sounds": 2, "objects": 1, "rooms": 1,
 
 INTRODUCTION = """# Benchmarks
 
-`make bench` writes this page and the README's table from [benchmarks.json](benchmarks.json), all that each command
-printed. Speed is of one core of a shared machine with two, as a ratio to another way in
-the same run. Intervals are 95 %.
+`make bench` measures every row anew in an afternoon, and writes this page and the README's table from
+[benchmarks.json](benchmarks.json), all that each command printed. Speed is of one core of a shared machine with two, as
+a ratio to another way in the same run. Intervals are 95 %: few homes or missions make them wide.
 
-*Weights* says whether a row was measured with the weights that ship. Do not rely on *older*.
+*Weights* says whether a row was measured with the weights that ship; *older* is not to be relied on.
 
     python benchmarks/report.py --only words sounds   # some; --stale: what older weights measured; --page: the page
+    python benchmarks/report.py --whole               # all twelve homes, the paper's numbers of tasks (two nights)
 
-SOUNDS is a folder of clips with an `index.csv`, or ESC-50; RECORDING the red kitchen of 7-Scenes; NYUV2 labelled
-frames; HOUSE the house of aws-robomaker-small-house-world; ROOMS a measured room.
+HOMES are the first two of twelve held-out homes, with `--whole` all; SOUNDS is a folder of clips with an `index.csv`,
+or ESC-50; RECORDING the red kitchen of 7-Scenes; NYUV2 labelled frames; HOUSE the house of
+aws-robomaker-small-house-world; ROOMS a measured room.
 
 | what | result | weights, date | command |
 |---|---|---|---|"""
@@ -244,14 +238,17 @@ def page(measured: Mapping[str, Any], shipped: Mapping[str, str]) -> str:
     for entry in ENTRIES:
         found = measured.get(entry.name)
         for number, figure in enumerate(entry.figures):
-            when = f"{weights_of(found, shipped, photos=figure.photos)}, {found['date']}" if found else "-"
-            command = "" if number else f"`{_short(entry.command)}`"
+            when = (
+                f"{weights_of(found, shipped, photos=figure.photos)}, {found['date']}{_homes(found)}" if found else "-"
+            )
+            command = "" if number else f"`{found['command'] if found else entry.command}`"
             lines.append(f"| {figure.label} | {shown(figure, found)} | {when} | {command} |")
     return "\n".join([*lines, AFTER])
 
 
-def _short(command: str) -> str:
-    return re.sub(r"(--scenes \S+)(?: house:\S+){3,}", r"\1 ...", command)
+def _homes(found: Mapping[str, Any]) -> str:
+    homes = [one for one in found.get("answer", {}).get("scenes", ()) if str(one).startswith("house:")]
+    return f", {len(homes)} home{'s' if len(homes) > 1 else ''}" if homes else ""
 
 
 def weights_of(found: Mapping[str, Any], shipped: Mapping[str, str], *, photos: bool = False) -> str:

@@ -3,6 +3,7 @@
     python benchmarks/report.py --sounds SOUNDS --recording RECORDING --house HOUSE
     python benchmarks/report.py --only words sounds --sounds SOUNDS
     python benchmarks/report.py --stale          # only what is missing, or was measured with other weights
+    python benchmarks/report.py --whole          # the paper's numbers of homes, tasks and missions (two nights)
     python benchmarks/report.py --page           # measure nothing, write the page again
     python benchmarks/report.py --check          # exit 1 unless page and README agree with docs/benchmarks.json
     python benchmarks/report.py --small          # every command on little data; writes nothing
@@ -21,6 +22,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -33,7 +35,9 @@ from avlmaps.core.version import __version__  # noqa: E402
 from avlmaps_sim.bench.harness.settings import shipped_checksums  # noqa: E402
 from page import (  # noqa: E402
     ENTRIES,
+    FEW,
     FIGURES,
+    HOMES,
     PAGE,
     README,
     Entry,
@@ -64,43 +68,52 @@ SMALL = {
     "rooms": f"avlmaps bench rooms {_HOME}",
     "change": "avlmaps bench change --scenes house:1 --days 2 --frames 40 --jobs 1 --out OUT",
     "live": "avlmaps bench live --scenes RECORDING --laps 1 --kills 1 --out OUT",
-    "live-hour": "avlmaps bench live --scenes RECORDING --laps 2 --rate 4 --kills 0 --no-ends --out OUT",
     "sources": "avlmaps bench sources --scenes house:1 --rooms ROOMS --trials 1 --jobs 1 --out OUT",
     "indexing": f"avlmaps bench indexing {_TASKS}",
     "indexing-clips": f"avlmaps bench indexing --sounds SOUNDS {_TASKS}",
     "indexing-paper": f"avlmaps bench indexing --rules paper {_TASKS}",
     "found": f"avlmaps bench found {_HOME}",
     "navigation": f"avlmaps bench navigation --sequences 1 {_HOME}",
-    "navigation-clips": f"avlmaps bench navigation --sequences 1 --sounds SOUNDS --series sounds-1 pairs {_HOME}",
 }
 
 
-def words_of(command: str, data: dict[str, Path]) -> list[str] | None:
-    """Return a command with the folders of data in it; None where one is not there."""
+def words_of(command: str, data: dict[str, Path], homes: Sequence[str]) -> list[str] | None:
+    """Return a command with the folders of data and the homes in it; None where one is not there."""
     words: list[str] = []
     for word in shlex.split(command):
         if word in data and not (word == "OUT" or data[word].exists()):
             return None
-        words.append(str(data[word]) if word in data else word)
+        if word.startswith("HOMES"):
+            words += [word.replace("HOMES", home) for home in homes]
+        else:
+            words.append(str(data[word]) if word in data else word)
     if words[0] == "avlmaps":
         return [sys.executable, "-m", "avlmaps", *words[1:], "--json"]
     return [sys.executable, str(HERE / Path(words[1]).name), *words[2:]]
 
 
-def measured(entry: Entry, words: list[str]) -> dict[str, Any] | None:
-    """Run a command and return what it printed, when and where; None where it fails."""
+def measured(entry: Entry, words: list[str], command: str) -> dict[str, Any] | None:
+    """Run a command and return what it printed, when, where and in what time; None where it fails."""
+    before_s = processor_s()
     done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=False)
     if done.returncode:
         print(f"{entry.name} failed ({done.returncode}): {shlex.join(words)}", file=sys.stderr)
         return None
     python = platform.python_version()
     facts: dict[str, Any] = {
-        "command": entry.command,
+        "command": command,
         "date": date.today().isoformat(),
+        "processor_s": round(processor_s() - before_s),
         "avlmaps": __version__,
         "machine": f"{os.cpu_count()} cores of a shared {platform.machine()} machine, Python {python}",
     }
     return {**facts, "answer": json.loads(done.stdout)} if entry.is_suite else {**facts, "text": done.stdout}
+
+
+def processor_s() -> float:
+    """Return the processor time of all commands that ended."""
+    times = os.times()
+    return times.children_user + times.children_system
 
 
 def run_small(entries: list[Entry], data: dict[str, Path]) -> list[str]:
@@ -109,12 +122,12 @@ def run_small(entries: list[Entry], data: dict[str, Path]) -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         data = {**data, **small_data(data, Path(folder)), "OUT": Path(folder) / "out"}
         for entry in entries:
-            words = words_of(SMALL.get(entry.name, entry.command), data)
+            words = words_of(SMALL.get(entry.name, entry.command), data, HOMES[:1])
             if words is None:
                 print(f"{entry.name}: skipped, its data is not there")
                 continue
             begin_s = time.monotonic()
-            found = measured(entry, words)
+            found = measured(entry, words, entry.command)
             missing = [one.label for one in entry.figures if found is not None and not is_there(one, found)]
             if found is None or missing:
                 failed.append(entry.name)
@@ -189,6 +202,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=Path("bench_out"), help="folder of the suites' work")
     parser.add_argument("--only", nargs="+", choices=[entry.name for entry in ENTRIES], help="only these entries")
     parser.add_argument("--stale", action="store_true", help="only entries of other weights, or never measured")
+    parser.add_argument("--whole", action="store_true", help="the paper's size: all homes, tasks and missions")
     parser.add_argument("--page", action="store_true", help="measure nothing")
     parser.add_argument("--small", action="store_true", help="run every entry on little data; write nothing")
     parser.add_argument("--check", action="store_true", help="write nothing; exit 1 if page or README differ")
@@ -211,15 +225,16 @@ def main() -> None:
     for entry in () if asked.page else entries:
         if asked.stale and not stale(entry, found.get(entry.name), shipped_checksums()):
             continue
-        words = words_of(entry.command, data)
+        command = f"{entry.command} {entry.whole}".rstrip() if asked.whole else entry.command
+        words = words_of(command, data, HOMES if asked.whole else HOMES[:FEW])
         if words is None:
             print(f"skipping {entry.name}: its data is not there", file=sys.stderr)
             continue
-        print(f"running {entry.name}: {entry.command}", file=sys.stderr)
-        answer = measured(entry, words)
+        print(f"running {entry.name}: {command}", file=sys.stderr)
+        answer = measured(entry, words, command)
         if answer is None:
             sys.exit(1)
-        found[entry.name] = answer
+        found = {**read_figures(), entry.name: answer}  # another command may have ended meanwhile
         write({one.name: found[one.name] for one in ENTRIES if one.name in found})
     write({one.name: found[one.name] for one in ENTRIES if one.name in found})
 

@@ -102,6 +102,7 @@ def test_an_encoder_that_is_right_is_right_in_every_figure(folder: Path) -> None
     assert figures.confusion.sum() == 35 * 300 + 100 * 100
     (row,) = summary_table({"once": figures})["rows"]
     assert row[0] == 2 and row[-2:] == [2, "once"]
+    assert len(LabelledFolder(folder, 1)) == 1 and len(LabelledFolder(folder, 600)) == 2
 
 
 def test_a_chair_taken_for_floor_costs_what_it_covers(folder: Path) -> None:
@@ -275,7 +276,7 @@ def test_the_suite_measures_the_chosen_model_not_the_profiles(
         run_suite("frames", SuiteInputs(nyuv2=folder, models=("pixels=colours",)), tmp_path)
     measured = []
 
-    def run_frames(encoder: EmbeddedPixels, _: Path) -> dict[str, Table]:
+    def run_frames(encoder: EmbeddedPixels, *_: Path | int | None) -> dict[str, Table]:
         measured.append(encoder.card.checksum)
         return {"a table": {"columns": ["a"], "rows": [[1]]}}
 
@@ -296,7 +297,7 @@ def test_the_suite_writes_its_tables_in_every_form(tmp_path: Path, folder: Path)
     assert set(answer["tables"]) == {"labelled frames", "by class", "by class at several scales"}
     assert [row[-1] for row in answer["tables"]["labelled frames"]["rows"]] == ["once, as in maps", "at several scales"]
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"frames.json", "frames.md", "frames.png", "frames-labelled-frames.csv", "frames-by-class.csv",
+    assert names == {"frames.json", "frames.md", "frames-labelled-frames.csv", "frames-by-class.csv",
                      "frames-by-class-at-several-scales.csv"}  # fmt: skip
     assert (tmp_path / "out" / "frames-by-class.csv").read_text().startswith("class,pixels,recall,IoU,taken for\n")
 

@@ -41,7 +41,7 @@ from avlmaps.maps.gravity import find_ground
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.recordings.layout import CameraNumbers
 from avlmaps.recordings.types import Frame, Ground
-from avlmaps_sim.bench.harness.figures import of_mean
+from avlmaps_sim.bench.harness.figures import Table, of_mean
 
 CLASSES = (
     "wall", "floor", "cabinet", "bed", "chair", "sofa", "table", "door", "window", "bookshelf", "picture", "counter",
@@ -135,8 +135,8 @@ class LabelledFrame:
 class LabelledFolder:
     """The frames of a folder (see the module) in the order of ``frames.csv``, read one at a time."""
 
-    def __init__(self, folder: Path) -> None:
-        """Read the index and the camera.
+    def __init__(self, folder: Path, most: int | None = None) -> None:
+        """Read the index and the camera; a longer index is thinned evenly to ``most`` frames.
 
         ``RecordingError``: there is no index, it or the camera's file is damaged, or it names no frame.
         """
@@ -156,9 +156,10 @@ class LabelledFolder:
                 if not np.isfinite(length) or abs(length - 1.0) > 0.05:
                     raise RecordingError(f"Line {line} of {index}: up has length {length:.3g}; it must be 1.")
                 self._up[name] = up / length
-        self.names = tuple(self._up)
-        if not self.names:
+        if not (count := len(self._up)):
             raise RecordingError(f"{index} names no frame.")
+        kept = np.linspace(0, count - 1, min(most or count, count)).round().astype(int)
+        self.names: tuple[str, ...] = tuple(np.array(list(self._up))[kept].tolist())
         self.camera = _camera_of(folder / "camera.json")
 
     def __len__(self) -> int:
@@ -238,7 +239,6 @@ def _grounded(frame: Frame, label: UInt8[np.ndarray, "h w"], up: Float[np.ndarra
 STEP = 2
 # How frames are seen.
 ONCE, SEVERAL = "once, as in maps", "at several scales"
-Table = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,12 +320,12 @@ def _figures(counts: Sequence[Int[np.ndarray, "37 37"]], labelled: int) -> Frame
     return FrameFigures(np.sum(counts, axis=0), len(counts), labelled, np.array(shares, np.float32))
 
 
-def run_frames(encoder: EmbeddedPixels, folder: Path) -> dict[str, Table]:
-    """Return the tables of a folder of labelled frames.
+def run_frames(encoder: EmbeddedPixels, folder: Path, most: int | None = None) -> dict[str, Table]:
+    """Return the tables of a folder of labelled frames, or of up to ``most`` of them.
 
     ``RecordingError``: the folder has no index, or a frame cannot be read.
     """
-    figures = measure(encoder, LabelledFolder(folder))
+    figures = measure(encoder, LabelledFolder(folder, most))
     return {
         "labelled frames": summary_table(figures),
         "by class": class_table(figures[ONCE]),

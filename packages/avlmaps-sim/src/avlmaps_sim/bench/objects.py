@@ -185,8 +185,7 @@ def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any
     chosen = chosen_on(settings.scenes)
     tables = {name: {**table, "chosen on": chosen} if chosen else table for name, table in named.items()}
     answer = {"suite": "objects", **provenance(settings, settings.recorded, settings.scenes, weights), "tables": tables}
-    written = write_answer(answer, out, f"{in_words(answer)}\n\n{markdown(tables)}")
-    return written
+    return write_answer(answer, out, f"{in_words(answer)}\n\n{markdown(tables)}")
 
 
 def _same(things: Sequence[SceneObject]) -> dict[str, str]:

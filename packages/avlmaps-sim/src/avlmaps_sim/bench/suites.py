@@ -1,4 +1,4 @@
-"""The suites behind `avlmaps bench`: run one, write its tables as JSON, Markdown and a picture."""
+"""The suites behind `avlmaps bench`: run one, write its tables as JSON, Markdown and CSV."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -39,6 +39,7 @@ class SuiteInputs:
     change: "tuple[SceneSettings, int] | None" = None
     live: "LiveBench | None" = None  # laps and kills of the suite ``live``; its own defaults if None
     sources: "SourcesBench | None" = None  # what the suite ``sources`` is run on; its own defaults if None
+    frames: int | None = None  # limit of labelled frames
 
 
 def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
@@ -181,7 +182,7 @@ def _frames(inputs: SuiteInputs) -> Mapping[str, Table]:
             "not give. "
             "Choose the profile embedded, synthetic or trained."
         )
-    return run_frames(encoder, inputs.nyuv2)
+    return run_frames(encoder, inputs.nyuv2, inputs.frames)
 
 
 def _language(_: SuiteInputs) -> Mapping[str, Table]:

@@ -1,4 +1,4 @@
-"""`avlmaps bench`: the quality figures, as JSON, Markdown and a picture."""
+"""`avlmaps bench`: the quality figures, as JSON, Markdown and CSV."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,7 +36,7 @@ class Indexing:
     sound_clips: Literal["unheard", "all"] = "unheard"
     """Clips of --sounds: those that the embedded sound encoder was not trained on, or all."""
     frames: Annotated[int, arg(metavar="N")] = 600
-    """Maximum number of frames per scene."""
+    """Maximum number of frames per scene, and of labelled frames."""
     tasks_a_scene: Annotated[int, arg(metavar="N")] = 20
     """Maximum number of tasks per scene and table (indexing)."""
     size: Literal["paper", "all"] = "paper"
@@ -79,7 +79,7 @@ class Bench(ModelVerb):
     takes --scenes, recordings of a real camera.
     objects: positions of objects, in the scenes of indexing, whose maps it shares.
     indexing: the paper's Tables III to V, in twelve held-out homes, in --scenes, or in a recording with objects.json.
-    found: is what is reported as found there? Brier scores and a reliability diagram, in the scenes of indexing.
+    found: is what is reported as found there? Brier scores and reliability, in the scenes of indexing.
     rooms: the rooms of a map against the true ones (overlap, names, count, area), in the scenes of indexing.
     live: a live map at the pace of a robot: frames, questions, memory, its end beside the build, kills; needs --scenes,
     recordings with poses.
@@ -122,7 +122,7 @@ class Bench(ModelVerb):
     kills: Annotated[int, arg(metavar="N")] = 40
     """How many live maps are killed at a random moment; those in --out are not repeated (live)."""
     ends: bool = True
-    """Whether a drive's end is compared with the build, and it is also driven as fast as the map takes it (live)."""
+    """Whether a drive's end is compared with the build (live)."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
     """Options of the suites indexing, objects and navigation."""
     navigation: Annotated[Navigation, OmitArgPrefixes] = field(default_factory=Navigation)
@@ -140,7 +140,7 @@ class Bench(ModelVerb):
         inputs = SuiteInputs(
             self.sounds, self.clips, scenes, self.nyuv2, self.profile, models, self.seed, indexing, navigation,
             change, self.live_settings() if self.suite == "live" else None,
-            self.sources_settings() if self.suite == "sources" else None,
+            self.sources_settings() if self.suite == "sources" else None, self.indexing.frames,
         )  # fmt: skip
         answer = run_suite(self.suite, inputs, self.out)
         lines: list[str] = []

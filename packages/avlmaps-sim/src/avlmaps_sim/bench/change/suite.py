@@ -168,8 +168,7 @@ def run_change(
         "note": NOTE,
         "tables": tables,
     }
-    written = write_answer(answer, out, f"# Change\n\n{in_words(answer)}\n\n{NOTE}\n\n{markdown(tables)}")
-    return written
+    return write_answer(answer, out, f"# Change\n\n{in_words(answer)}\n\n{NOTE}\n\n{markdown(tables)}")
 
 
 def _home(job: SceneJob, days: int, open_spec: Callable[[str], Scene]) -> dict[str, HomeResult]:

@@ -1,4 +1,4 @@
-"""The suite ``avlmaps bench found``: Brier scores, what is reported as found, and a reliability diagram."""
+"""The suite ``avlmaps bench found``: Brier scores, what is reported as found, and reliability."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -33,7 +33,7 @@ _BINS = np.linspace(0.0, 1.0, 11)
 
 
 def run_found(settings: IndexingSettings | None, out: Path) -> Any:
-    """Query scenes, whose maps are those of the suite ``indexing`` in the same folder; write tables and a picture."""
+    """Query scenes, whose maps are those of the suite ``indexing`` in the same folder; write tables."""
     settings = settings or IndexingSettings()
     weights = settings.checked()
     todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")

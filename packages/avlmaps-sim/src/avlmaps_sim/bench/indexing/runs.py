@@ -195,7 +195,8 @@ def scored(answers: Sequence[Answered], seed: int = 0, *, by_centre: bool = Fals
 
 def chance(tasks: Sequence[Task]) -> float:
     """Return the share that is right where one of the candidates of each name is drawn at random."""
-    return float(np.mean([len(task.targets) / (len(task.targets) + task.rivals) for task in tasks])) if tasks else 0.0
+    right = [1 if task.kind is TaskKind.SOUND else len(task.targets) for task in tasks]  # boxes of one sound: its track
+    return float(np.mean([own / (own + task.rivals) for own, task in zip(right, tasks, strict=True)])) if tasks else 0.0
 
 
 def bootstrapped_mean(values: Float[np.ndarray, " n"], rng: np.random.Generator) -> tuple[float, float]:
@@ -217,7 +218,7 @@ PAPER_SIZES: Mapping[TaskKind, int] = {
 }
 _PHOTOS_A_TASK = 12  # tried for each that is wanted
 _MAKING = 3  # raised when tasks are made by other rules
-_QUERYING = 7  # raised when they are queried by other rules
+_QUERYING = 8  # raised when they are queried by other rules
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

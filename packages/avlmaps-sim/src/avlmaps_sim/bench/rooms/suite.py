@@ -249,8 +249,7 @@ def run_rooms(settings: IndexingSettings | None, out: Path) -> Any:
         "note": NOTE,
         "tables": tables,
     }
-    written = write_answer(answer, out, f"# Rooms\n\n{in_words(answer)}\n\n{NOTE}\n\n{markdown(tables)}")
-    return written
+    return write_answer(answer, out, f"# Rooms\n\n{in_words(answer)}\n\n{NOTE}\n\n{markdown(tables)}")
 
 
 def _scene(job: SceneJob) -> dict[str, Judged]:
