@@ -52,11 +52,6 @@ def test_the_second_never_has_more_say_than_the_first(first: np.ndarray, second:
     assert (np.abs(both - first) <= np.abs(both - second) + 1e-6).all()
 
 
-@given(one=distributions())
-def test_two_of_one_mind_are_that_mind(one: np.ndarray):
-    np.testing.assert_allclose(paired(one, one), one, atol=1e-6)
-
-
 def agreeing(by: float) -> tuple[np.ndarray, np.ndarray]:
     """Return two distributions whose Bhattacharyya coefficient is this in every cell."""
     first = np.tile(np.array([1.0, 0.0], np.float32), (2, 3, 1))

@@ -59,8 +59,8 @@ def test_each_cell_is_a_distribution_on_a_grid_of_half_the_size(size: tuple[int,
 def test_the_checksum_beside_the_weights_is_theirs(weights: str) -> None:
     notes = load_network(weights).notes
     content = (files("avlmaps.perception.embedded") / "weights" / f"{weights}.onnx").read_bytes()
-    assert notes.checksum == checksum_of(content, notes)
-    assert checksum_of(content, msgspec.structs.replace(notes, called={}, note="said otherwise")) == notes.checksum
-    assert checksum_of(content + b" ", notes) != notes.checksum
-    assert checksum_of(content, msgspec.structs.replace(notes, fineness=notes.fineness + 1)) != notes.checksum
-    assert checksum_of(content, msgspec.structs.replace(notes, temperature=notes.temperature + 0.1)) != notes.checksum
+    assert (known := notes.rewritten or notes.checksum) == checksum_of(content, notes)
+    assert checksum_of(content, msgspec.structs.replace(notes, called={}, note="said otherwise")) == known
+    assert checksum_of(content + b" ", notes) != known
+    assert checksum_of(content, msgspec.structs.replace(notes, fineness=notes.fineness + 1)) != known
+    assert checksum_of(content, msgspec.structs.replace(notes, temperature=notes.temperature + 0.1)) != known
