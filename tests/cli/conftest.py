@@ -9,15 +9,15 @@ from helpers.walked_room import shared_walk, walked_map
 
 
 @pytest.fixture(scope="session")
-def walk() -> Path:
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording of 24 frames (6 s) with a sound from 2 to 4 s."""
-    return shared_walk()
+    return shared_walk(tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
-def built(walk: Path) -> Path:
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The map of the walk."""
-    return walked_map(walk)
+    return walked_map(tmp_path_factory)
 
 
 @pytest.fixture

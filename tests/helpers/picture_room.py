@@ -1,7 +1,7 @@
 """A room with painted walls that is rendered by formula: pictures with exact depth and poses, quick and seeded."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -48,10 +48,9 @@ class Room:
 
     seed: int = 0
 
-    @cached_property
+    @property
     def walls(self) -> list[np.ndarray]:
-        rng = np.random.default_rng(self.seed)
-        return [cv2.GaussianBlur(painting(rng), (0, 0), 0.8) for _ in range(6)]
+        return _walls(self.seed)
 
     def render(self, world_from_camera: np.ndarray, camera: Pinhole = CAMERA) -> tuple[np.ndarray, np.ndarray]:
         """Return the colours and the exact z-depths at pixel centres; paint is as soft as a pixel at 2 m is wide."""
@@ -75,6 +74,12 @@ class Room:
             texel = ((hit[mine][:, across] + shift) / _TEXEL_M).astype(np.float32) % 511
             picture[mine] = between_texels(wall, texel)
         return picture, depth.astype(np.float32)
+
+
+@cache
+def _walls(seed: int) -> list[np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return [cv2.GaussianBlur(painting(rng), (0, 0), 0.8) for _ in range(6)]
 
 
 def between_texels(picture: np.ndarray, xy: np.ndarray) -> np.ndarray:

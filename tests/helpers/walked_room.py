@@ -1,10 +1,8 @@
 """A short walk in the analytic room with one real-looking sound, as a recording on the disk."""
 
-import atexit
-import shutil
 from functools import cache
 from pathlib import Path
-from tempfile import mkdtemp
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +12,9 @@ from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
 from helpers.raycast import View, render
 from helpers.room import Room
+
+if TYPE_CHECKING:
+    import pytest  # an environment of wheels alone, which writes this walk too, has none
 
 CAMERA = Pinhole(160.0, 160.0, 120.0, 90.0, 240, 180)
 RATE_HZ = 22050
@@ -32,23 +33,27 @@ def _seen() -> list[tuple[np.ndarray, View]]:
     return [(pose, render(room.scene, CAMERA, pose)) for pose in room.walk()[100:196:4]]
 
 
-@cache
-def walked_map(walk: Path) -> Path:
-    """Return the map of a walk that lies beside it: about 3,000 voxels with one sound, made once a process."""
+def shared_walk(factory: "pytest.TempPathFactory") -> Path:
+    """Return a walk that is made once in a run; tests share it and leave it as it is."""
+    from helpers.made_once import made_once
+
+    def write(folder: Path) -> None:
+        write_walk(folder / "rec")
+
+    return made_once(factory, "walk", write) / "rec"
+
+
+def walked_map(factory: "pytest.TempPathFactory") -> Path:
+    """Return the map of that walk, made once in a run as well: about 3,000 voxels with one sound."""
     from avlmaps.api import build_map
     from avlmaps.maps.settings import BuildSettings
+    from helpers.made_once import made_once
 
-    path = walk.parent / "room.avlmap"
-    build_map(walk, path, "colours", BuildSettings(voxel_size_m=0.1), progress=False)
-    return path
+    def build(folder: Path) -> None:
+        settings = BuildSettings(voxel_size_m=0.1)
+        build_map(shared_walk(factory), folder / "room.avlmap", "colours", settings, progress=False)
 
-
-@cache
-def shared_walk() -> Path:
-    """Return a walk that tests share and leave as it is."""
-    folder = Path(mkdtemp(prefix="avlmaps-tests-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return write_walk(folder / "rec")
+    return made_once(factory, "walked-room", build) / "room.avlmap"
 
 
 def write_walk(path: Path) -> Path:

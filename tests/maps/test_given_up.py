@@ -9,12 +9,12 @@ import pytest
 from avlmaps.maps.gravity import up_doubts
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame, Recording
-from helpers.walked_room import write_walk
+from helpers.walked_room import shared_walk
 
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    return open_recording(write_walk(tmp_path_factory.mktemp("up") / "rec"))
+    return open_recording(shared_walk(tmp_path_factory))
 
 
 def doubts(recording: Recording, up: tuple[float, float, float] | None) -> tuple[str, ...]:

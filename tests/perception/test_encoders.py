@@ -17,7 +17,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.perception.encoders import MODULES, Encoders, encoders_of, profile, profiles
 from avlmaps.perception.protocols import PixelEncoder
-from helpers.walked_room import write_walk
+from helpers.walked_room import shared_walk
 
 
 class Words:
@@ -109,7 +109,7 @@ GUIDE = Path(__file__).parents[2] / "docs"
 
 
 def test_the_guides_encoder_answers_as_an_object_and_as_a_package(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It says nothing of what its protocol needs besides; that is made for it, whichever way it comes."""
     (page,) = [one for one in GUIDE.rglob("*.md") if "class Hues" in one.read_text(encoding="utf-8")]
@@ -120,7 +120,8 @@ def test_the_guides_encoder_answers_as_an_object_and_as_a_package(
     register(Backend(Kind.PIXELS, "hues", "hues_of_the_guide:Hues"))
     encoders = Encoders.named("colours", pixels="hues")
     assert encoders.pixels is encoders.pixels
-    built = avlmaps.build_map(write_walk(tmp_path / "rec"), tmp_path / "map", encoders=encoders)
+    few = avlmaps.BuildSettings(voxel_size_m=0.1, frames=avlmaps.FrameSettings(step=6))
+    built = avlmaps.build_map(shared_walk(tmp_path_factory), tmp_path / "map", encoders=encoders, settings=few)
     assert built.ask("something red").text
     hues = Encoders.named("colours", pixels=importlib.import_module("hues_of_the_guide").Hues())
     assert avlmaps.open_map(tmp_path / "map", encoders=hues).ask("something red").text

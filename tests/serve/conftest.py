@@ -15,15 +15,15 @@ from helpers.walked_room import shared_walk, walked_map
 
 
 @pytest.fixture(scope="session")
-def walk() -> Path:
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The recording of the map."""
-    return shared_walk()
+    return shared_walk(tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
-def room(walk: Path) -> Path:
+def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A map of about 3,000 voxels with one sound."""
-    return walked_map(walk)
+    return walked_map(tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
