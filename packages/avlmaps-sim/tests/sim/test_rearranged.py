@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from avlmaps_sim import scenes
 from avlmaps_sim.free_space import free_space, reaching_part
 from avlmaps_sim.mesh import Material
 from avlmaps_sim.rearranged import Change, rearranged, to_json
@@ -112,7 +113,8 @@ def test_the_same_day_is_the_same_scene_and_its_truth_is_json(scene: Scene, days
         rearranged(scene, -1)
 
 
-def test_the_name_of_a_scene_says_its_day(tmp_path) -> None:
+def test_the_name_of_a_scene_says_its_day(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(scenes._MAKERS, "house", lambda *_: scene)  # pyright: ignore[reportPrivateUsage]
     assert on_day("house:7", 0) == "house:7" and on_day("house:7:held-out", 3) == "house:7:held-out:day-3"
     same, none = open_changed("house:7:day-0")
     assert not none and [one.name for one in same.objects] == [one.name for one in open_scene("house:7").objects]
