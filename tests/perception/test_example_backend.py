@@ -62,6 +62,7 @@ def test_the_example_is_as_short_as_is_said() -> None:
     assert len((SOURCE / "thumbnail_places.py").read_text().splitlines()) <= 30
 
 
+@pytest.mark.nightly  # by day: test_registry (entry points), test_conformance, test_remembered_models (its map)
 def test_it_is_found_held_to_its_protocol_and_makes_a_map_that_remembers_it(
     installed: Path, mapped: tuple[Path, Path]
 ) -> None:
