@@ -67,14 +67,19 @@ def track(tmp_path_factory: pytest.TempPathFactory) -> AudioTrack:
     return track_of(tmp_path_factory.mktemp("track") / "a.flac", SAMPLES)
 
 
+@pytest.fixture(scope="module")
+def whole(track: AudioTrack, tmp_path_factory: pytest.TempPathFactory) -> HeardSounds:
+    """What is heard in the track at once."""
+    walk = straight_walk(30.0, 0.3, track)
+    return detect_events(track, walked(walk), FakeEncoder(), PLAIN, tmp_path_factory.mktemp("clips"))
+
+
 @pytest.mark.slow
 @given(cuts=st.lists(st.integers(0, len(SAMPLES)), max_size=30), asked=st.integers(0, 30))
 def test_however_the_track_is_cut_the_sounds_are_those_of_the_whole_track(
-    track: AudioTrack, tmp_path_factory: pytest.TempPathFactory, cuts: list[int], asked: int
+    track: AudioTrack, whole: HeardSounds, cuts: list[int], asked: int
 ) -> None:
-    walk = straight_walk(30.0, 0.3, track)
-    whole = detect_events(track, walked(walk), FakeEncoder(), PLAIN, tmp_path_factory.mktemp("clips"))
-    sounds = ears()
+    walk, sounds = straight_walk(30.0, 0.3, track), ears()
     for number, piece in enumerate(np.split(SAMPLES, sorted(cuts))):
         add(sounds, piece)
         if number == asked:

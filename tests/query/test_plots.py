@@ -28,7 +28,8 @@ def colours_in(path: Path) -> int:
 
 
 @pytest.mark.slow
-def test_a_product_has_a_panel_for_each_part_and_one_for_all(tmp_path: Path) -> None:
+def test_a_product_has_a_panel_for_each_part_and_one_for_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("avlmaps.query.plots._DPI", 50)  # a seventh of the pixels
     m = furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK))
     heat = m.object("chair", primary=True) * m.sound("dog")
     one, three = m.object("chair", primary=True).plot(), heat.plot()

@@ -21,8 +21,6 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
-from mcp.client.client import Client
-from mcp.client.stdio import StdioServerParameters, stdio_client
 
 from avlmaps.cli import main
 from avlmaps.serve.operations import OPERATIONS
@@ -60,6 +58,8 @@ def test_a_process_answers_programs_and_agents_and_finishes_what_runs(start: Sta
     assert url.startswith("http://127.0.0.1:")
     answer = httpx.get(f"{url}/maps/room/ask", params={"sentence": "the red thing"}).json()
     assert answer["goals"] and "server" not in httpx.get(f"{url}/maps").headers
+
+    from mcp.client.client import Client  # here, since its models take 1.4 s of each worker that collects this file
 
     async def agent(mode: str) -> Any:
         async with Client(f"{url}/mcp", mode=mode) as client:
@@ -120,6 +120,9 @@ def test_with_tls_files_it_speaks_https_and_nothing_else(start: Start, tmp_path:
 
 @pytest.mark.nightly
 def test_an_agent_is_served_by_standard_input_and_output(room: Path) -> None:
+    from mcp.client.client import Client
+    from mcp.client.stdio import StdioServerParameters, stdio_client
+
     async def conversation() -> Any:
         words = ["-m", "avlmaps", "serve", str(room), "--stdio"]
         parameters = StdioServerParameters(command=sys.executable, args=words, env=dict(os.environ))

@@ -16,6 +16,7 @@ def right() -> Draft:
     return RoomWalk("room", seed=61, frames=15).draft(TUM_CAMERA.resized(80, 60))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
 def test_a_right_draft_passes_and_a_mistake_is_found_in_every_format(form: Format, right: Draft) -> None:
     assert form.holds(right)
