@@ -19,7 +19,7 @@ from helpers.picture_room import CAMERA, Room, RoomWalk, looking, painting
 PHOTO_FROM = looking((2.9, 1.9, 1.3), (0.2, 0.4, 1.0))
 APART = np.eye(4)
 APART[:3, 3] = (-0.05, 0.01, 0.0)
-WALK = RoomWalk(frames=30)
+WALK = RoomWalk(frames=20)
 
 
 def rng() -> np.random.Generator:
