@@ -15,7 +15,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
 from avlmaps_sim.bench.harness.evidence import MARGIN_M, NEAR_M, Box, Event, Evidence, Photo, alone_near
 from avlmaps_sim.bench.harness.factors import WeakSounds, true_regions
-from avlmaps_sim.bench.harness.settings import TaskError
+from avlmaps_sim.bench.harness.settings import TaskError, save_versioned
 from avlmaps_sim.bench.harness.workplace import TrueVoxels
 from avlmaps_sim.bench.indexing.runs import (
     LIMITS_M,
@@ -27,10 +27,11 @@ from avlmaps_sim.bench.indexing.runs import (
     scored,
 )
 from avlmaps_sim.bench.indexing.scene_queries import QueriedScene
-from avlmaps_sim.bench.indexing.suite import tables
+from avlmaps_sim.bench.indexing.suite import open_tasks, score_others, tables
 from avlmaps_sim.bench.indexing.tasks import (
     Task,
     TaskKind,
+    TaskSet,
     area_tasks,
     near_sound_tasks,
     photo_tasks,
@@ -244,6 +245,21 @@ def test_recall_counts_answers_within_each_distance_and_no_answer_is_as_far_as_t
     assert score.mean_m == pytest.approx((0.0 + 0.4 + 0.9 + 1.2 + 12.0) / 5)
     assert (score.count, score.answered) == (5, 4)
     assert score.recall_interval(LIMITS_M[0])[0] < 0.4 < score.recall_interval(LIMITS_M[0])[1]
+
+
+def test_another_system_is_judged_by_saved_tasks_as_ours_is(tmp_path: Path):
+    tasks = tuple(
+        Task(f"t{x}", TaskKind.AREA, "s", "chair", "kitchen", (Box((x, 0, 0), (x + 1, 1, 1)),), 1) for x in (0, 9)
+    )
+    save_versioned(TaskSet(IndexingSettings().recorded, ("s",), tasks), tmp_path / "tasks.json")
+    read = open_tasks(tmp_path / "tasks.json")
+    (table,) = score_others(read, {"t0": (0.5, 1.2, 7.0)}).values()
+    chance, yours, _ = (dict(zip(table["columns"], row, strict=True)) for row in table["rows"])
+    assert (chance["R@1 < 0.5 m %"], yours["R@1 < 0.5 m %"], yours["answered %"]) == (50.0, 50.0, 50.0)
+    assert yours["mean m"] == pytest.approx((0.2 + np.hypot(10, 1)) / 2, abs=0.01)
+    for wrong in ({"t1": (0, 0, 0)}, {"t0": (float("nan"), 0, 0)}, {"t0": ()}):
+        with pytest.raises(TaskError):
+            score_others(read, wrong)
 
 
 # Truth.

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -91,6 +92,11 @@ class Photo:
 
     world_from_camera: Float[np.ndarray, "4 4"]
     share: Float[np.ndarray, " objects"]
+
+
+def photo_name(world_from_camera: Float[np.ndarray, "4 4"]) -> str:
+    """Return the name of the file that holds the photo taken from a pose."""
+    return f"{sha256(world_from_camera.round(9).tobytes()).hexdigest()[:12]}.png"
 
 
 def alone_near(distance_m: Sequence[float], near_m: float = NEAR_M, margin_m: float = MARGIN_M) -> int | None:

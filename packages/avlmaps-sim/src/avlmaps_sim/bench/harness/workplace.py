@@ -24,7 +24,7 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.modalities import read_picture
 from avlmaps.query.settings import Rules, build_settings, query_settings
 from avlmaps.recordings.types import Recording
-from avlmaps_sim.bench.harness.evidence import Event, Evidence, Photo
+from avlmaps_sim.bench.harness.evidence import Event, Evidence, Photo, photo_name
 from avlmaps_sim.bench.harness.own_recording import OwnRecording, is_recording
 from avlmaps_sim.bench.harness.settings import Recorded, SceneSettings, TaskError, models_of, unheard_folder
 from avlmaps_sim.free_space import STRUCTURE
@@ -290,8 +290,7 @@ class Workplace:
 
     def photo_file(self, world_from_camera: Float[np.ndarray, "4 4"]) -> Path:
         """Return the file of a photo taken from a pose, drawn if need be."""
-        named = sha256(world_from_camera.round(9).tobytes()).hexdigest()[:12]
-        path = self.job.folder / "photos" / f"{named}.png"
+        path = self.job.folder / "photos" / photo_name(world_from_camera)
         if not path.exists():
             import cv2
 

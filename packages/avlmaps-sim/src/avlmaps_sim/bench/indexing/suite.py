@@ -1,10 +1,11 @@
 """Tables III, IV and V as ``avlmaps bench indexing`` writes them, the paper's own figures beside ours."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps_sim.bench.harness.figures import (
@@ -20,6 +21,7 @@ from avlmaps_sim.bench.harness.figures import (
     wilson,
     write_answer,
 )
+from avlmaps_sim.bench.harness.settings import TaskError, load_versioned
 from avlmaps_sim.bench.indexing.runs import (
     LIMITS_M,
     OURS,
@@ -28,10 +30,12 @@ from avlmaps_sim.bench.indexing.runs import (
     Score,
     chance,
     configurations,
+    judged,
     run,
     scored,
 )
-from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
+from avlmaps_sim.bench.indexing.tasks import SCHEMA_VERSION, Task, TaskKind, TaskSet
+from avlmaps_sim.mesh import Triple
 
 TITLE = {
     TaskKind.AREA: "Table III: an object in an area",
@@ -60,8 +64,7 @@ def tables(outcome: Outcome) -> dict[str, dict[str, Any]]:
 
 def _table(outcome: Outcome, kind: TaskKind) -> dict[str, Any]:
     tasks = [task for task in outcome.tasks.tasks if task.kind is kind]
-    coin = ["chance: one of the candidates", len(tasks), _percent(chance(tasks))]
-    rows = [[*coin, *[""] * (len(columns()) - len(coin))]]
+    rows = [_chance(tasks)]
     for one in configurations(kind):
         answers = outcome.answers(kind, one.name)
         if answers:
@@ -73,6 +76,47 @@ def _table(outcome: Outcome, kind: TaskKind) -> dict[str, Any]:
     table = {"columns": columns(), "rows": [*rows, *_paper_rows(kind)]}
     chosen = chosen_on(outcome.tasks.scenes)
     return {**table, "chosen on": chosen} if chosen else table
+
+
+def open_tasks(path: Path) -> tuple[Task, ...]:
+    """Read what ``--save-tasks`` wrote. ``TaskError``: the file holds no tasks."""
+    return load_versioned(path, TaskSet, SCHEMA_VERSION).tasks
+
+
+def score_others(tasks: Sequence[Task], places: Mapping[str, Sequence[float]]) -> dict[str, dict[str, Any]]:
+    """Judge another system's answers by the rules of ours.
+
+    ``places`` are first goals by the task's name, metres, in the world of the recording; the height does not count.
+    A task that is left out is as wrong as its scene's targets lie apart. Returns a table of each kind of task.
+
+    Raises:
+        TaskError: a place belongs to no task, or is none.
+    """
+    if strange := sorted(places.keys() - {task.name for task in tasks}):
+        raise TaskError(f"{len(strange)} of {len(places)} answers belong to no task, such as {strange[0]!r}.")
+    if wrong := [name for name, at in places.items() if len(at) < 2 or not np.isfinite(at).all()]:
+        raise TaskError(f"The answer to {wrong[0]} is {places[wrong[0]]}; give x, y and z in metres.")
+    ends: dict[str, list[Sequence[float]]] = {task.scene: [] for task in tasks}
+    for task in tasks:
+        ends[task.scene] += [end[:2] for box in task.targets for end in (box.low, box.high)]
+    largest_m = {scene: float(np.linalg.norm(np.ptp(own, axis=0))) for scene, own in ends.items()}
+    made: dict[str, dict[str, Any]] = {}
+    for kind in dict.fromkeys(task.kind for task in tasks):
+        own = [task for task in tasks if task.kind is kind]
+        answers = [judged(task, "yours", _at(places.get(task.name)), largest_m[task.scene]) for task in own]
+        by_centre = _row("yours, by the centre", scored(answers, by_centre=True))
+        rows = [_chance(own), _row("yours", scored(answers)), by_centre]
+        made[TITLE[kind]] = {"columns": columns(), "rows": rows}
+    return made
+
+
+def _at(place: Sequence[float] | None) -> Triple | None:
+    return None if place is None else (place[0], place[1], 0.0)
+
+
+def _chance(tasks: Sequence[Task]) -> list[Any]:
+    coin = ["chance: one of the candidates", len(tasks), _percent(chance(tasks))]
+    return [*coin, *[""] * (len(columns()) - len(coin))]
 
 
 def _row(name: str, score: Score) -> list[Any]:

@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps_sim.bench.harness.evidence import Box, Evidence, Photo, alone_near, heard_places, shown_boxes
+from avlmaps_sim.bench.harness.evidence import Box, Evidence, Photo, alone_near, heard_places, photo_name, shown_boxes
 from avlmaps_sim.bench.harness.settings import Recorded
 from avlmaps_sim.mesh import Triple
 
@@ -78,6 +78,11 @@ class Task:
         if self.photo is None:
             raise ValueError(f"the task {self.name} has no photo")
         return np.array(self.photo, np.float64)
+
+    @property
+    def photo_name(self) -> str:
+        """The photo's file in the folder ``photos`` of the scene's work."""
+        return photo_name(self.world_from_photo)
 
     def off_m(self, position: Triple) -> float:
         """Return how far a place is from the nearest target, horizontally to its box."""
