@@ -60,7 +60,7 @@ class Navigation:
     language: Literal["learned", "rules", "chat", "none"] = "learned"
     """Translator of sentences into programs; rules is the former name of learned, none gives robots the programs."""
     guess: bool = True
-    """Send robots to the best guess where the map is not confident, as in the paper."""
+    """Let robots refuse what the map does not find; by default they drive to the best guess, as in the paper."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +70,7 @@ class Bench(ModelVerb):
     Example: avlmaps bench indexing --scenes house:1000000:held-out --out bench_out
 
     words: household phrases that were not trained on; needs nothing.
-    language: commands and questions that strangers wrote; needs nothing.
+    language: commands and questions written for this project before use; needs nothing.
     sounds, segmentation: need --sounds, a folder of clips with an index.csv.
     locate: needs --scenes, recordings with poses; half of the frames become the map, the others are located.
     frames: needs --nyuv2, labelled frames of NYU Depth V2 or of your own camera (docs/guides/train-eyes.md); kinds of
@@ -98,7 +98,7 @@ class Bench(ModelVerb):
     clips: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder of clips with an index.csv: queries each by name, dry and in simulated rooms (sounds)."""
     scenes: Annotated[tuple[str, ...], arg(metavar="SCENE ...")] = ()
-    """Recordings with poses (locate, recordings, live); names of scenes such as house:1000000:held-out (the others)."""
+    """Recordings with poses (locate, recordings, live); house:1000000:held-out, .glb, or with objects.json (others)."""
     nyuv2: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder of labelled frames (frames.csv, NAME.color.jpg, NAME.depth.png, NAME.label.png, camera.json)."""
     profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
@@ -122,7 +122,7 @@ class Bench(ModelVerb):
     kills: Annotated[int, arg(metavar="N")] = 40
     """How many live maps are killed at a random moment; those in --out are not repeated (live)."""
     ends: bool = True
-    """Whether a drive's end is compared with the build (live)."""
+    """Do not compare a drive's end with the build (live)."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
     """Options of the suites indexing, objects and navigation."""
     navigation: Annotated[Navigation, OmitArgPrefixes] = field(default_factory=Navigation)
