@@ -122,7 +122,7 @@ class Bench(ModelVerb):
     kills: Annotated[int, arg(metavar="N")] = 40
     """How many live maps are killed at a random moment; those in --out are not repeated (live)."""
     ends: bool = True
-    """Do not compare a drive's end with the build (live)."""
+    """Do not compare a drive's end with the build, nor drive as fast as the map takes it (live)."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
     """Options of the suites indexing, objects and navigation."""
     navigation: Annotated[Navigation, OmitArgPrefixes] = field(default_factory=Navigation)

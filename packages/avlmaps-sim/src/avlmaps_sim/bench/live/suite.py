@@ -138,7 +138,7 @@ class LiveBench:
     # How many processes are killed; those that a folder of work holds, of the same package, are not repeated.
     kills: int = 40
     rate: float = 1.0  # how many times faster than it was recorded a recording is driven
-    ends: bool = True  # whether its end is compared with the build
+    ends: bool = True  # whether its end is compared with the build, and it is also driven as fast as the map takes it
 
 
 def run_live(
@@ -198,7 +198,7 @@ def _pace_word(rate: float | None) -> str:
 
 
 def _paces(chosen: LiveBench) -> tuple[float | None, ...]:
-    return (chosen.rate, None) if chosen.laps else ()
+    return () if not chosen.laps else (chosen.rate, None) if chosen.ends else (chosen.rate,)
 
 
 def _table(columns: str, rows: _Rows) -> Table:
