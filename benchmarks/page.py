@@ -232,15 +232,15 @@ def page(measured: Mapping[str, Any], shipped: Mapping[str, str]) -> str:
         shipped: checksums of the weights that ship, by module.
     """
     lines = [INTRODUCTION]
-    for entry in ENTRIES:
-        found = measured.get(entry.name)
+    for entry in (one for one in ENTRIES if one.name in measured):
+        found = measured[entry.name]
         for number, figure in enumerate(entry.figures):
-            when = (
-                f"{weights_of(found, shipped, photos=figure.photos)}, {found['date']}{_homes(found)}" if found else "-"
-            )
-            command = "" if number else f"`{found['command'] if found else entry.command}`"
+            when = f"{weights_of(found, shipped, photos=figure.photos)}, {found['date']}{_homes(found)}"
+            command = "" if number else f"`{found['command']}`"
             lines.append(f"| {figure.label} | {shown(figure, found)} | {when} | {command} |")
-    return "\n".join([*lines, AFTER])
+    missing = [entry.name for entry in ENTRIES if entry.name not in measured]
+    told = [f"\nNot measured with these weights, so without a row: {', '.join(missing)}."] if missing else []
+    return "\n".join([*lines, *told, AFTER])
 
 
 def _homes(found: Mapping[str, Any]) -> str:
