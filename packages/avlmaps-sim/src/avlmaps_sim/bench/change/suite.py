@@ -159,7 +159,7 @@ def run_change(
     weights = settings.checked()
     todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
     work = partial(_home, days=days, open_spec=open_spec)
-    found = side_by_side(work, todo, settings.jobs, "change", lambda one: one.spec)
+    found = side_by_side(work, todo, settings.jobs, "change")
     tables = tables_of({way: [home[way] for home in found] for way in (TRUE, OURS)})
     answer = {
         "suite": "change",

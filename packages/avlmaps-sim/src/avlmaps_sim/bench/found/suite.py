@@ -38,9 +38,7 @@ def run_found(settings: IndexingSettings | None, out: Path) -> Any:
     weights = settings.checked()
     todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
     judge = partial(judged_job, most=settings.tasks_a_scene)
-    answers = [
-        one for scene in side_by_side(judge, todo, settings.jobs, "found", lambda one: one.spec) for one in scene
-    ]
+    answers = [one for scene in side_by_side(judge, todo, settings.jobs, "found") for one in scene]
     answer = {
         "suite": "found",
         **provenance(settings, settings.recorded, settings.scenes, weights),

@@ -18,7 +18,6 @@ def side_by_side(
     todo: Sequence[S],
     jobs: int,
     label: str,
-    name: Callable[[S], str],
     done: Callable[[], int] | None = None,
     total: int | None = None,
 ) -> list[T]:
@@ -32,7 +31,7 @@ def side_by_side(
         results: list[T] = []
         for one in todo:
             results.append(do(one))
-            say(f"{label}: {name(one)} is done, {len(results)} of {len(todo)}")
+            say(f"{label}: {len(results)} of {len(todo)} scenes are done")
         return results
     with fresh_processes(workers, _begin) as pool:
         futures = [pool.submit(do, one) for one in todo]

@@ -299,12 +299,8 @@ def run(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Scene
         _Todo(job, open_spec, tasks=tuple(task for task in tasks.tasks if task.scene == job.spec))
         for job in scene_jobs(settings, tasks.recorded, tasks.scenes, work)
     ]
-    scenes = side_by_side(_run_scene, todo, settings.jobs, "indexing", _named)
+    scenes = side_by_side(_run_scene, todo, settings.jobs, "indexing")
     return Outcome(settings, tasks, tuple(scenes), weights)
-
-
-def _named(todo: _Todo) -> str:
-    return todo.job.spec
 
 
 def _tasks(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Scene]) -> TaskSet:
@@ -312,7 +308,7 @@ def _tasks(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Sc
         return given
     jobs = scene_jobs(settings, settings.recorded, settings.scenes, work)
     todo = [_Todo(job, open_spec, settings.tasks_a_scene) for job in jobs]
-    made = side_by_side(_made, todo, settings.jobs, "mapping", _named)
+    made = side_by_side(_made, todo, settings.jobs, "mapping")
     own = tuple(
         task
         for kind in TaskKind

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from hashlib import sha256
 from math import ceil
 from pathlib import Path
@@ -122,7 +122,7 @@ class NavigationPlace:
             photos |= dict(zip([file.name for file in files], mission.world_from_photos, strict=True))
             names[mission.name] = tuple(f"./{file.name}" for file in files)
         label, seed = self.work.label, self.job.recorded.seed
-        hearing = _once(lambda: WeakHearing(avlmap, seed))
+        hearing = cache(lambda: WeakHearing(avlmap, seed))
         known = KnownScene(avlmap, self.work.truth, label, self.job.recorded.hearing, photos, hearing)
         return Pilot(
             known, self.floor, self._launch, translator, self.job.folder / "photos",
@@ -132,17 +132,6 @@ class NavigationPlace:
     def _launch(self, start: GroundPose) -> tuple[Driver, WatchedBody]:
         body = WatchedBody(SimulatedBody(self.building, start, BASE.radius_m), self._known)
         return MapDriver(self.obstacles, body), body
-
-
-def _once(make: Callable[[], WeakHearing]) -> Callable[[], WeakHearing]:
-    made: list[WeakHearing] = []
-
-    def given() -> WeakHearing:
-        if not made:
-            made.append(make())
-        return made[0]
-
-    return given
 
 
 _MAKING = 3  # raised when missions are made in another way
@@ -222,16 +211,12 @@ def run(settings: NavigationSettings, out: Path, open_spec: OpenSpec = open_scen
         for job in _jobs(settings, missions, out)
     ]
     total = sum(len(_pairs(one.missions)) for one in todo)
-    scenes = side_by_side(_sent, todo, settings.jobs, "navigation", _named, lambda: _count(todo), total)
+    scenes = side_by_side(_sent, todo, settings.jobs, "navigation", lambda: _count(todo), total)
     return Outcome(settings, missions, tuple(scenes), weights)
 
 
 def _jobs(settings: NavigationSettings, missions: MissionSet, out: Path) -> list[SceneJob]:
     return scene_jobs(settings, missions.recorded, missions.scenes, out / "work")
-
-
-def _named(todo: _Todo) -> str:
-    return todo.job.spec
 
 
 def _journal(settings: NavigationSettings, out: Path, job: SceneJob) -> Path:
@@ -260,7 +245,7 @@ def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> M
             return before
     empty = MissionSet(settings.recorded, settings.scenes, BASE.radius_m, (), asked)
     todo = [_Todo(job, settings, (), _journal(settings, out, job), open_spec) for job in _jobs(settings, empty, out)]
-    made = side_by_side(_made, todo, settings.jobs, "mapping", _named)
+    made = side_by_side(_made, todo, settings.jobs, "mapping")
     own = [
         mission
         for series in settings.series

@@ -237,7 +237,7 @@ def run_rooms(settings: IndexingSettings | None, out: Path) -> Any:
     settings = settings or IndexingSettings()
     weights = settings.checked()
     todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
-    found = side_by_side(_scene, todo, settings.jobs, "rooms", lambda one: one.spec)
+    found = side_by_side(_scene, todo, settings.jobs, "rooms")
     tables: dict[str, Table] = {}
     for name in TABLES:
         tables[name] = {"columns": _COLUMNS, "rows": [_row(WAY, [one[name] for one in found])]}

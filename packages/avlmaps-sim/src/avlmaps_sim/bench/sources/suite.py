@@ -177,9 +177,7 @@ def run_sources(settings: SourcesBench, out: Path, seed: int) -> dict[str, Table
     """Measure, and return the tables. ``AvlmapsError``: the measured room is not there."""
     room = None if settings.rooms is None else measured_room(settings.rooms, seed)
     todo = [HomeJob(spec, out / "work", seed, settings.sounds) for spec in settings.homes]
-    each = side_by_side(
-        partial(measure_home, open_spec=open_scene), todo, settings.jobs, "sources", lambda one: one.spec
-    )
+    each = side_by_side(partial(measure_home, open_spec=open_scene), todo, settings.jobs, "sources")
     homes = [outcome for own in each for outcome in own]
     tables: dict[str, Table] = {
         "homes": table_of_homes(homes), "regions": table_of_regions(homes),
