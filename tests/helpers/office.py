@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from avlmaps.maps.build import build_map
-from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.map_data import MapData, encoders_of_map
 from avlmaps.maps.types import Keyframes, Voxels
 from avlmaps.perception.embedded.pixels import features_of
 from avlmaps.recordings.open import open_recording
 from helpers.made_once import made_once
-from helpers.walked_room import write_walk
+from helpers.walked_room import shared_walk
 
 VOXEL_M = 0.1
 ROOM_M, HEIGHT_M = 4.0, 3.2
@@ -40,14 +40,14 @@ def names() -> list[str]:
 
 def office_of(factory: pytest.TempPathFactory) -> Path:
     """Return the map of the office, in a folder of the caller's own."""
-    return made_once(factory, "office", _write_office) / "office.avlmap"
+    return made_once(factory, "office", lambda folder: _write_office(folder, shared_walk(factory))) / "office.avlmap"
 
 
-def _write_office(folder: Path) -> None:
+def _write_office(folder: Path, walk: Path) -> None:
     """Build the map of a small room, and put the office's voxels and views in the place of its own."""
     path = folder / "office.avlmap"
-    recording = open_recording(write_walk(folder / "rec"))
-    stored = build_map(recording, path, "embedded", BuildSettings(VOXEL_M), progress=False)
+    few = BuildSettings(VOXEL_M, FrameSettings(step=3))
+    stored = build_map(open_recording(walk), path, "embedded", few, progress=False)
     encoders = encoders_of_map(stored.info)
     pixels: Any = encoders.pixels
     index, which = _voxels()
