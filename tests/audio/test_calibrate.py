@@ -81,7 +81,7 @@ def test_a_right_array_stays(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def straight(tmp_path_factory: pytest.TempPathFactory) -> tuple[AudioTrack, Trajectory]:
-    rng, true, walk = np.random.default_rng(5), microphones_named("square4"), curved_drive(12.0)
+    rng, true, walk = np.random.default_rng(5), microphones_named("square4"), curved_drive(9.0)
     poses = np.tile(walk.world_from_body[:1], (len(walk.stamps_s), 1, 1))
     poses[:, 0, 3] += 0.02 * walk.stamps_s
     drive = Trajectory(walk.stamps_s, poses)

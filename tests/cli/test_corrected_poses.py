@@ -17,7 +17,7 @@ from helpers.raycast import render
 from helpers.room import Room
 from helpers.walked_room import CAMERA
 
-BUILT = ("--profile", "colours", "--sensor", "none", "--voxel-size-m", "0.1")
+BUILT = ("--profile", "colours", "--sensor", "none", "--voxel-size-m", "0.1", "--frame-step", "2")
 
 
 @pytest.fixture(scope="module")

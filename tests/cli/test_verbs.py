@@ -174,7 +174,7 @@ def test_info_takes_the_options_by_which_build_reads_a_recording(walk: Path, ans
 
 def test_another_day_is_merged_and_its_changes_are_told(dated: Path, built: Path, tmp_path: Path, answer, run) -> None:
     today, home = tmp_path / "today.avlmap", tmp_path / "home.avlmap"
-    answer("build", dated, "--out", today, "--voxel-size-m", "0.1", "--profile", "colours")
+    answer("build", dated, "--out", today, "--voxel-size-m", "0.1", "--profile", "colours", "--frame-step", "2")
     made = answer("merge", built, today, "--out", home)
     assert made["path"] == str(home) and made["checks"]["agreeing"] >= 5
     np.testing.assert_allclose(made["map_from_recording"], np.eye(4), atol=0.05)
