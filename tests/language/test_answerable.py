@@ -129,9 +129,9 @@ def test_alternatives_may_have_prepositions_of_their_own(one: str, room: str) ->
 
 @given(st.sampled_from(["milk", "water", "coffee"]), ROOMS)
 def test_an_amount_is_no_number_of_things(stuff: str, room: str) -> None:
-    with pytest.raises(QueryError, match="how much"):
-        read_question(f"how much {stuff} is there in the {room}?")
-    assert is_refused(f"how much space is there in the {room}?")
+    for what in (stuff, "space"):
+        with pytest.raises(QueryError, match=f"how much {what}'"):
+            read_question(f"how much {what} is there in the {room}?")
     (chairs,) = read_question(f"how much chairs are there in the {room}?").inquiry.of
     assert chairs.name == "chairs"
 

@@ -180,6 +180,7 @@ def test_the_two_ways_round_visit_the_same_corners_in_the_other_order() -> None:
     ahead, back = (command_to_program(f"circle the table {way}") for way in ("counterclockwise", "clockwise"))
     assert "outline[i * len(outline) // 8]" in ahead
     assert "outline[-(i * len(outline) // 8)]" in back
+    assert command_to_program("go clockwise around the table, then turn left").startswith(back)
 
 
 @pytest.mark.few(4)

@@ -2,7 +2,7 @@
 
 A few networks that differ in their first weights are fitted without the voices of the first fold; those voices are then
 read with the mean of the networks. That is what is measured, and what the limits of the decision are chosen on. With
-`--more` each network is then fitted a little more, with all voices.
+`--more` each network is then fitted a little more, with all voices. With `--start` the networks that ship are fitted.
 """
 
 import argparse
@@ -19,6 +19,7 @@ from training.language.fit import fitted
 from training.language.leave_out import FOLDS, Heard, chosen, halves, read_voices, table
 from training.language.network import Network
 from training.language.pool import Pool, build, vocabulary, without
+from training.language.unfold import unfolded
 
 from avlmaps.language.learned.reader import LearnedReader
 
@@ -39,10 +40,12 @@ def main() -> None:
     parser.add_argument(
         "--folds", type=int, default=1, help="measure on this many folds of voices (default: %(default)s)"
     )
+    parser.add_argument("--start", action="store_true", help="fit the networks that ship further, more gently")
     given = parser.parse_args()
     pool = build(given.variants, given.made, given.seed)
     seeds = range(given.seed, given.seed + given.networks)
-    fits = [_left_out(pool, voices, given.minutes, seeds, given.processes) for voices in FOLDS[: given.folds]]
+    begun = unfolded(_WEIGHTS) if given.start else None
+    fits = [_left_out(pool, voices, given.minutes, seeds, given.processes, begun) for voices in FOLDS[: given.folds]]
     rows = [row for _, _, each in fits for row in each]
     limits = chosen(rows)
     for number, (_, _, own) in enumerate(fits):
@@ -60,14 +63,23 @@ def main() -> None:
 
 
 def _left_out(
-    pool: Pool, voices: frozenset[str], minutes: float, seeds: Sequence[int], processes: int
+    pool: Pool,
+    voices: frozenset[str],
+    minutes: float,
+    seeds: Sequence[int],
+    processes: int,
+    begun: tuple[list[Network], dict[str, int]] | None = None,
 ) -> tuple[list[Network], dict[str, int], list[Heard]]:
     """Return networks fitted without some voices, their vocabulary, and what they read in those voices."""
     rest = without(pool, voices)
-    words = vocabulary(rest)
+    starts, words = begun or ([None] * len(seeds), vocabulary(rest))
     note = f"without {len(voices)} voices"
     networks = _at_once(
-        [partial(fitted, rest, words, minutes, seed, note=f"{note}, {seed}") for seed in seeds], processes
+        [
+            partial(fitted, rest, words, minutes, seed, start=start, note=f"{note}, {seed}")
+            for seed, start in zip(seeds, starts, strict=True)
+        ],
+        processes,
     )
     with TemporaryDirectory() as folder:
         write(networks, words, Path(folder), {})

@@ -4,7 +4,9 @@ Writers seldom write what is plain. A reader that has seen few plain lists of go
 """
 
 import random
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 
 from training.language.augment import Names
 from training.language.rows import Example
@@ -23,6 +25,8 @@ from avlmaps.language.intents import (
     Intent,
     Move,
     Pick,
+    RefusalReason,
+    Refuse,
     Return,
     Side,
     StopAt,
@@ -50,15 +54,19 @@ _PARTS = ("leg", "door", "handle", "top", "corner", "edge", "drawer", "end", "fo
 _ORDINALS = {2: ("second", "2nd"), 3: ("third", "3rd"), 4: ("fourth", "4th"), 5: ("fifth", "5th"), 6: ("sixth",)}
 _CLOSEST = {Pick.NEAREST: ("nearest", "closest"), Pick.FARTHEST: ("farthest", "furthest")}
 _ENDS = (Pick.LEFT, Pick.RIGHT, Pick.NORTH, Pick.SOUTH, Pick.EAST, Pick.WEST)
-_HAS = ("if there is {a}", "if there's {a}", "if you have {a} on your map", "if you know of {a}", "should there be {a}",
-        "if the map has {a}", "in case there is {a}", "provided there is {a}", "if you can find {a}",
-        "assuming there is {a}", "if {a} is there", "when there is {a}")  # fmt: skip
-_UNLESS = ("unless there is {a}", "unless there's {a}", "if there is no {b}", "if there isn't {a}",
-           "if you have no {b}", "if you don't know {a}", "failing {a}", "unless you find {a}")  # fmt: skip
-_ELSE = (", otherwise ", ", or else ", ", else ", "; if not, ", ". If not, ", ", failing that ", ". Otherwise ",
-         " otherwise ", " and if not ", ", if there is none ", ", in any other case ")  # fmt: skip
 _SPELLED = {2: "two", 3: "three", 4: "four", 5: "five", 10: "ten", 15: "fifteen", 20: "twenty", 30: "thirty"}
 _SALAD = 0.05
+_SAID = tomllib.loads(Path(__file__).with_name("plain.toml").read_text(encoding="utf-8"))
+_FILLED = {
+    "what": ("what is", "what's", "which is", "whats"), "whats": ("what is", "what's", "whats", "what things are"),
+    "next": ("next to", "beside", "near", "close to", "by", "around", "on", "nearby"),
+    "large": ("biggest", "largest"), "early": ("first", "earliest"),
+}  # fmt: skip
+_OPPOSITE = {
+    Ask.SMALLEST_ROOM: (Ask.LARGEST_ROOM, "large", ("smallest", "tiniest")),
+    Ask.LAST_SOUND: (Ask.FIRST_SOUND, "early", ("last", "latest", "most recent")),
+}
+_ALL = {"rooms": ("rooms", "areas"), "sounds": ("sounds", "noises", "sound events"), "things": ("things", "objects")}
 
 
 def plain(count: int, names: Names, draw: random.Random) -> list[Example]:
@@ -81,7 +89,7 @@ class _Maker:
         count = self.draw.choices((1, 2, 3, 4, 5, 6), (3, 4, 4, 3, 2, 1))[0]
         if self.draw.random() < 0.3:
             return self._list(max(2, count))
-        if self.draw.random() < 0.1:
+        if self.draw.random() < 0.25:
             return self._condition()
         said, meant = zip(*(self._order() for _ in range(count)), strict=True)
         joint = self.draw.choice(_THEN) if self.draw.random() < 0.5 else None
@@ -93,6 +101,8 @@ class _Maker:
         return self._example(text, tuple(meant))
 
     def question(self) -> Example:
+        if self.draw.random() < 0.35:
+            return self._listed()
         said, target = self._place()
         one = said.removeprefix("the ")
         plural = target.kind is TargetKind.OBJECT
@@ -139,6 +149,9 @@ class _Maker:
             (one, first), (other, second) = places
             joint = self.draw.choice((" and ", f" and {near} ", f", {near} ", f" {near} "))
             return self._of_files(f"{said} {near} {one}{joint}{other}", target.with_near(first, second), image, clip)
+        if (image or lacks) and not clip and self.draw.random() < 0.25:
+            text = self.draw.choice(_SAID["questions"]["photo"]) + self.draw.choice(("", "?"))
+            return Example(text, None if lacks else Inquiry(Ask.ROOM_OF, (photo,)), True, VOICE, image, clip)
         place, meant = self.draw.choice((
             (f"where {this_photo} was taken", photo), (f"the place in {this_photo}", photo),
             (f"{said} {near} {this_photo}", target.with_near(photo)),
@@ -177,44 +190,133 @@ class _Maker:
             text = self.draw.choice(("first ", "First ", "please ")) + text
         return self._example(text, tuple(Go(target) for _, target in parts))
 
+    def _listed(self) -> Example:
+        """Return a question that the lists of a map answer, or none."""
+        ask = self.draw.choice([None, *(ask for ask in Ask if ask.is_listed)])
+        name = str(ask).removeprefix("count_")
+        written, filled = ask, {key: self.draw.choice(words) for key, words in _FILLED.items()}
+        if ask is not None and ask in _OPPOSITE and (ask not in _SAID["questions"] or self.draw.random() < 0.7):
+            written, key, words = _OPPOSITE[ask]
+            filled[key] = self.draw.choice(words)
+        elif name in _ALL:
+            written = Ask.ROOMS if ask == name else Ask.COUNT_ROOMS
+            filled |= {"all": self.draw.choice(_ALL[name]), "each": name.removesuffix("s")}
+        (room, area), (thing, object_) = self._of(TargetKind.AREA), self._of(TargetKind.OBJECT)
+        if ask is Ask.ROOM_OF and self.draw.random() < 0.3:
+            thing, object_ = self._of(TargetKind.SOUND)
+        of = () if ask is None or ask.of_map else (area if ask is Ask.CONTENTS else object_,)
+        text = self.draw.choice(_SAID["questions"][written or "refuse"])
+        if "{all}" in text and "hear" in text and name != "sounds":
+            return self._listed()
+        text = self.draw.choice(_SAID["questions"]["polite"]) + text.format(**filled, room=room, thing=thing)
+        text += self.draw.choice(("", "", "?", " ?", "."))
+        return Example(text, None if ask is None else Inquiry(ask, of), True, VOICE)
+
     def _condition(self) -> Example:
-        """Return a command whose steps depend on whether the map has a thing."""
-        name = self._of(TargetKind.OBJECT)[1].name
-        thing = Target(TargetKind.OBJECT, name)
-        a = f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
-        (do, meant), (other, instead) = self._order(), self._order()
-        if self.draw.random() < 0.5:
-            do, meant = f"{self.draw.choice(_GO)} {self.draw.choice(('it', 'that', f'the {name}'))}", Go(thing)
-        if self.draw.random() < 0.3:
-            has, does = self.draw.choice(_UNLESS).format(a=a, b=name), If(thing, (), (instead,))
-            return self._example(self.draw.choice((f"{has}, {other}", f"{other} {has}")), (does,))
-        has, joint = self.draw.choice(_HAS).format(a=a), self.draw.choice((", ", ", then ", " "))
-        if self.draw.random() < 0.4:
-            return self._example(self.draw.choice((f"{has}{joint}{do}", f"{do} {has}")), (If(thing, (meant,), ()),))
-        text = self.draw.choice((f"{has}{joint}{do}", f"{do} {has}")) + self.draw.choice(_ELSE) + other
-        return self._example(text, (If(thing, (meant,), (instead,)),))
+        """Return a command whose steps depend on whether the map has a thing, or on what no map says."""
+        thing, words = self._sought()
+        (do, meant), (other, instead), said = self._steps(), self._steps(), _SAID["conditions"]
+        if self.draw.random() < 0.15:
+            has = self.draw.choice(said["cannot"]).format(b=thing.name, room=self._of(TargetKind.AREA)[0])
+            text = self.draw.choice((f"{has}, {do}", f"{has} {do}", f"{do} {has}", f"{has} {do}, otherwise {other}"))
+            return self._example(text, (Refuse(RefusalReason.CONDITION),))
+        own, placed = self.draw.random() < 0.6, words["where"] and self.draw.random() < 0.4
+        if own:
+            do, one = self._with(thing, self.draw.choice(said["one"]).format(b=thing.name))
+            meant = (one,)
+        drawn, joint = self.draw.random(), self.draw.choice((", ", ", then ", " ", ", ", " then "))
+        if drawn < 0.25:
+            has = self.draw.choice(said["misplaced" if placed else "unless"]).format(**words)
+            does = If(thing, (), instead)
+            text = self.draw.choice((f"{has}{joint}{other}", f"{has}, {other}", f"{other} {has}"))
+            if own and self.draw.random() < 0.3:
+                joints = [one for one in said["else"] if "else" in one or "otherwise" in one.lower()]
+                text, does = f"{has}{joint}{other}{self.draw.choice(joints)}{do}", If(thing, meant, instead)
+            return self._behind_another(text, does)
+        if drawn < 0.4:
+            text = self.draw.choice(said["asks"]).format(do=do, **words)
+        elif drawn < 0.55:
+            do, one = self._with(thing, f"the {words['b']}")
+            text, meant = self.draw.choice(said["behind"]).format(do=do), (one,)
+        else:
+            has = self.draw.choice(said["placed" if placed else "has"]).format(**words)
+            text = f"{has}{joint}{do}" if own or self.draw.random() < 0.6 else f"{do} {has}"
+        if self.draw.random() < 0.6:
+            return self._behind_another(text + self.draw.choice(said["else"]) + other, If(thing, meant, instead))
+        return self._behind_another(text + self.draw.choice(("", "", "", *said["nothing"])), If(thing, meant))
+
+    def _sought(self) -> tuple[Target, dict[str, str]]:
+        """Return a thing or a room that a map may have, and its words: with an article, without, and several."""
+        kind = self.draw.choice((TargetKind.OBJECT, TargetKind.OBJECT, TargetKind.OBJECT, TargetKind.AREA))
+        name, place = self._of(kind)[1].name, ""
+        thing = Target(kind, name)
+        if kind is TargetKind.OBJECT and self.draw.random() < 0.4:
+            near, other = self._of(self.draw.choice((TargetKind.OBJECT, TargetKind.AREA, TargetKind.AREA)))
+            place = f" {'in' if other.kind is TargetKind.AREA else self.draw.choice(_NEAR)} {near}"
+            thing = thing.with_near(other)
+        article = "an" if name[0] in "aeiou" else "a"
+        return thing, {
+            "a": f"{article} {name}{place}", "b": f"{name}{place}", "things": f"{plural_of(name)}{place}", "name": name,
+            "where": place.strip(),
+        }  # fmt: skip
+
+    def _with(self, thing: Target, said: str) -> tuple[str, Intent]:
+        """Return an order about a thing that is said by a pronoun or its name."""
+        if said == "there" or self.draw.random() < 0.6:
+            verb = self.draw.choice(_GO)
+            return f"{verb.removesuffix(' to')} there" if said == "there" else f"{verb} {said}", Go(thing)
+        amount, metres = self._metres()
+        return self.draw.choice((
+            (f"face {said}", Face(thing)), (f"look at {said}", Face(thing)), (f"circle {said}", Circle(thing)),
+            (f"drive around {said}", Circle(thing)), (f"stop {amount} from {said}", StopAt(thing, metres)),
+            (f"approach {said} to within {amount}", StopAt(thing, metres)),
+            (f"go halfway to {said}", Between((Target(TargetKind.HERE), thing))),
+            (f"go {amount} behind {said}", Beside(thing, Side.BEHIND, metres)),
+        ))  # fmt: skip
+
+    def _behind_another(self, text: str, does: Intent) -> Example:
+        if self.draw.random() < 0.8:
+            return self._example(text, (does,))
+        first, before = self._go()
+        return self._example(f"{first}{self.draw.choice(_THEN)}{text}", (before, does))
+
+    def _steps(self) -> tuple[str, tuple[Intent, ...]]:
+        """Return one order, or two."""
+        orders = [self._order() for _ in range(self.draw.choice((1, 1, 1, 2)))]
+        joint = self.draw.choice((" and ", " and then ", ", then "))
+        return joint.join(said for said, _ in orders), tuple(meant for _, meant in orders)
 
     def _counted(self) -> tuple[str, Target]:
         """Return a thing that is counted from an end of its row, or from the nearest."""
         name = self._of(TargetKind.OBJECT)[1].name
         number = self.draw.choice((1, 2, 2, 2, 3, 3, 4, 5, 6))
         nth = "" if number == 1 else self.draw.choice(_ORDINALS[number])
+        near, place = (), ""
+        if self.draw.random() < 0.25:
+            where, area = self._of(TargetKind.AREA)
+            near, place = (area,), f" in {where}"
         if self.draw.random() < 0.4 and number > 1:
             pick = self.draw.choice(list(_CLOSEST))
             order = self.draw.choice(_CLOSEST[pick])
-            said = self.draw.choice((f"the {nth} {order} {name}", f"the {nth}-{order} {name}"))
-            return said, Target(TargetKind.OBJECT, name, (), pick, number)
+            said = self.draw.choice((f"the {nth} {order} {name}", f"the {nth}-{order} {name}", f"{nth} {order} {name}"))
+            return said + place, Target(TargetKind.OBJECT, name, near, pick, number)
         pick = self.draw.choice(_ENDS)
-        end = self.draw.choice((f"the {pick}", f"the {pick}", f"the {pick} end", f"{pick}"))
+        end = self.draw.choice((f"the {pick}", f"the {pick}", f"the {pick} end", f"{pick}", f"the {pick} side"))
         if number == 1:
             most = f"{pick}most" if pick in (Pick.LEFT, Pick.RIGHT) else f"{pick}ernmost"
-            said = self.draw.choice((f"the {most} {name}", f"the first {name} from {end}", f"the {name} at {end}"))
+            far = self.draw.choice(("furthest", "farthest", "most"))
+            said = self.draw.choice((
+                f"the {most} {name}", f"the {most} {name}", f"the first {name} from {end}", f"the {name} at {end}",
+                f"the {name} {far} to the {pick}", f"the {name} that is {far} to the {pick}",
+                f"the {name} {far} {pick}", f"the {pick} one of the two {plural_of(name)}",
+                f"the {name} that is the {far} to the {pick}",
+            ))  # fmt: skip
         else:
             said = self.draw.choice((
                 f"the {nth} {name} from {end}", f"{nth} {name} from {end}", f"the {name} that is {nth} from {end}",
                 f"the {nth} {name}, counting from {end}", f"the {name}, {nth} from {end}",
             ))  # fmt: skip
-        return said, Target(TargetKind.OBJECT, name, (), pick, number)
+        return said + place, Target(TargetKind.OBJECT, name, near, pick, number)
 
     def _order(self) -> tuple[str, Intent]:
         orders: tuple[Callable[[], tuple[str, Intent]], ...] = (
@@ -224,7 +326,7 @@ class _Maker:
         return self.draw.choice(orders)()
 
     def _go(self) -> tuple[str, Intent]:
-        said, target = self._place() if self.draw.random() < 0.9 else self._counted()
+        said, target = self._place() if self.draw.random() < 0.85 else self._counted()
         if self.draw.random() < 0.08:
             return self.draw.choice((("come back", Return()), ("return to the start", Return())))
         if self.draw.random() < 0.06 and target.kind is TargetKind.OBJECT and not target.near:
@@ -290,7 +392,7 @@ class _Maker:
         return f"{self.draw.choice(('stop', 'stand', 'stay'))} {amount} from {said}", StopAt(target, metres)
 
     def _circle(self) -> tuple[str, Intent]:
-        said, target = self._of(TargetKind.OBJECT)
+        said, target = self._of(TargetKind.OBJECT) if self.draw.random() < 0.85 else self._counted()
         return f"{self.draw.choice(('circle', 'drive around', 'go around', 'go round'))} {said}", Circle(target)
 
     def _wait(self) -> tuple[str, Intent]:

@@ -12,11 +12,11 @@ from training.language.augment import joinable, names_of, variant, with_manners
 from training.language.plain import plain
 from training.language.rows import Example, examples_of, lists
 
-from avlmaps.language.intents import Clarify, RefusalReason, Refuse
+from avlmaps.language.intents import Clarify
 from avlmaps.language.learned.english import WIDTH
 from avlmaps.language.learned.features import features, seen_as
 from avlmaps.language.learned.linear import INDEX, SYMBOLS
-from avlmaps.language.sentence import Sentence, chosen_things, forms
+from avlmaps.language.sentence import Sentence
 from avlmaps.language.verbalise import strange_word
 
 _MOST_TOKENS = 70
@@ -106,19 +106,7 @@ class _Words:
 def collected() -> list[Example]:
     """Return every row, each with what it means most likely."""
     found = [one for paths in lists().values() for path in paths for one in examples_of(path) if one.row]
-    return [one for one in found if not _names_nonsense(one) and not _is_contradicted(one)]
-
-
-def _is_contradicted(example: Example) -> bool:
-    """Return whether rows of `rewrites.toml` give a meaning to a sentence that its list, which is older, refuses."""
-    first = example.meaning[0] if isinstance(example.meaning, tuple) and example.meaning else None
-    if not isinstance(first, Clarify) and first != Refuse(RefusalReason.CONDITION):
-        return False
-    tokens = Sentence(example.say).tokens
-    said = " ".join(token.text for token in tokens)
-    delayed = tokens[:1] and tokens[0].text == "wait" and not example.say.lower().startswith("wait")
-    depends = any(says.fullmatch(said) for says, _ in forms("condition", said))
-    return bool(delayed or depends or any(chosen_things(said)))
+    return [one for one in found if not _names_nonsense(one)]
 
 
 def _names_nonsense(example: Example) -> bool:

@@ -17,7 +17,7 @@ from avlmaps.language import intents as act
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import describes, is_entry, sounding_words, sounds_like
-from avlmaps.language.word_classes import filled, listed, pattern_of, table, word_list
+from avlmaps.language.word_classes import filled, listed, load_word_classes, pattern_of, table, word_list
 
 _ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
 _MARKS = {act.TargetKind.AREA: "@", act.TargetKind.SOUND: "$"}
@@ -26,6 +26,7 @@ _HEARD = frozenset({"hear", "heard", "hearing", "sound", "noise"})
 _WAYS = dict.fromkeys(("clockwise", "cw"), act.TurnSense.CLOCKWISE) | dict.fromkeys(
     ("counterclockwise", "anticlockwise", "ccw"), act.TurnSense.COUNTERCLOCKWISE
 )
+_ENDS = frozenset(act.Pick(side) for side in ("left", "right", "north", "south", "east", "west"))
 _VAGUE = frozenset({"a", "an", "one", "another"})
 _AMOUNTS = {
     "clock": lexer.clock_at, "m": lexer.length_at, "deg": lexer.angle_at, "s": lexer.duration_at, "n": lexer.number_at,
@@ -168,6 +169,12 @@ def unmet_by(tokens: Sequence[Token], inquiry: act.Inquiry, used: frozenset[int]
     return None if found is None else getattr(found, "question", "A map cannot answer this.")
 
 
+def unanswered(tokens: Sequence[Token]) -> str | None:
+    """Return why a map cannot answer a question that no reading makes good, where its words show that."""
+    found = _first("unanswered", _Marked(tokens, None, {}), frozenset())
+    return None if found is None else getattr(found, "question", None)
+
+
 def lacking(tokens: Sequence[Token], named: frozenset[int]) -> act.Clarify:
     """Return the question for what an unclear command lacks; ``named`` are the words of known names."""
     found = _first("unclear", _Marked(tokens, named, {}), frozenset())
@@ -177,10 +184,9 @@ def lacking(tokens: Sequence[Token], named: frozenset[int]) -> act.Clarify:
 
 def in_direction(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tuple[act.Intent, ...] | act.Clarify:
     """Return intents whose circles run in the direction that is said, or the question which one is meant."""
-    ways = [_WAYS[token.text] for token in tokens if token.text in _WAYS]
-    steps = act.steps_of(intents)
-    circles = sum(isinstance(step, act.Circle) for step in steps)
-    if not circles or not ways or any(isinstance(step, act.Turn) for step in steps):
+    ways = [_WAYS[token.text] for at, token in enumerate(tokens) if token.text in _WAYS and not _turns(tokens, at)]
+    circles = sum(isinstance(step, act.Circle) for step in act.steps_of(intents))
+    if not circles or not ways:
         return tuple(intents)
     if len(ways) != circles:
         return act.Clarify("Which way round? Say it for each: go clockwise around the table.")
@@ -191,6 +197,15 @@ def in_direction(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tupl
         return replace(intent, way=next(left)) if isinstance(intent, act.Circle) else intent
 
     return tuple(map(turned, intents))
+
+
+def _turns(tokens: Sequence[Token], at: int) -> bool:
+    """Return whether the words round a direction are of a turn: "turn 90 degrees clockwise"."""
+    cuts = [number for number, token in enumerate(tokens) if token.kind == "punct" or token.text in ("then", "and")]
+    start = max((cut for cut in cuts if cut < at), default=-1)
+    clause = list(tokens[start + 1 : min((cut for cut in cuts if cut > at), default=len(tokens))])
+    turns = load_word_classes().words["TURN_HERE"]
+    return any(token.text in turns or lexer.angle_at(clause, number) for number, token in enumerate(clause))
 
 
 def _sounds(name: str) -> bool:
@@ -210,6 +225,8 @@ def _facts_of_targets(targets: Sequence[act.Target]) -> Iterator[str]:
             yield str(target.pick)
         if target.number > 1:
             yield "number"
+        if target.pick in _ENDS:
+            yield "end"
         if target.near:
             yield from ("near", "room near") if target.kind is act.TargetKind.AREA else ("near",)
         if target.kind is act.TargetKind.SOUND:

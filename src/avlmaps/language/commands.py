@@ -4,26 +4,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from avlmaps.core.errors import LanguageError, QueryError
+from avlmaps.core.errors import LanguageError
 from avlmaps.language import intents as act
-from avlmaps.language.claims import claimed_words, forbidden, is_alive
+from avlmaps.language.claims import claimed_words, forbidden
 from avlmaps.language.gate import NoOrder, no_order
 from avlmaps.language.learned.decision import EXAMPLE, NameResolver, Weighed, decided, refusal_of, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
-from avlmaps.language.names import is_entry
-from avlmaps.language.questions import read_question
 from avlmaps.language.said_places import SaidStorey, changes_storey, said_storeys
-from avlmaps.language.sentence import (
-    ASK,
-    Attachments,
-    Sentence,
-    StandIns,
-    any_one,
-    forms,
-    language_of,
-    stand_ins,
-)
+from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, any_one, language_of, stand_ins
 from avlmaps.language.verbalise import verbalise
 from avlmaps.language.word_classes import load_word_classes
 
@@ -64,68 +53,14 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
     Raises LanguageError where it is empty or too long.
     """
     _check_length(text)
-    branched = _branched(text, given)
-    if branched is not None:
-        return branched
     read = _read(text, given)
     stop = read.stops
-    if is_stop(tokenise(text)) or isinstance(stop, act.Clarify):
-        return read
-    closed = no_order(text)
-    if closed is None or (stop is not None and (closed.is_unsure or stop.reason is act.RefusalReason.HARM)):
+    closed = None if is_stop(tokenise(text)) else no_order(text)
+    if closed is None or (stop is not None and (closed.is_unsure or _harms(stop))):
         return read
     refused = act.Refuse(act.RefusalReason.UNKNOWN, _not_ordered(closed))
     answer = _asked(closed, read.intents) if stop is None else refused
     return replace(read, intents=(answer,), why="gate")
-
-
-def _branched(text: str, given: Attachments | None) -> Command | None:
-    """Return a command whose steps depend on whether the map has a thing; None for any other."""
-    said = " ".join(token.text for token in tokenise(text))
-    found = next(filter(None, (says.fullmatch(said) for says, _ in forms("condition", said))), None)
-    parts = {} if found is None else found.groupdict()
-    what = re.sub(r" (?:is|are|'s)(?: not| n't)? ", " ", parts.get("what") or "")
-    thing = _thing(what, given) if what else None
-    if found is None or (what and (thing is None or is_entry(f"{what} {parts['then'].split()[0]}"))):
-        return None
-    clauses = (_named(parts[name], what) if parts.get(name) else "" for name in ("before", "then", "otherwise"))
-    reads = [read_command(clause, given) if clause else Command((), (), (), "words") for clause in clauses]
-    notes = tuple(dict.fromkeys(note for read in reads for note in read.notes))
-    stopped = next((read for read in reads if read.intents and read.stops is not None), None)
-    if stopped is not None:
-        return replace(stopped, notes=notes)
-    before, then, otherwise = (read.intents for read in reads)
-    if thing is None:  # "go to the piano if there is one"
-        thing = next(
-            (one for step in then for one in act.targets_of(step) if one.kind is not act.TargetKind.HERE), None
-        )
-    if thing is None:
-        return None
-    if bool(parts.get("none")) != bool(parts.get("unless")):
-        then, otherwise = otherwise, then
-    return Command((*before, act.If(replace(thing, pick=act.Pick.ANY), then, otherwise)), notes, (), "words")
-
-
-def _thing(what: str, given: Attachments | None) -> act.Target | None:
-    """Return the thing or room that a condition is about; None for what no map holds, such as a person."""
-    try:
-        inquiry = read_question(f"is there a {what}", given).inquiry
-    except QueryError:
-        return None
-    if inquiry.ask.of_map:
-        return None
-    thing = inquiry.of[0]
-    is_thing = thing.kind in (act.TargetKind.OBJECT, act.TargetKind.AREA) and what.startswith(thing.name)
-    alone = inquiry.ask is act.Ask.EXISTS and len(inquiry.of) == 1 and not is_alive(thing.name)
-    return thing if is_thing and alone else None
-
-
-def _named(clause: str, what: str) -> str:
-    """Return the steps of a condition with its thing in the place of "it", "one" and "there"."""
-    if not what:
-        return clause
-    named = re.sub(r"\b(?:it|her(?! [a-z])|them|one of them|that one|one)\b", f"a {what}", clause)
-    return re.sub(r"^((?:go|drive|move|head|run|come) (?:over |straight )?)(?:to )?there\b", rf"\1to a {what}", named)
 
 
 def is_stop(tokens: Sequence[Token]) -> bool:
@@ -139,12 +74,15 @@ def check_order(text: str) -> None:
     """Raise an UnclearError for what is no order, or a danger, before a language model may write for it."""
     read = read_command(text)
     stop = read.stops
-    harms = isinstance(stop, act.Refuse) and stop.reason is act.RefusalReason.HARM
-    if stop is not None and (harms or read.why == "gate"):
+    if stop is not None and (_harms(stop) or read.why == "gate"):
         raise UnclearError(verbalise((stop,)), getattr(stop, "choices", ()))
     closed = None if stop is None else no_order(text)  # the reader refuses it too, perhaps for another reason
     if closed is not None:
         raise UnclearError(_not_ordered(closed))
+
+
+def _harms(stop: act.Refuse | act.Clarify) -> bool:
+    return isinstance(stop, act.Refuse) and stop.reason is act.RefusalReason.HARM
 
 
 def _not_ordered(closed: NoOrder) -> str:
@@ -152,12 +90,12 @@ def _not_ordered(closed: NoOrder) -> str:
 
 
 def _asked(closed: NoOrder, intents: Sequence[act.Intent]) -> act.Clarify:
-    order = verbalise(intents).removeprefix("I will ").rstrip(".")
-    return act.Clarify(f"{closed.answer} Shall I {order}?", (order,), (tuple(intents),))
+    order = verbalise(intents).removeprefix("I will").rstrip(".")
+    return act.Clarify(f"{closed.answer} Shall I{order}?", (order.lstrip(", "),), (tuple(intents),))
 
 
 def _read(text: str, given: Attachments | None) -> Command:
-    stand = stand_ins(text, () if given is None else given.own, orders=True)
+    stand = stand_ins(text, () if given is None else given.own)
     if stand.own:
         read = _read(stand.text, replace(given or Attachments(), own=()))
         intents = tuple(_back(act.on_targets(one, stand.target), stand) for one in read.intents)

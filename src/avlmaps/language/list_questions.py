@@ -1,7 +1,6 @@
 """Questions that a map answers from its lists rather than by heat: rooms by size, sounds by time, what is where.
 
-They are few and plain, so that rows of `list_questions.toml` read them; a sentence that fits none is left to the
-networks. Nothing here knows a map.
+The networks read those for which they have symbols, rows of `list_questions.toml` the others. Nothing here knows a map.
 """
 
 import re
@@ -16,6 +15,7 @@ from avlmaps.language.intents import Ask, Inquiry, TargetKind
 from avlmaps.language.lexer import without_spoken_end
 from avlmaps.language.names import mended, sounding_words
 from avlmaps.language.sentence import OwnName, stand_ins
+from avlmaps.language.verbalise import phrase
 from avlmaps.language.word_classes import filled, pattern, table, words_of
 
 NUMBERS = {
@@ -84,16 +84,12 @@ def list_question(inquiry: Inquiry) -> ListQuestion | None:
     about = inquiry.of[0]
     if about.kind is TargetKind.IMAGE and inquiry.ask is Ask.ROOM_OF:
         return replace(listed, name="this photo")
-    if about.is_file or about.near or len(inquiry.of) > 1:
+    if about.is_file or len(inquiry.of) > 1:
         return None
-    return replace(listed, name=f"sound of {about.name}" if about.kind is TargetKind.SOUND else about.name)
+    return replace(listed, name=f"sound of {about.name}" if about.kind is TargetKind.SOUND else phrase(about)[4:])
 
 
 _TABLE = "list_questions"
-_SAME = {
-    "noises": "sounds", "sound": "sounds", "acoustic": "sounds", "audio": "sounds", "auditory": "sounds",
-    "objects": "things", "regions": "rooms", "areas": "rooms", "zones": "rooms", "room": "rooms", "region": "rooms",
-}  # fmt: skip
 _TYPED = {"u": "you", "ya": "you", "ur": "your", "r": "are"}
 _NO_NAMES = frozenset({"i", "you", "we", "have", "has", "do", "is", "are", "was", "can", "in", "on", "near", "by"})
 
@@ -130,15 +126,11 @@ def _listed(of: Listed, said: dict[str, str | None]) -> ListQuestion | None:
         return None
     if speaks_of_photo(thing) or " or " in thing:
         return None
-    names = said.get("names") or (f"{said['one']}s" if said.get("one") else "")
-    name = room or thing or said.get("words") or said.get("seen") or names
-    name = _SAME.get(name.split()[0], name) if of is Listed.NAMES else name
-    since = f"{said.get('visit') or ''}{said.get('date') or ''}"
-    change = said.get("change") or ""
+    since, change = f"{said.get('visit') or ''}{said.get('date') or ''}", said.get("change") or ""
     change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(change)), "")
-    other = said.get("other") or ""
-    how = "rooms" if of is Listed.BESIDE and names else how
-    return ListQuestion(of, name, bool(said.get("first")), bool(said.get("counts")), since, change, how, other)
+    how = "rooms" if said.get("names") else how
+    name = room or thing or said.get("seen") or ""
+    return ListQuestion(of, name, since=since, change=change, how=how, other=said.get("other") or "")
 
 
 def _heard(said: Mapping[str, str | None]) -> ListQuestion | None:

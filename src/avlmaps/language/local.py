@@ -327,7 +327,7 @@ class LocalTranslator(LearnedTranslator):
 
     def proposed(self, command: str) -> Weighed | None:
         """Return what the model makes of a command, checked; None where it means nothing."""
-        stand = stand_ins(command, self.given.own, orders=True)
+        stand = stand_ins(command, self.given.own)
         sentence = Sentence(stand.text, replace(self.given, own=()))
         intents = meaning(self._model.write(stand.text, sentence.tokens).program)
         if intents is None:

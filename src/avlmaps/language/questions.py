@@ -8,14 +8,14 @@ from functools import partial
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
-from avlmaps.language.claims import unmet_by
+from avlmaps.language.claims import unanswered, unmet_by
 from avlmaps.language.intents import Ask, Inquiry, Pick, Target, TargetKind
 from avlmaps.language.learned.decision import NameResolver, is_doubtful, kind_of
 from avlmaps.language.learned.reader import Read, ReadingLimits, learned_reader
 from avlmaps.language.list_questions import SUPPORTED
 from avlmaps.language.names import is_entry, is_known, sounding_forms, sounds_like, third_forms
 from avlmaps.language.sentence import ASK, Attachments, Sentence, language_of, stand_ins
-from avlmaps.language.verbalise import lacks_file
+from avlmaps.language.verbalise import lacks_file, phrase
 from avlmaps.language.word_classes import listed, load_word_classes, pattern, word_list
 
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
@@ -122,7 +122,8 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> A
         file = lacks_file(sentence.tokens)
         if file is not None:
             raise QueryError(file.question)
-        raise QueryError(f"A map cannot answer this. It answers {SUPPORTED}; ask it like: {_EXAMPLE}.")
+        cannot = f"A map cannot answer this. It answers {SUPPORTED}; ask it like: {_EXAMPLE}."
+        raise QueryError(unanswered(sentence.tokens) or cannot)
     if use is not None and (reads[0].is_purpose or _names_nothing(reads[0])):
         return _resolved(_for_use(sentence, use, limits), sentence)
     plain = [read for read in reads if isinstance(read.meaning, Inquiry)]
@@ -139,7 +140,8 @@ def _likely(reads: Sequence[Read], sentence: Sentence, limits: ReadingLimits) ->
     others = [(one.meaning, one.probability) for one in reads if isinstance(one.meaning, Inquiry)]
     alike = sum(likely for one, likely in others if one.of == best.of and (best.of or one.ask is best.ask))
     if alike < (limits.question_doubtful if is_doubtful(sentence.tokens, reads[0].used) else limits.question):
-        raise QueryError(f"{sentence.text.strip()[:80]!r} is not understood; say it like: {_EXAMPLE}.")
+        cannot = f"{sentence.text.strip()[:80]!r} is not understood; say it like: {_EXAMPLE}."
+        raise QueryError(unanswered(sentence.tokens) or cannot)
     back = unmet_by(sentence.tokens, best, reads[0].used)
     if back is not None:
         raise QueryError(back)
@@ -215,19 +217,14 @@ def _near(name: str, place: str, sentence: Sentence, limits: ReadingLimits) -> t
     raise QueryError(f"{place!r} is not understood; say it like: {_EXAMPLE}.")
 
 
-def _not_near_itself(target: Target) -> Target:
-    others = tuple(one for one in target.near if (one.kind, one.name) != (target.kind, target.name))
-    return replace(target, near=others)
-
-
 def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
     resolver = NameResolver(sentence)
-    targets = tuple(_not_near_itself(resolver.resolve(target)) for target in inquiry.of)
+    targets = tuple(resolver.resolve(target) for target in inquiry.of)
     if resolver.problem is not None:
         raise QueryError(resolver.problem.question)
     for one in targets:
-        if one.pick in (Pick.FARTHEST, Pick.OTHER):
-            raise QueryError(f"A map cannot choose '{one.pick} {one.name}'; say what it is near.")
+        if one.pick not in (Pick.ANY, Pick.NEAREST) or one.number > 1:
+            raise QueryError(f"A map cannot choose {phrase(replace(one, near=()))!r}; say what it is near.")
     sides = sentence.side_notes if any(target.near for target in targets) else ()
     notes = (*sentence.notes, *resolver.notes, *sides, *_from_nowhere(sentence, targets))
     return AskedSentence(Inquiry(inquiry.ask, targets), tuple(dict.fromkeys(notes)))

@@ -16,13 +16,11 @@ from typing import Any
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
-from avlmaps.core.words import singulars_of
 from avlmaps.language.claims import claimed_words
-from avlmaps.language.intents import Pick, Target, TargetKind
+from avlmaps.language.intents import Target, TargetKind
 from avlmaps.language.lexer import WORDS, Token, in_figures, tokenise
 from avlmaps.language.names import (
     class_words,
-    is_entry,
     is_known,
     respelt,
     sounding_forms,
@@ -41,14 +39,6 @@ ASK = "This seems to be {language}. Commands and questions have to be in English
 _ANOTHER = "another language than English"
 _LATIN = "LATIN"
 _SEVERAL = 3  # words; fewer may be a name that English borrowed
-_ORDERS = {
-    "closest": "nearest", "furthest": "farthest", "northern": "north", "southern": "south", "eastern": "east",
-    "western": "west",
-}  # fmt: skip
-_NUMBERS = {
-    word: number for number, words in enumerate(("second 2nd", "third 3rd", "fourth 4th", "fifth 5th"), 2)
-    for word in words.split()
-}  # fmt: skip
 _SIDE = re.compile(
     r"\b((?:left|right|north|south|east|west|in front) of|behind|opposite|"
     r"across from|underneath|under|beneath|below|above|over)\b"
@@ -112,7 +102,7 @@ class Sentence:
 
 @dataclass(frozen=True, slots=True)
 class StandIns:
-    """A sentence with known words in the place of own names and of things that are chosen by their order."""
+    """A sentence with known words in the place of own names."""
 
     text: str
     own: dict[str, Target] = field(default_factory=dict)  # what each word stands for
@@ -127,10 +117,7 @@ class StandIns:
     def target(self, target: Target) -> Target:
         """Return a target with what its name stands for."""
         own, near = self.own.get(target.name), tuple(map(self.target, target.near))
-        if own is None:
-            return replace(target, near=near)
-        pick = own.pick or target.pick
-        return replace(target, name=own.name, pick=pick, number=own.number, near=near)
+        return replace(target, name=target.name if own is None else own.name, near=near)
 
 
 def rewritten(text: str, *, only_robot: bool = False) -> tuple[str, list[str]]:
@@ -139,7 +126,7 @@ def rewritten(text: str, *, only_robot: bool = False) -> tuple[str, list[str]]:
     With ``only_robot`` only what is said of the robot is said to it.
     """
     notes: list[str] = []
-    for says, row in forms("row", text.lower(), only_robot=only_robot):
+    for says, row in _forms(text.lower(), only_robot=only_robot):
         found = says.search(text)
         if found is not None:
             notes += [found.expand(row["note"])] if "note" in row else []
@@ -169,9 +156,9 @@ def _whatever(found: re.Match[str]) -> str:
     return f"whatever is {sound}"
 
 
-def forms(kind: str, text: str, *, only_robot: bool = False) -> Iterator[tuple[re.Pattern[str], Mapping[str, Any]]]:
-    """Yield the rows of a kind; those of which no word of `has` is in the text cannot fit it and are not compiled."""
-    for row in table("rewrites")[kind]:
+def _forms(text: str, *, only_robot: bool) -> Iterator[tuple[re.Pattern[str], Mapping[str, Any]]]:
+    """Yield the rows; those of which no word of `has` is in the text cannot fit it and are not compiled."""
+    for row in table("rewrites")["row"]:
         has = row.get("has", "").split()
         if (row.get("robot") or not only_robot) and (not has or any(word in text for word in has)):
             yield _form(row["says"]), row
@@ -209,46 +196,18 @@ def is_reserved(name: str) -> bool:
     )
 
 
-def stand_ins(text: str, names: Sequence[OwnName], *, orders: bool = False) -> StandIns:
-    """Return a sentence with a known word for each own name that the lexicon does not have.
-
-    With ``orders`` also for each thing that is chosen by its order ("the second nearest chair").
-    """
+def stand_ins(text: str, names: Sequence[OwnName]) -> StandIns:
+    """Return a sentence with a known word for each own name that the lexicon does not have."""
     out, own = text, dict[str, Target]()
-
-    def stand_in(said: str, target: Target) -> None:
-        nonlocal out
-        words = _ROOMS if target.kind is TargetKind.AREA else _THINGS
-        word = next((one for one in words if one not in own and one not in text.casefold()), None)
-        pattern = re.compile(rf"(?<![\w-]){said}(?![\w-])", re.IGNORECASE)
-        if word is not None and pattern.search(out):
-            out, own[word] = pattern.sub(f"the {word}", out), target
-
     for name, is_room in sorted(names, key=lambda one: -len(one[0])):
-        if not is_reserved(name) and lexicon().find(name, EntryKind.ROOM if is_room else EntryKind.THING) is None:
-            target = Target(TargetKind.AREA if is_room else TargetKind.OBJECT, name)
-            stand_in(rf"(?:(?:the|a|an|my|your|our) )?{re.escape(name)}", target)
-    for words, target in chosen_things(out) if orders else ():
-        stand_in(re.escape(words), target)
+        if is_reserved(name) or lexicon().find(name, EntryKind.ROOM if is_room else EntryKind.THING) is not None:
+            continue
+        kind, words = (TargetKind.AREA, _ROOMS) if is_room else (TargetKind.OBJECT, _THINGS)
+        word = next((one for one in words if one not in own and one not in text.casefold()), None)
+        said = re.compile(rf"(?<![\w-])(?:(?:the|a|an|my|your|our) )?{re.escape(name)}(?![\w-])", re.IGNORECASE)
+        if word is not None and said.search(out):
+            out, own[word] = said.sub(f"the {word}", out), Target(kind, name)
     return StandIns(out, own)
-
-
-def chosen_things(text: str) -> Iterator[tuple[str, Target]]:
-    """Yield the things of a sentence that are chosen by their order, each with its words."""
-    for says, _ in forms("pick", text.lower()):
-        for found in says.finditer(text):
-            said = found.groupdict()
-            words = found["name"].lower().split()
-            names = [" ".join(words[:end]) for end in range(len(words), 0, -1)]
-            name = next(filter(is_entry, names if found.end("name") == found.end() else names[:1]), "")
-            if not name:
-                continue
-            *before, last = name.split()
-            name = " ".join([*before, next(filter(is_entry, singulars_of(last)), last)])
-            order, number = said["order"].lower(), _NUMBERS.get((said.get("number") or "").lower(), 1)
-            pick = Pick(_ORDERS.get(order, order))
-            whole = found[0].removesuffix(found["name"][len(" ".join([*before, last])) :])
-            yield whole, Target(TargetKind.OBJECT, name, pick=pick, number=number)
 
 
 def language_of(text: str) -> str | None:

@@ -17,7 +17,7 @@ _FILES = {
     TargetKind.CLIP: "Which recording? Attach it, or name its file in the sentence.",
 }
 _SHORT = 3  # letters; shorter words are spelt like too many others
-_ORDINALS = {2: "second", 3: "third", 4: "fourth", 5: "fifth"}
+_ORDINALS = {2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "sixth"}
 _HEARD = {
     TargetKind.SOUND: "where {} was heard", TargetKind.CLIP: "where a sound like {} was heard",
     TargetKind.IMAGE: "where the picture {} was taken", TargetKind.HERE: "here",

@@ -50,7 +50,7 @@ _SMALL_WORDS = frozenset({"a", "an", "one", "some", "first", "second", "half", "
 _WORTH_ASKING = 0.1
 _MEANT: dict[type[Intent], tuple[str, ...]] = {
     act.Wait: ("wait",),
-    act.If: ("if", "unless", "otherwise", "not", "whether", "instead"),
+    act.If: ("if", "unless", "otherwise", "not", "no", "whether", "instead"),
 }
 
 
@@ -80,7 +80,7 @@ class NameResolver:
 
     def resolve(self, target: Target) -> Target:
         """Return a target with the name that is meant; what is not known becomes a question."""
-        near = tuple(self.resolve(one) for one in target.near)
+        near = tuple(self.resolve(one) for one in target.near if (one.kind, one.name) != (target.kind, target.name))
         match target.kind:
             case TargetKind.IMAGE | TargetKind.CLIP if not target.name:
                 given = self.sentence.given
@@ -165,7 +165,9 @@ def weighed(read: Read, names: NameResolver) -> Weighed:
         intents, stop = (intents, turned) if isinstance(turned, Clarify) else (turned, None)
     if stop is not None:
         return Weighed((refusal_of(stop, tokens),), read.probability)
-    doubtful = is_doubtful(tokens, read.used, frozenset(word for one in intents for word in _MEANT.get(type(one), ())))
+    meant = frozenset(word for one in intents for word in _MEANT.get(type(one), ()))
+    counted = any(target.number > 1 for one in intents for target in act.targets_of(one))
+    doubtful = is_doubtful(tokens, read.used, meant | {"third"} if counted else meant)
     if doubtful and any(isinstance(one, act.If) for one in intents):  # a condition of which half was read
         return Weighed((refusal_of(unclear(tokens), tokens),), read.probability)
     return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(names.notes)))
@@ -291,13 +293,11 @@ def is_doubtful(tokens: Sequence[Token], used: frozenset[int], meant: frozenset[
         used: the tokens that the reading points at.
         meant: words that belong to the reading though nothing points at them: of a wait "wait", no "no, wait".
     """
-    if any(token.text in claimed_words("turning") - meant for token in tokens):
-        return True
     covered = {at for start in used for at in range(start, max(start + 1, amount_end(tokens, start)))}
     said = {tokens[at].text for at in covered}
-    return any(
-        at not in covered and (_is_number(tokens, at) or _is_name(tokens[at], said)) for at in range(len(tokens))
-    )
+    unread = [at for at, token in enumerate(tokens) if at not in covered and token.text not in meant]
+    turns = any(tokens[at].text in claimed_words("turning") for at in unread)
+    return turns or any(_is_number(tokens, at) or _is_name(tokens[at], said) for at in unread)
 
 
 def _is_name(token: Token, said: set[str]) -> bool:

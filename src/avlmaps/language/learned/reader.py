@@ -8,7 +8,7 @@ nonsense, its readings are unlikely.
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
@@ -108,8 +108,10 @@ class LearnedReader:
 
     def lines(self, tokens: Sequence[Token], *, is_question: bool) -> list[Line]:
         """Return the likeliest lines for a sentence, the likeliest first."""
-        if not 0 < len(tokens) <= _MOST_TOKENS:
-            return []
+        return _lines(self, tuple(tokens), is_question=is_question) if 0 < len(tokens) <= _MOST_TOKENS else []
+
+    def written(self, tokens: Sequence[Token], *, is_question: bool) -> list[Line]:
+        """Return what `lines` does; the networks run each time."""
         seen = features(tokens, self._vocabulary)
         outputs: Any = self._words.run(None, {name: array[None] for name, array in seen._asdict().items()})
         states, begin = outputs
@@ -149,6 +151,12 @@ class LearnedReader:
             if not beam or len(done) >= 2 * _BEAM:
                 break
         return sorted(done, key=lambda line: -line.log)[:_BEAM]
+
+
+@lru_cache(maxsize=256)
+def _lines(reader: LearnedReader, tokens: tuple[Token, ...], *, is_question: bool) -> list[Line]:
+    """Return the lines of a sentence, which a front may ask for twice: as a question to lists, then as another."""
+    return reader.written(tokens, is_question=is_question)
 
 
 def _following(

@@ -16,7 +16,8 @@ from typing import Any
 from avlmaps.core.errors import LanguageError, QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.words import singulars_of, stem_of
-from avlmaps.language.list_questions import Listed, ListQuestion
+from avlmaps.language.intents import Ask
+from avlmaps.language.list_questions import Listed
 from avlmaps.language.sentence import Attachments
 from avlmaps_sim.bench.harness.figures import wilson
 
@@ -41,6 +42,14 @@ _WHO = frozenset(
         "sounds",
     }
 )
+LISTED = {
+    Ask.LARGEST_ROOM: ("rooms", "biggest"), Ask.SMALLEST_ROOM: ("rooms", "smallest"),
+    Ask.FIRST_SOUND: ("sounds", "first"), Ask.LAST_SOUND: ("sounds", "last"),
+    **{Ask(name): ("names", name) for name in ("rooms", "sounds", "things")},
+    **{Ask(f"count_{name}"): ("counts", name) for name in ("rooms", "sounds", "things")},
+    Ask.CONTENTS: ("in", ""), Ask.BESIDE: ("near", ""), Ask.ROOM_OF: ("room_of", ""),
+}  # fmt: skip
+"""How lists write the questions to a map's lists that the networks read: a key, and its value where no target is."""
 Row = Mapping[str, Any]
 
 
@@ -106,13 +115,7 @@ def _asked(sentence: str, given: Attachments) -> dict[str, Any]:
 
     ``QueryError``: the sentence is not understood.
     """
-    from avlmaps.language.list_questions import (
-        list_question,
-        read_list,
-        said_alternatives,
-        said_number,
-        speaks_of_photo,
-    )
+    from avlmaps.language.list_questions import read_list, said_alternatives, said_number
     from avlmaps.language.questions import read_question
     from avlmaps.language.said_places import asks_how_many_storeys, said_storeys
 
@@ -123,38 +126,21 @@ def _asked(sentence: str, given: Attachments) -> dict[str, Any]:
         return {"ask": "list", "storey": storeys[0].said or storeys[0].rest}
     if storeys:
         return {**_asked(storeys[0].rest, given), "storey": storeys[0].said}
-    rest = sentence
-    listed, numbered = read_list(rest), said_number(rest)
-    if listed is not None and listed.of is Listed.ROOM_OF:
-        if speaks_of_photo(listed.name) and given.image is not None:
-            return {"ask": "list", "room_of": {"image": given.image}}
-        of = read_question(listed.name, given).inquiry.of
-        return {"ask": "list", "room_of": of[0].to_json()} if of else {"ask": "refuse"}
+    listed, numbered = read_list(sentence), said_number(sentence)
     if listed is not None:
-        return {"ask": "list", **_list_json(listed)}
+        is_heard = listed.of is Listed.HEARD
+        told = {"heard": listed.name, "how": listed.how} if is_heard else {"near": {"object": listed.name}}
+        return {"ask": "list", **{key: value for key, value in told.items() if value}}
     if numbered is not None:
         number, what = numbered
         of = read_question(f"how many {what} are there", given).inquiry.to_json()["of"]
         return {"ask": "list", "at_least": number, "of": of[0]}
-    alternatives = said_alternatives(rest)
-    if not alternatives and (listed := list_question(whole := read_question(rest, given).inquiry)) is not None:
-        told = {"room_of": whole.of[0].to_json()} if listed.of is Listed.ROOM_OF else _list_json(listed)
-        return {"ask": "list", **told}
-    read = [read_question(words, given).inquiry.to_json() for words in alternatives or (rest,)]
+    inquiries = [read_question(words, given).inquiry for words in said_alternatives(sentence) or (sentence,)]
+    read = [inquiry.to_json() for inquiry in inquiries]
+    key, value = LISTED.get(inquiries[0].ask, ("", ""))
+    if key:
+        return {"ask": "list", key: value or read[0]["of"][0]}
     return {"ask": read[0]["ask"], "of": [target for one in read for target in one["of"]]}
-
-
-def _list_json(listed: ListQuestion) -> dict[str, Any]:
-    name = listed.name
-    told: dict[Listed, dict[str, Any]] = {
-        Listed.HEARD: {"heard": name, **({"how": listed.how} if listed.how else {})},
-        Listed.ROOM_BY_SIZE: {"rooms": "smallest" if listed.first else "biggest"},
-        Listed.SOUND_BY_TIME: {"sounds": "first" if listed.first else "last"},
-        Listed.CONTENTS: {"in": {"area": name}},
-        Listed.BESIDE: {"near": {"object": name}},
-        Listed.NAMES: {"counts" if listed.counts else "names": name},
-    }
-    return told[listed.of]
 
 
 def _answered(got: Mapping[str, Any], wanted: Any) -> str:
