@@ -1,9 +1,7 @@
-"""The lines that a person types: each is tried on one small map, and the examples run on it."""
+"""The lines that a person types: each is tried on one small map."""
 
 import re
-import runpy
 import shutil
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +27,6 @@ from helpers.raycast import render
 from helpers.room import Room
 from helpers.walked_room import RATE_HZ, beeps
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 CAMERA = avlmaps.Pinhole(107.0, 107.0, 80.0, 60.0, 160, 120)
 COARSE = avlmaps.BuildSettings(voxel_size_m=0.1)
 
@@ -506,26 +503,6 @@ def test_what_is_no_map_size_up_or_profile_is_refused() -> None:
         avlmaps.VoxelMap(encoders=Hues())  # pyright: ignore[reportArgumentType]
     with pytest.raises(MapError, match="has no frame yet"):
         avlmaps.VoxelMap(encoders="colours").ask("the chair")
-
-
-# Examples
-
-WORDS = {
-    "01": ["home.avlmap", "where can I sit?"], "02": ["rec", "new.avlmap"], "03": ["rec"], "04": ["rec", "live.avlmap"],
-    "05": ["rec", "mine.avlmap"], "06": ["rec"], "07": ["home.avlmap"], "08": ["home.avlmap"],
-    "09": ["home.avlmap", "photo.png"], "10": ["home.avlmap", "heat.png"], "11": ["rec", "driven.avlmap"],
-}  # fmt: skip
-
-
-@pytest.mark.few(4)
-@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
-def test_the_examples_run(
-    script: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(folder)
-    monkeypatch.setattr(sys, "argv", [str(script), *WORDS[script.name[:2]]])
-    runpy.run_path(str(script), run_name="__main__")
-    assert capsys.readouterr().out.strip()
 
 
 def test_a_program_may_change_its_folder_while_it_uses_relative_paths(
