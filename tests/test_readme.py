@@ -77,7 +77,7 @@ def test_clone_install_and_the_command_stand_before_its_first_use() -> None:
 def test_the_first_steps_of_the_readme_run_as_written_and_find_what_they_query(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Fewer frames of the same walk, and nothing else, are what this test changes."""
+    """Fewer frames of the same walk, in smaller pictures, are all that this test changes."""
     from avlmaps.cli import main
 
     section = README.split("## First steps")[1].split("\n## ")[0]
@@ -87,7 +87,7 @@ def test_the_first_steps_of_the_readme_run_as_written_and_find_what_they_query(
     said = {}
     for command in commands:
         words = shlex.split(command)
-        smaller = ["--max-frames", "36"] if words[0] == "record" else []
+        smaller = ["--max-frames", "30", "--size", "200x150"] if words[0] == "record" else []
         with pytest.raises(SystemExit) as stop:
             main([*words, *smaller, "--json"])
         told = capsys.readouterr()
