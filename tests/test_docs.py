@@ -25,22 +25,17 @@ def _python_of(page: Path) -> list[str]:
 
 @pytest.mark.filterwarnings("error::DeprecationWarning")
 @pytest.mark.parametrize("page", ["../README.md", *(page for page in PAGES if _python_of(DOCS / page))])
-def test_the_python_of_the_documents_can_be_read_and_its_imports_are_there(page: str) -> None:
-    for block in _python_of(DOCS / page):
-        for line in ast.walk(ast.parse(block)):
+def test_the_python_of_the_documents_can_be_read_and_imports_what_is_there_and_all_that_it_uses(page: str) -> None:
+    known: set[str] = set()
+    for tree in map(ast.parse, _python_of(DOCS / page)):
+        found = list(ast.walk(tree))
+        for line in found:
             if isinstance(line, ast.ImportFrom) and (line.module or "").partition(".")[0] in OURS:
                 there = importlib.import_module(line.module or "")
                 for name in line.names:
                     assert hasattr(there, name.name), f"{page}: {line.module} has no {name.name}"
             elif isinstance(line, ast.Attribute) and isinstance(line.value, ast.Name) and line.value.id == "avlmaps":
                 assert hasattr(avlmaps, line.attr), f"{page}: avlmaps.{line.attr}"
-
-
-@pytest.mark.parametrize("page", ["../README.md", *(page for page in PAGES if _python_of(DOCS / page))])
-def test_a_page_imports_the_packages_that_its_python_uses(page: str) -> None:
-    known: set[str] = set()
-    for tree in map(ast.parse, _python_of(DOCS / page)):
-        found = list(ast.walk(tree))
         imports = (name for one in found if isinstance(one, ast.Import | ast.ImportFrom) for name in one.names)
         known |= {name.asname or name.name.partition(".")[0] for name in imports}
         used = {one.id for one in found if isinstance(one, ast.Name)}

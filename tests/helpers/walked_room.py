@@ -37,10 +37,7 @@ def shared_walk(factory: "pytest.TempPathFactory") -> Path:
     """Return a walk that is made once in a run; tests share it and leave it as it is."""
     from helpers.made_once import made_once
 
-    def write(folder: Path) -> None:
-        write_walk(folder / "rec")
-
-    return made_once(factory, "walk", write) / "rec"
+    return made_once(factory, "walk", lambda folder: write_walk(folder / "rec")) / "rec"
 
 
 def walked_map(factory: "pytest.TempPathFactory") -> Path:
