@@ -26,6 +26,9 @@ else:
             self.dtypes = dtypes
             self.dim_str = dim_str.strip()
 
+        def __repr__(self) -> str:
+            return f"{'|'.join(self.dtypes)}[{self.dim_str}]"
+
         def __call__(self) -> None:
             """Make nothing: ``typing`` accepts as a type what can be called."""
             raise TypeError("an array type declares; make arrays with NumPy")
