@@ -170,10 +170,7 @@ def test_normalised_scores_lie_in_0_1_and_keep_their_order(scores) -> None:
     assert not len(scores) or stretched[np.argmax(scores)] == 1.0
 
 
-@given(
-    hnp.arrays(np.float64, st.integers(1, 8), elements=st.floats(-1, 1)),
-    st.floats(-2, 2) | st.floats(-200, 200),
-)
+@given(hnp.arrays(np.float64, st.integers(1, 8), elements=st.floats(-1, 1)), st.floats(-2, 2) | st.floats(-200, 200))
 def test_scores_that_differ_by_rounding_alone_are_equal(noise, score) -> None:
     rounding = 2.0 * np.finfo(np.float32).eps * max(1.0, abs(score))
     np.testing.assert_array_equal(stretch_scores(score + rounding * noise), np.ones(len(noise)))

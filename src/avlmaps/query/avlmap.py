@@ -61,19 +61,14 @@ class AVLMap:
 
     ``primary``: whether a part (of a sound or a picture, its place) is what is sought rather than a mark near that; its
     heat reaches 0.5 m, that of a mark 5 m.
-    ``QueryError``: a word is empty or not understood. ``BackendError``: the map was made without the model needed.
+    ``QueryError``: a word is empty, or an encoder of any words does not understand it; one of names has no heat for it,
+    and a ``note`` on why. ``BackendError``: the map was made without the model needed.
     """
 
     def __init__(
-        self,
-        data: MapData,
-        encoders: "Encoders | None" = None,
-        *,
-        path: Path | None = None,
-        settings: QuerySettings | None = None,
-        edits: Sequence[Edit] | None = None,
-        heats: HeatCache | None = None,
-    ) -> None:
+        self, data: MapData, encoders: "Encoders | None" = None, *, path: Path | None = None,
+        settings: QuerySettings | None = None, edits: Sequence[Edit] | None = None, heats: HeatCache | None = None,
+    ) -> None:  # fmt: skip
         """``encoders``: by default those that it names. ``edits``: None for those of the map's folder, () for none."""
         self.data, self.path = data, path or Path("a map in memory")
         self._encoders = encoders
@@ -260,11 +255,9 @@ class AVLMap:
 
     @checked(QueryError)
     def image(
-        self,
-        picture: str | Path | Photo | UInt8[np.ndarray, "h w 3"],
-        intrinsics: Pinhole | None = None,
+        self, picture: str | Path | Photo | UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None = None,
         primary: bool = False,
-    ) -> Heatmap:
+    ) -> Heatmap:  # fmt: skip
         """Return the heat of where a picture was taken; if it is not located, of the best guess.
 
         ``picture``: a file, or RGB uint8, or that with what its EXIF says. ``intrinsics``: by default by its EXIF, else
@@ -278,11 +271,9 @@ class AVLMap:
 
     @checked(QueryError)
     def locate(
-        self,
-        picture: str | Path | UInt8[np.ndarray, "h w 3"],
-        intrinsics: Pinhole | None = None,
+        self, picture: str | Path | UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None = None,
         focal_35mm: float | None = None,
-    ) -> "Located":
+    ) -> "Located":  # fmt: skip
         """Return the pose of the camera that took a picture, or that it was not located; see ``locate.locate``.
 
         ``intrinsics``, ``focal_35mm`` (as if for 35 mm film): of the camera that took it; by default by a file's EXIF,
@@ -306,21 +297,11 @@ class AVLMap:
     # Questions.
 
     def ask(
-        self,
-        question: Question | str = "",
-        top: int = 3,
-        intrinsics: "Pinhole | Sequence[float] | None" = None,
-        attachments: Mapping[str, Attachment] | None = None,
-        *,
-        object: str | None = None,
-        sound: str | None = None,
-        area: str | None = None,
-        image: str | Path | None = None,
-        clip: str | Path | None = None,
-        primary: Modality | str | None = None,
-        at: HeardAt | None = None,
-        near: str | Sequence[float] | None = None,
-    ) -> "Answer":
+        self, question: Question | str = "", top: int = 3, intrinsics: "Pinhole | Sequence[float] | None" = None,
+        attachments: Mapping[str, Attachment] | None = None, *, object: str | None = None, sound: str | None = None,
+        area: str | None = None, image: str | Path | None = None, clip: str | Path | None = None,
+        primary: Modality | str | None = None, at: HeardAt | None = None, near: str | Sequence[float] | None = None,
+    ) -> "Answer":  # fmt: skip
         """Answer a query with places, as the command line, the server and the viewer do.
 
         ``question``: a sentence, such as "the chair near the sound of glass breaking" or "how many chairs are there",
@@ -383,15 +364,9 @@ class AVLMap:
 
     @checked(QueryError)
     def things(
-        self,
-        names: Sequence[str] | None = None,
-        least_confidence: float = 0.5,
-        structure: bool = False,
-        watch: Watch = lambda stage, done, total: None,
-        *,
-        at: str | int | None = None,
-        room: str | None = None,
-    ) -> list[Thing]:
+        self, names: Sequence[str] | None = None, least_confidence: float = 0.5, structure: bool = False,
+        watch: Watch = lambda stage, done, total: None, *, at: str | int | None = None, room: str | None = None,
+    ) -> list[Thing]:  # fmt: skip
         """Return the things of the map, most confident first; see ``contents.find_things``.
 
         ``at``: those that were there on a day: a date, or the number of a visit from 1; their ``rows`` hold what is
@@ -419,12 +394,9 @@ class AVLMap:
 
     @checked(QueryError)
     def unedited_things(
-        self,
-        names: Sequence[str] | None = None,
-        least_confidence: float = 0.5,
-        structure: bool = False,
+        self, names: Sequence[str] | None = None, least_confidence: float = 0.5, structure: bool = False,
         watch: Watch = lambda stage, done, total: None,
-    ) -> list[Thing]:
+    ) -> list[Thing]:  # fmt: skip
         """Return ``things`` as the encoder sees them, without what people corrected."""
         return contents.find_things(self, self._names.search, names, least_confidence, structure, watch)
 

@@ -138,21 +138,15 @@ class Editor:
         for need in _NEEDS.get(does, ()):
             if not given[need]:
                 raise AskError(f"{does} needs {option(need)}.")
-        match does:
-            case "rename":
-                return self.rename(name or None, to, at=at, by=by)
-            case "rename-room":
-                return self.rename_room(name, to, by=by)
-            case "merge":
-                return self.merge(*places, to=to, by=by)
-            case "split":
-                return self.split(name or None, at=at, plane=places, box=box, by=by)
-            case "forbid":
-                return self.forbid(name, box=box, room=room, by=by)
-            case "pin":
-                return self.pin(name, at or "", by=by)
-            case _:
-                return self.undo(name, by=by)
+        makers = {
+            "rename": lambda: self.rename(name or None, to, at=at, by=by),
+            "rename-room": lambda: self.rename_room(name, to, by=by),
+            "merge": lambda: self.merge(*places, to=to, by=by),
+            "split": lambda: self.split(name or None, at=at, plane=places, box=box, by=by),
+            "forbid": lambda: self.forbid(name, box=box, room=room, by=by),
+            "pin": lambda: self.pin(name, at or "", by=by),
+        }
+        return makers.get(does, lambda: self.undo(name, by=by))()
 
     def history(self) -> "EditsAnswer":
         """Return all edits, the oldest first, and which of them find nothing to apply to."""

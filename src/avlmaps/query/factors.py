@@ -41,10 +41,12 @@ class Factor(ABC):
     found: bool  # whether the map holds the part
     understood: str  # what the encoder could act on
     note: str  # one sentence on why it was not found, or ``""``
+    middles: Float[np.ndarray, "i 3"]  # (instances, 3) of each instance its middle, where lists put it
     flat: bool  # whether the heat is the same at every height
     # Whether the heat says in which region a place lies, not how near it is; ``held`` says it of things.
     regional: bool = False
     is_named: bool = True  # whether what was said of it is understood; False where only a colour is ("red elephant")
+    plain: "Callable[[], Factor] | None" = None  # without its colour; None where it has none
     # The heat and the anchors of all voxels, once they were computed.
     _of_all: tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]] | None = None
 
@@ -79,10 +81,9 @@ class Factor(ABC):
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""
 
-    def held(self, lead: "NearThings") -> Float[np.ndarray, " i"]:
+    def held(self, lead: "Factor") -> Float[np.ndarray, " i"]:
         """Return how far each instance of a lead lies in this region, in [0, 1]: the mean over its voxels."""
-        heat = self.among(lead.mask)[lead.mask].astype(np.float64)
-        count = len(lead.confidence)
+        heat, count = self.at(lead.anchors), len(lead.confidence)
         own = np.maximum(np.bincount(lead.instance, minlength=count), 1)
         return np.bincount(lead.instance, heat, minlength=count) / own
 
@@ -134,6 +135,7 @@ class NearThings(Factor):
     # of them. None where there are no others.
     with_uncertain: "Callable[[], NearThings] | None" = None
     is_named: bool = True  # see ``Factor``
+    plain: "Callable[[], Factor] | None" = None  # see ``Factor``
     flat: bool = field(default=False, init=False)
 
     def include_uncertain(self) -> "NearThings":
@@ -154,8 +156,8 @@ class NearThings(Factor):
         return self.space.centres_of(self.mask)
 
     @cached_property
-    def middles(self) -> Float[np.ndarray, "i 3"]:
-        """Of each instance, the voxel nearest to its middle: where lists put a thing."""
+    def middles(self) -> Float[np.ndarray, "i 3"]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Of each instance, the voxel nearest to its middle."""
         order, ends = np.argsort(self.instance, kind="stable"), np.cumsum(np.bincount(self.instance))
         return np.array([middle_of(own) for own in np.split(self.anchors[order], ends)[:-1]]).reshape(-1, 3)
 
@@ -211,6 +213,13 @@ class NearAnchors(Factor):
     def confidence(self) -> Float[np.ndarray, " i"]:  # pyright: ignore[reportIncompatibleVariableOverride]
         """The certainty, for each instance."""
         return np.full(int(self.instance.max(initial=-1)) + 1, self.certainty)
+
+    @cached_property
+    def middles(self) -> Float[np.ndarray, "i 3"]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Of each instance, the middle of its best anchors."""
+        each = [np.flatnonzero(self.instance == number) for number in range(len(self.confidence))]
+        best = [own[self.scores[own] == self.scores[own].max()] for own in each]
+        return np.array([self.anchors[top].mean(axis=0) for top in best]).reshape(-1, 3)
 
     def heat_and_anchors(
         self, among: Bool[np.ndarray, " n"] | None = None

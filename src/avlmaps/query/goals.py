@@ -59,7 +59,7 @@ def evidence_of(
     itself = float(lead.scores[lead.instance == instance].max(initial=0.0)) if isinstance(lead, NearAnchors) else 1.0
     alone = itself * float(lead.confidence[instance])
     rooms = [factor for factor in context if factor.part.modality is Modality.AREA]
-    beside = [factor for factor in rooms if not _holds(factor, lead)]
+    beside = [factor for factor in rooms if not holds(factor, lead)]
     room = inside * float(np.prod([factor.at(position[None])[0] for factor in beside]))
     near = peak / max(itself * room, _LEAST_SCORE) if context else 1.0
     marks = [_mark(factor, position) for factor in context if factor not in rooms]
@@ -74,8 +74,9 @@ def logit(probability: float) -> float:
     return float(np.clip(np.log(held / (1.0 - held)), -_MOST_LOGIT, _MOST_LOGIT))
 
 
-def _holds(factor: Factor, lead: Factor) -> bool:
-    return factor.regional and isinstance(lead, NearThings)
+def holds(factor: Factor, lead: Factor) -> bool:
+    """Return whether a factor says in which region what is sought lies."""
+    return factor.regional and factor is not lead
 
 
 def _mark(factor: Factor, position: Float[np.ndarray, "3"]) -> float:
@@ -172,8 +173,7 @@ _Likely = TypeVar("_Likely", bound=HasProbability)
 
 def alike(goals: Sequence[Goal], found_at: float) -> list[Goal]:
     """Return the goals that are found and fit as well as the likeliest."""
-    found = [goal for goal in goals if goal.probability >= found_at and goal.probability > 0.0]
-    return as_likely(found)
+    return as_likely([goal for goal in goals if goal.probability >= found_at and goal.probability > 0.0])
 
 
 def as_likely(things: Sequence[_Likely]) -> list[_Likely]:
@@ -202,38 +202,26 @@ class Shares:
         return places
 
 
-def share_voxels(
-    factors: Sequence[Factor],
-    values: Callable[[], Float32[np.ndarray, " n"]],
-    of_things: Callable[[], Float32[np.ndarray, " n"]],
-) -> Shares:
-    """Divide the heated voxels among the lead's instances; ``values`` and ``of_things`` (without regions) are slow."""
-    lead = lead_of(factors)
-    if isinstance(lead, NearThings) and len(factors) == 1:
+def share_voxels(factors: Sequence[Factor], of_things: Callable[[], Float32[np.ndarray, " n"]]) -> Shares:
+    """Divide the heated voxels among the lead's instances; ``of_things``, the product without regions, is slow."""
+    lead, count = lead_of(factors), len(lead_of(factors).confidence)
+    regions = [factor for factor in factors if holds(factor, lead)]
+    others = [factor for factor in factors if factor is not lead and factor not in regions]
+    if isinstance(lead, NearThings) and not others:
         rows = np.flatnonzero(lead.mask)
         instance, heat = lead.instance, np.ones(len(rows))  # an object's own voxels are as hot as can be
-    elif isinstance(lead, NearAnchors) and not lead.regional and len(factors) == 1:
+    elif isinstance(lead, NearAnchors) and not lead.regional and not others:
         # The heat of cones is highest at their anchors, which are places as well: no voxel is hotter, or more central.
         rows, instance, heat = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
     else:
-        rows = np.flatnonzero(values() > 0.0) if len(lead.anchors) else np.zeros(0, np.int64)
+        rows = np.flatnonzero(of_things() > 0.0) if len(lead.anchors) else np.zeros(0, np.int64)
         instance = lead.instance[lead.anchor_of(rows)] if len(rows) else np.zeros(0, np.int64)
-        heat = values()[rows].astype(np.float64)
+        heat = of_things()[rows].astype(np.float64)
     if isinstance(lead, NearAnchors):
-        at_anchors = np.array(lead.scores, np.float64)
-        for factor in factors:
-            if factor is not lead:
-                at_anchors *= factor.at(lead.anchors)
+        at_anchors = np.prod([lead.scores, *(factor.at(lead.anchors) for factor in others)], axis=0)
         heat, instance = np.append(heat, at_anchors), np.append(instance, lead.instance)
-    count = len(lead.confidence)
-    regions, inside = [factor for factor in factors if _holds(factor, lead)], np.ones(count)
-    if not (regions and isinstance(lead, NearThings)):
-        return Shares(lead, rows, heat, instance, _highest(instance, heat, count), inside)
-    inside = np.prod([region.held(lead) for region in regions], axis=0)
-    others = of_things()
-    near = np.flatnonzero(others > 0.0)
-    peak = _highest(lead.instance[lead.anchor_of(near)], others[near].astype(np.float64), count)
-    return Shares(lead, rows, heat, instance, peak * inside, inside)
+    inside = np.prod([np.ones(count), *(region.held(lead) for region in regions)], axis=0)
+    return Shares(lead, rows, heat, instance, _highest(instance, heat, count) * inside, inside)
 
 
 def _highest(instance: Int[np.ndarray, " m"], heat: Float[np.ndarray, " m"], count: int) -> Float[np.ndarray, " i"]:
@@ -242,14 +230,20 @@ def _highest(instance: Int[np.ndarray, " m"], heat: Float[np.ndarray, " m"], cou
     return peak
 
 
-def weigh_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[tuple[Goal, GoalEvidence]]:
-    """Return up to ``top`` goals with their evidence, best first; what lies within a better one is a part of it."""
+def weigh_goals(
+    factors: Sequence[Factor], shares: Shares, top: int, likely: float = 1.0
+) -> list[tuple[Goal, GoalEvidence]]:
+    """Return up to ``top`` goals with their evidence, best first; what lies within a better one is a part of it.
+
+    None is likelier than ``likely``, nor than the one before it, less the share by which it fits worse.
+    """
     lead, is_named = lead_of(factors), all(factor.is_named for factor in factors)
     score = np.round(shares.peak * lead.confidence, 3)  # more digits would be noise; of equals the larger leads
     extent = np.bincount(lead.instance, minlength=len(score))
     ground: list[Float[np.ndarray, 2]] = []
     extents = _Extents(lead) if isinstance(lead, NearThings) else None
     goals: list[tuple[Goal, GoalEvidence]] = []
+    before = float(score.max(initial=0.0))
     for instance in map(int, np.lexsort((-extent, -score))):
         if len(goals) >= top or score[instance] <= 0.0:
             break
@@ -261,8 +255,9 @@ def weigh_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[tup
             continue
         ground.append(xy)
         evidence = evidence_of(factors, instance, position, float(shares.peak[instance]), shares.inside[instance])
-        probability = probability_of(evidence) if is_named else 0.0
-        goals.append((_goal(factors, lead, instance, position, float(score[instance]), probability), evidence))
+        fits = float(score[instance])
+        likely, before = min(probability_of(evidence) if is_named else 0.0, likely * fits / before), fits
+        goals.append((_goal(factors, lead, instance, position, fits, round(likely, 3)), evidence))
     return goals
 
 
@@ -287,7 +282,8 @@ class _Extents:
 def _position(factors: Sequence[Factor], lead: Factor, shares: Shares, instance: int) -> Float[np.ndarray, "3"]:
     if isinstance(lead, NearThings):
         return _place_on_thing(lead, shares, instance)
-    rows = np.flatnonzero((shares.instance == instance) & (shares.heat >= shares.peak[instance] - _SAME))
+    own = np.flatnonzero(shares.instance == instance)
+    rows = own[shares.heat[own] >= shares.heat[own].max() - _SAME]
     at_anchors = rows[rows >= len(shares.rows)]
     plateau = shares.places(at_anchors if len(at_anchors) else rows)
     middle = plateau[np.argmin(np.linalg.norm(plateau - plateau.mean(axis=0), axis=1))]

@@ -1,5 +1,6 @@
 """Heat over the occupied voxels: an array, numbers at any point, products and weighted sums, and their goals."""
 
+import itertools
 import threading
 from abc import ABC, abstractmethod
 from collections import OrderedDict
@@ -16,13 +17,16 @@ from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Part, Role
 from avlmaps.query.factors import Factor, lead_of, product_of, times
-from avlmaps.query.goals import MOST_GOALS, Goal, GoalEvidence, Shares, share_voxels, weigh_goals
+from avlmaps.query.goals import MOST_GOALS, Goal, GoalEvidence, Shares, holds, share_voxels, weigh_goals
 from avlmaps.query.settings import FOUND_AT
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+_CONDITIONS = 5  # parts of a query of which some are left out in turn
 
 
 class Heat(ABC):
@@ -184,11 +188,11 @@ class Heatmap(Heat):
     @cached_property
     def values(self) -> Float32[np.ndarray, " n"]:  # pyright: ignore[reportIncompatibleMethodOverride, reportIncompatibleVariableOverride]
         """The product of the factors' heat, computed when it is first used."""
-        return times(self._of_things, [factor for factor in self.factors if _is_region(factor, self.lead)])
+        return times(self._of_things, [factor for factor in self.factors if holds(factor, self.lead)])
 
     @cached_property
     def _of_things(self) -> Float32[np.ndarray, " n"]:
-        return product_of([factor for factor in self.factors if not _is_region(factor, self.lead)])
+        return product_of([factor for factor in self.factors if not holds(factor, self.lead)])
 
     @overload
     def __mul__(self, other: "Heatmap") -> "Heatmap": ...
@@ -270,7 +274,7 @@ class Heatmap(Heat):
 
     @cached_property
     def _shares(self) -> Shares:
-        return share_voxels(self.factors, lambda: self.values, lambda: self._of_things)
+        return share_voxels(self.factors, lambda: self._of_things)
 
     @cached_property
     def probability(self) -> float:
@@ -282,6 +286,16 @@ class Heatmap(Heat):
         """Whether the first goal is likely enough to be right; where there is none, nothing is found at any limit."""
         return self.probability >= self.found_at and self.probability > 0.0
 
+    @cached_property
+    def _most(self) -> float:
+        # No answer is likelier than that to fewer of its conditions: near and in what it lies, and its colour.
+        asked = (self.lead, *(factor for factor in self.factors if factor is not self.lead))[:_CONDITIONS]
+        ways = [[one, *([one.plain().for_product()] if one.plain else [])] for one in asked]
+        parts = itertools.product(ways[0], *([*each, None] for each in ways[1:]))
+        fewer = [kept for part in parts if len(kept := tuple(filter(None, part))) > 1 and kept != asked]
+        firsts = [weigh_goals(kept, Heatmap(self.space, kept)._shares, 1) for kept in fewer]
+        return min((goal.probability for first in firsts for goal, _ in first), default=1.0)
+
     def goals(self, top: int = 3) -> list[Goal]:
         """Return the best distinct places, best first; none where there is no heat."""
         return [goal for goal, _ in self.weighed(top)]
@@ -289,13 +303,13 @@ class Heatmap(Heat):
     def weighed(self, top: int = 3) -> list[tuple[Goal, GoalEvidence]]:
         """Return the goals, each with the evidence that its probability rests on."""
         if self.where is None:
-            return weigh_goals(self.factors, self._shares, top)
+            return weigh_goals(self.factors, self._shares, top, self._most)
         return self._where_it_may[:top]
 
     @cached_property
     def _where_it_may(self) -> list[tuple[Goal, GoalEvidence]]:
         assert self.where is not None
-        every = weigh_goals(self.factors, self._shares, MOST_GOALS)
+        every = weigh_goals(self.factors, self._shares, MOST_GOALS, self._most)
         most = self.where(np.array([goal.position for goal, _ in every]).reshape(-1, 3))
         return [
             (replace(goal, probability=round(min(goal.probability, float(sure)), 3)), evidence)
@@ -321,10 +335,6 @@ class Heatmap(Heat):
             return figure
         figure = draw_heat(self.factors, self.shown, self.found, self.goals(top))
         return figure if path is None else save(figure, path)
-
-
-def _is_region(factor: Factor, lead: Factor) -> bool:
-    return factor.regional and factor is not lead
 
 
 def product(heatmaps: Sequence[Heatmap]) -> Heatmap:

@@ -515,9 +515,11 @@ class _Search:
             note = half + ("; " + note if note else "")
         is_found = found.best >= FOUND_AT and is_named
         falloff, mask = self.heat.falloff_per_m(part.role), _mask(len(space), found)
+        plain = replace(self, colour=None).factor if colour else None
         return NearThings(
-            space, part, falloff, mask, found.instance, found.confidence, is_found, said, note, with_uncertain, is_named
-        )
+            space, part, falloff, mask, found.instance, found.confidence, is_found, said, note, with_uncertain,
+            is_named, plain,
+        )  # fmt: skip
 
 
 def _colour_factor(

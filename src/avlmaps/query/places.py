@@ -37,11 +37,7 @@ def place_given(place: str | Sequence[float]) -> Float[np.ndarray, " n"]:
     return place_of(",".join(map(str, place)) if not isinstance(place, str) and np.iterable(place) else str(place))
 
 
-def distance_m(
-    level: Callable[[Float[np.ndarray, "m 3"]], Float[np.ndarray, "m 3"]],
-    point: Sequence[float],
-    place: Float[np.ndarray, " n"],
-) -> float:
+def distance_m(level: Callable[[Any], np.ndarray], point: Sequence[float], place: Float[np.ndarray, " n"]) -> float:
     """Return how far a point (recording frame) lies from a place: in space, or level where that has no height."""
     here = np.array(point)
     return math.dist(here, place) if len(place) == 3 else math.dist(level(here)[:2], place)

@@ -232,7 +232,9 @@ def draw_ground(ax: "Axes", view: TopDown, space: Space, with_walk: bool = True)
     ax.set_aspect("equal")
     ax.set_facecolor(_PAPER)
     ax.autoscale(False)
-    _name_axes(ax, space)
+    at = f"(m), frame: {FRAME}" if space.is_level else "of the level frame (m)"
+    ax.set_xlabel(f"x {at}", fontsize=8, color=INK)
+    ax.set_ylabel(f"y {at}", fontsize=8, color=INK)
     ax.tick_params(labelsize=7, colors=INK, length=2)
     for spine in ax.spines.values():
         spine.set_color("#c9c7c0")
@@ -240,12 +242,6 @@ def draw_ground(ax: "Axes", view: TopDown, space: Space, with_walk: bool = True)
     if with_walk and len(walk) > 1:
         ax.plot(*walk[:, :2].T, color="white", linewidth=2.6, alpha=0.8)
         ax.plot(*walk[:, :2].T, color=_PATH, linewidth=1.2, label="path of the camera")
-
-
-def _name_axes(ax: "Axes", space: Space) -> None:
-    at = f"(m), frame: {FRAME}" if space.is_level else "of the level frame (m)"
-    ax.set_xlabel(f"x {at}", fontsize=8, color=INK)
-    ax.set_ylabel(f"y {at}", fontsize=8, color=INK)
 
 
 def picture_frame(space: Space) -> FrameName:

@@ -11,7 +11,7 @@ from avlmaps.core.lexicon import Entry, EntryKind, lexicon
 from avlmaps.core.question import Part, Role
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, RoomContents, ScaledEncoder, ViewEncoder
-from avlmaps.query.factors import NearAnchors, NearThings, stretch_scores
+from avlmaps.query.factors import Factor, NearAnchors, stretch_scores
 from avlmaps.query.floor_plan import CELL_M, FloorPlan
 from avlmaps.query.room_regions import NONE, RoomRegions
 from avlmaps.query.settings import FEWEST_VIEWS, FOUND_AT, LEAST_PART, AreaSettings, HeatSettings, RoomSettings
@@ -320,8 +320,8 @@ class InRooms(NearAnchors):
         own = (getattr(self, each.name) for each in fields(NearAnchors) if each.init)
         return NearAnchors(*own)
 
-    def held(self, lead: NearThings) -> Float[np.ndarray, " i"]:
-        """Return how likely each instance is in such a room: a thing is in one, that of its middle, as in lists."""
+    def held(self, lead: Factor) -> Float[np.ndarray, " i"]:
+        """Return how likely each instance is in such a room: it is in one, that of its middle, as in lists."""
         return self.at(lead.middles)
 
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
