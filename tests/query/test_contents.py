@@ -1,5 +1,9 @@
 """Listing what a map holds: things, sounds and rooms against a furnished map whose contents are known."""
 
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from query_fakes import (
@@ -16,8 +20,15 @@ from query_fakes import (
 )
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.question import Modality, Part, Role
+from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.perception.embedded.pixels import EmbeddedPixels, features_of
+from avlmaps.query.answer import Answer, PartAnswer
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.contents import SoundEvent, Thing
+from avlmaps.query.goals import Goal
+from avlmaps.query.lists import answer_list
+from avlmaps.query.settings import QuerySettings
 
 
 @pytest.fixture
@@ -120,3 +131,19 @@ def test_a_sentence_is_answered_like_its_parts(furnished: AVLMap) -> None:
     answer = furnished.ask("the chair near the sound of a dog")
     assert answer.parts[0].part.query == "chair"
     assert answer.goals[0].position == pytest.approx(furnished.things(["chair"])[0].position, abs=0.3)
+
+
+def test_what_a_wall_hides_is_not_near_and_who_asks_for_sounds_is_told_sounds() -> None:
+    def thing(name: str, x: float) -> Thing:
+        return Thing(name, 0.9, (x, 0.0, 0.5), (0.4, 0.4, 0.4), (0, 0, 0), np.zeros(0, np.int64), np.zeros((0, 3)))
+
+    heard = [SoundEvent((f"dog {x}",), (0.9,), x, 9.0, (x, 0.0, 0.5), np.zeros((0, 3)), Path()) for x in (0.2, 2.0)]
+    there = [thing("sink", 1.1), thing("chair", 0.0), thing("door", 1.2)]
+    rooms, space = SimpleNamespace(rooms_of=lambda at: at[:, 0] > 1.0), SimpleNamespace(level=lambda at: at)
+    lists = {"where": rooms, "space": space, "things": lambda: there, "sounds": lambda: heard}
+    avlmap: Any = SimpleNamespace(**lists, settings=QuerySettings(), has=bool)
+    part = PartAnswer(Part(Modality.OBJECT, "sofa", Role.PRIMARY), 1.0, True)
+    sofa = Answer((Goal((0.6, 0.0, 0.5), 0.8, (0.4, 0.4, 0.4), {}, 0.8),), True, (part,))
+    for of, how, told in ((Listed.BESIDE, "", ["chair", "door"]), (Listed.HEARD, "near", ["dog 0.2"])):
+        answer = answer_list(avlmap, ListQuestion(of, "sofa", how=how), 9, lambda words: sofa)
+        assert sorted(goal.name for goal in answer.goals) == told

@@ -102,6 +102,8 @@ def test_what_was_heard_and_when_is_answered_with_times(m: avlmaps.AVLMap) -> No
         assert m.ask(f"how often did you hear {sound.names[0]}?").count == answer.count
     other = m.ask("when did you hear a volcano")
     assert not other.found and other.count == 0 and sounds[0].names[0] in other.text
+    assert [m.ask(f"did you hear {one}?").text[:3] for one in ("a volcano", sounds[0].names[0])] == ["No.", "Yes"]
+    assert "No sound was heard in" in m.ask("what noises are in the kitchen?").text
 
 
 def test_heat_is_an_array_and_has_arithmetic(m: avlmaps.AVLMap) -> None:

@@ -32,6 +32,7 @@ from avlmaps.query.modalities import Attachment, Photo, read_picture
 from avlmaps.query.places import distance_m, lies_between, place_given
 
 if TYPE_CHECKING:
+    from avlmaps.language.intents import Ask
     from avlmaps.language.list_questions import ListQuestion
     from avlmaps.language.questions import AskedSentence
     from avlmaps.language.sentence import OwnName
@@ -43,6 +44,8 @@ _MOST_ALIKE = 10  # goals that are looked at for others that fit as well
 _STOREY_STEMS = ("floor", "stor", "level", "stair")
 _AS_NEAR = "distance counts, the side does not."
 _BETWEEN = re.compile(r"\bbetween\b", re.IGNORECASE)
+_NEAR = r"\b(?:near|next to|beside|by|close to)(?: the)?"
+_HEARD = re.compile(r"\b(?:hear|heard|sounds?|noises?)\b", re.IGNORECASE)
 # "There is no chair in the kitchen, right?"
 _STATED = re.compile(
     r"(?:so,? |and )?there (?P<verb>is|are)(?P<no>n't| not| no)?(?: any)? (?P<what>.+?),? "
@@ -216,9 +219,6 @@ def on_storey(answer: Answer, storeys: "Storeys | None") -> Answer:
     return replace(answer, storeys=storeys, text=text)
 
 
-# The kinds of question.
-
-
 def _of_storeys(asking: _Asking) -> Answer | None:
     sentence = asking.asked.sentence
     if not any(stem in sentence.lower() for stem in _STOREY_STEMS):  # a query of one word loads nothing of the language
@@ -288,14 +288,18 @@ def _of_lists(asking: _Asking) -> Answer | None:
 
 
 def _read_list(asking: _Asking) -> "ListQuestion | None":
-    from avlmaps.language.list_questions import list_question, read_list
+    from avlmaps.language.list_questions import Listed, list_question, read_list
 
     asked, own = asking.asked, own_names(asking.avlmap, asking.asked.sentence)
     by_rows = read_list(asked.sentence, own)
     if by_rows is not None or not asked.sentence.strip():
         return by_rows
     with suppress(QueryError):  # `_read` says why a sentence is not understood
-        return list_question(_reading(asked, asked.sentence, own).inquiry)
+        listed = list_question(_reading(asked, asked.sentence, own).inquiry)
+        how = listed and {Listed.BESIDE: "near", Listed.CONTENTS: "in"}.get(listed.of)
+        if listed and how and _HEARD.search(asked.sentence) and not listed.name.startswith("sound of "):
+            return replace(listed, of=Listed.HEARD, how=how)  # who asks for sounds is told of no things
+        return listed
     return None
 
 
@@ -329,12 +333,15 @@ def _of_claims(asking: _Asking) -> Answer | None:
         return None
     answer = _read(asking.but(sentence=f"{stated['verb'].lower()} there {stated['what']}"))
     is_right = answer.found != bool(stated["no"])
-    return replace(answer, text=f"{'Yes' if is_right else 'No'}. {answer.text}")
+    return replace(answer, text=f"{'Yes' if is_right else 'No'}. {re.sub('^(Yes|No)[.] ', '', answer.text)}")
 
 
 def _read(asking: _Asking) -> Answer:
     asked, avlmap = asking.asked, asking.avlmap
-    questions, notes, counted = _questions(asked, own_names(avlmap, asked.sentence))
+    from avlmaps.language.intents import Ask
+
+    questions, notes, kind = _questions(asked, own_names(avlmap, asked.sentence))
+    counted = kind is Ask.HOW_MANY
     listed = None if questions else _of_lists(asking)  # "the largest room" in another question
     if listed is not None:
         return listed
@@ -357,6 +364,8 @@ def _read(asking: _Asking) -> Answer:
         best = replace(best, goals=_one_a_room(avlmap, best.goals))
     count = sum(goal.probability >= avlmap.settings.found_at for goal in best.goals) if counted else None
     text = found_text(best.parts, best.goals[0], count) if best.found and counted else best.text
+    if kind is Ask.EXISTS:
+        text = f"{'Yes' if best.found else 'No'}. {text}"
     sides = " ".join(note for note in notes if note.endswith(_AS_NEAR)) if best.found else ""
     return replace(
         best, goals=best.goals[: asked.top], count=count, notes=(*notes, *best.notes),
@@ -382,15 +391,14 @@ def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
     return Question.of([Part(Modality.OBJECT, asked.sentence)]) if is_name else None
 
 
-def _questions(asked: Asked, own: "tuple[OwnName, ...]") -> tuple[tuple[Question, ...], tuple[str, ...], bool]:
-    from avlmaps.language.intents import Ask
+def _questions(asked: Asked, own: "tuple[OwnName, ...]") -> "tuple[tuple[Question, ...], tuple[str, ...], Ask]":
     from avlmaps.language.list_questions import said_alternatives
 
     said = said_alternatives(asked.sentence) or (asked.sentence,)
     read = [_reading(asked, words, own) for words in said]
     questions = tuple(dict.fromkeys(question for one in read for question in one.questions))
     notes = tuple(dict.fromkeys(note for one in read for note in one.notes))
-    return questions, notes, read[0].inquiry.ask is Ask.HOW_MANY
+    return questions, notes, read[0].inquiry.ask
 
 
 def _reading(asked: Asked, words: str, own: "tuple[OwnName, ...]") -> "AskedSentence":
@@ -419,12 +427,14 @@ def _related(sentence: str, question: Question) -> Question:
     # The goals lie between the two parts of context that are named behind "between", whatever they are. No room lies in
     # another one.
     said = _BETWEEN.search(sentence)
-    ends = [part for part in question.parts if part.role is Role.CONTEXT] if said else []
+    context = [part for part in question.parts if part.role is Role.CONTEXT]
+    ends = context if said else []
     if said and len(ends) > 2:
         ends = [part for part in ends if part.query.casefold() in sentence[said.end() :].casefold()]
     named = dict(zip(map(id, ends), ENDS, strict=True)) if len(ends) == len(ENDS) else {}
     rooms = "near" if question.lead.modality is Modality.AREA else ""
-    return Question(tuple(replace(part, relation=named.get(id(part), rooms)) for part in question.parts))
+    near = {id(part): "near" for part in context if re.search(rf"{_NEAR} {re.escape(part.query)}\b", sentence.lower())}
+    return Question(tuple(replace(part, relation=(near | named).get(id(part), rooms)) for part in question.parts))
 
 
 def _answered(avlmap: "AVLMap", question: Question, asked: Asked, *, counted: bool = False) -> Answer:
@@ -449,7 +459,7 @@ def _fused(
     avlmap: "AVLMap", question: Question, heats: Sequence[Heatmap], *, counted: bool
 ) -> tuple[Heatmap, list[Factor]]:
     # The product of the parts, and the factor of each. Areas that goals lie between, or that things are counted in,
-    # bound the goals instead.
+    # bound the goals instead: what is counted in one is no likelier than that there is any.
     areas = [part.role is Role.CONTEXT and part.modality is Modality.AREA for part in question.parts]
     ends = [part.relation in ENDS for part in question.parts]
     counts_things = counted and question.lead.modality is Modality.OBJECT
@@ -467,7 +477,8 @@ def _fused(
         heat = heat.only(_between(*(one.factors[0] for one, is_end in zip(heats, ends, strict=True) if is_end)))
     for part, is_end, is_bound in zip(question.parts, ends, bounds, strict=True):
         if is_bound and not is_end:
-            heat = heat.only(partial(avlmap.where.inside, part.query))
+            most, inside = product(heats).probability, partial(avlmap.where.inside, part.query)
+            heat = heat.only(lambda places, most=most, inside=inside: most * inside(places))
     return heat, factors
 
 

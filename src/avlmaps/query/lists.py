@@ -26,6 +26,7 @@ from avlmaps.query.contents import NOWHERE, Whereabouts
 from avlmaps.query.edits import means
 from avlmaps.query.goals import MOST_GOALS, Goal
 from avlmaps.query.places import lies_between
+from avlmaps.query.words import is_a
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Stay
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from avlmaps.query.contents import SoundEvent, Thing
 
 BESIDE_M = 1.0  # from box to box, horizontally
+_HEARD_M = 2.5  # from the robot to the box of what it was near
 _ON_M = 0.3  # how far over a thing's box another that lies on it may be
 _HANGS = ("wall", "ceiling", "built in")  # such lies on nothing, even over a table
 _MOST_NAMED = 12
@@ -107,10 +109,8 @@ def _rooms_by_size(lists: _Lists) -> Answer:
         return lists.answer([], f"The map shows no room of {_LEAST_M2:g} m² or more.")
     likely = extreme_shares(areas[order], smallest=first)
     goals = [_room_goal(where, int(number)) for number in order]
-    goals = [
-        replace(goal, probability=round(share * goal.probability, 3))
-        for goal, share in zip(goals, likely.tolist(), strict=True)
-    ]
+    sure = (likely * [goal.probability for goal in goals]).round(3).tolist()
+    goals = [replace(goal, probability=one) for goal, one in zip(goals, sure, strict=True)]
     which = "smallest" if first else "largest"
     text = placed(f"the {which} room is {the_room(goals[0].name)}, {areas[order[0]]:.0f} m²", goals[0])
     rivals = [f"{the_room(goals[n].name)} ({areas[order[n]]:.1f} m²)" for n in np.flatnonzero(likely > 0.1).tolist()]
@@ -159,14 +159,21 @@ def _sounds_by_time(lists: _Lists) -> Answer:
 
 
 def _heard(lists: _Lists) -> Answer:
-    # When, where and how often a sound was heard, which came first, or what was heard in a room.
+    # When, where and how often a sound was heard, which came first, or what was heard in a room or near a thing.
     question, sounds = lists.question, sorted(lists.avlmap.sounds(), key=lambda sound: sound.onset_s)
-    if question.how == "in":
-        inside = lists.avlmap.where.inside(question.name, [sound.position for sound in sounds]) if sounds else ()
-        sounds = [sound for sound, is_in in zip(sounds, inside, strict=True) if is_in]
-        told = ", ".join(f"{_sound_goal(sound).name} at {sound.onset_s:.1f} s" for sound in sounds)
-        text = f"In the {question.name} were heard: {told}." if sounds else f"No sound was in the {question.name}."
-        return lists.answer([_sound_goal(sound) for sound in sounds], text, count=len(sounds))
+    if question.how in ("in", "near"):
+        goals, fits = list(map(_sound_goal, sounds)), list[int]()
+        if question.how == "in" and goals:
+            fits = np.flatnonzero(lists.avlmap.where.inside(question.name, [goal.position for goal in goals])).tolist()
+        elif goals:
+            subject = lists.ask(question.name)
+            if not subject.found:
+                return replace(subject, goals=())
+            fits = sorted(number for _, number in _near(lists, subject.goals[0], goals, _HEARD_M))
+        told = ", ".join(f"{goals[number].name} at {sounds[number].onset_s:.1f} s" for number in fits)
+        where = f"{question.how} {the_room(question.name)}"
+        text = f"{where.capitalize()} were heard: {told}." if told else f"No sound was heard {where}."
+        return lists.answer([goals[number] for number in fits], text, count=len(fits))
     found = [sound for sound in sounds if _is_called(sound, question.name)]
     goals = [_sound_goal(sound) for sound in found]
     if not found:
@@ -344,13 +351,23 @@ def _beside(lists: _Lists) -> Answer:
         return replace(subject, goals=())
     if lists.question.other:
         return _between(lists, subject)
-    own = _Box(lists.avlmap, subject.goals[0])
-    near = [(own.gap_m(box), thing) for thing in lists.things() if not own.overlaps(box := _Box(lists.avlmap, thing))]
-    near = sorted((one for one in near if one[0] <= BESIDE_M), key=lambda one: one[0])
+    goals = list(map(_thing_goal, lists.things()))
+    near = _near(lists, subject.goals[0], goals, BESIDE_M)
     words = in_words([one.part for one in subject.parts])
-    what = ", ".join(f"{thing.name} ({gap:.1f} m)" for gap, thing in near[:_MOST_NAMED])
+    what = ", ".join(f"{goals[number].name} ({gap:.1f} m)" for gap, number in near[:_MOST_NAMED])
     text = f"Next to {words}: {what or 'no thing that the map is certain of'}."
-    return lists.answer([_thing_goal(thing) for _, thing in near], text, subject)
+    return lists.answer([goals[number] for _, number in near], text, subject)
+
+
+def _near(lists: _Lists, mark: Goal, goals: Sequence[Goal], most_m: float) -> list[tuple[float, int]]:
+    # The gap to each goal near a thing and its number, the nearest first. Walls part things; a door is in two rooms.
+    own, boxes = _Box(lists.avlmap, mark), [_Box(lists.avlmap, goal) for goal in goals]
+    room, *rooms = lists.avlmap.where.rooms_of(np.array([one.position for one in (mark, *goals)])).tolist()
+    of_two = [is_a(goal.name, "door") or is_a(lists.question.name, "door") for goal in goals]
+    each = zip(boxes, rooms, of_two, strict=True)
+    gaps = [own.gap_m(box) if at == room or both else math.inf for box, at, both in each]
+    near = (number for number, gap in enumerate(gaps) if gap <= most_m and not own.overlaps(boxes[number]))
+    return sorted((gaps[number], number) for number in near)
 
 
 def _between(lists: _Lists, one: Answer) -> Answer:
@@ -405,9 +422,6 @@ def counted(names: Sequence[str]) -> str:
     often = Counter(names).most_common()
     shown = ", ".join(name if count == 1 else f"{name} ({count})" for name, count in often[:_MOST_NAMED])
     return shown + (f" and {len(often) - _MOST_NAMED} kinds more" if len(often) > _MOST_NAMED else "")
-
-
-# Storeys.
 
 
 def how_many(avlmap: "AVLMap") -> Answer:

@@ -208,10 +208,8 @@ def beyond(lists: MapLists, room: str | None, about: NearAnswer | None) -> list[
     """Return the note that what things should be near to lies in another room than they do."""
     if room is None or about is None or _inside(lists, room, [about], lambda one: one["position"]):
         return []
-    own = lists.avlmap.where.name_of(about["position"])
-    return [
-        f"No {about['name']} lies in {the_room(room)}; the distances are to the one in {the_room(own or 'the map')}."
-    ]
+    own = the_room(lists.avlmap.where.name_of(about["position"]) or "the map")
+    return [f"No {about['name']} lies in {the_room(room)}; the distances are to the one in {own}."]
 
 
 def map_answer(avlmap: AVLMap, note: Callable[[AvlmapsError], object] = lambda _: None) -> dict[str, Any]:
