@@ -68,18 +68,17 @@ def test_every_row_of_what_was_measured_has_its_figure(entry):
         assert (shown(figure, MEASURED.get(entry.name)) == NOT_YET) == (entry.name not in MEASURED), figure.label
 
 
-def test_sealed_rounds_are_added_up_from_the_one_after_the_fourth():
+def test_sealed_rounds_are_added_up_whole_and_after_the_fourth():
     columns = ["list", "sentences", "right", "harmless", "asked back", "misread", "dangers driven"]
-    rows = [
-        ["fourth four, commands", 9, "9 (x)", "", "", "0 (x)", "-"],
+    early = [[f"{name} four, commands", 5, "1 (x)", "", "", "0 (x)", "-"] for name in ("first", "2", "3", "fourth")]
+    late = [
         ["fifth, commands", 10, "8 (x)", "", "", "2 (x)", "1 of 3"],
         ["fifth, questions", 10, "0 (x)", "", "", "9 (x)", "-"],
         ["sixth, commands", 10, "9 (x)", "", "", "0 (x)", "0 of 4"],
     ]
-    told = pooled({"columns": columns, "rows": rows})
-    assert (told[2], told[5], told[6]) == (
-        "right 17 of 20 (85.0 %)", "misread 2 of 20 (10.0 %)", "dangers driven 1 of 7",
-    )  # fmt: skip
+    told = pooled({"columns": columns, "rows": [["child, commands", 9, "9 (x)", "", "", "0 (x)", "-"], *early, *late]})
+    assert told[2] == "right 21 of 40 (52.5 %), after round 4 17 of 20 (85.0 %)"
+    assert (told[5].split(",")[0], told[6]) == ("misread 2 of 40 (5.0 %)", "dangers driven 1 of 7")
 
 
 def test_what_was_measured_is_known_by_an_entry_and_by_its_own_command():
