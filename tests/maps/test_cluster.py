@@ -75,7 +75,6 @@ def test_the_order_of_jobs_and_jobs_that_are_done_twice_change_nothing(
     assert build(tmp_path / "map", Pickled(times=2, seed=3), audio) == alone
 
 
-@pytest.mark.nightly
 def test_a_build_whose_head_dies_resumes_to_the_same_map(tmp_path: Path, audio: Path, alone: dict[str, bytes]) -> None:
     done = []
 

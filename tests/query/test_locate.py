@@ -73,13 +73,6 @@ def test_a_located_picture_needs_no_guess(stored: LocatableMap, photo: np.ndarra
     assert_at(asked, PHOTO_FROM)
 
 
-@pytest.mark.nightly
-def test_the_same_question_has_the_same_answer(stored: LocatableMap, photo: np.ndarray) -> None:
-    a, b = (locate(stored, photo, None, rng()) for _ in range(2))
-    np.testing.assert_array_equal(a.world_from_camera, b.world_from_camera)
-    assert replace(a, world_from_camera=None, elapsed_ms=0.0) == replace(b, world_from_camera=None, elapsed_ms=0.0)
-
-
 def test_a_photo_of_another_size_is_taken_for_the_maps_own_camera(stored: LocatableMap) -> None:
     large = WALK.room.render(PHOTO_FROM, CAMERA.resized(480, 360))[0]
     assert_at(locate(stored, large, None, rng()), PHOTO_FROM)
