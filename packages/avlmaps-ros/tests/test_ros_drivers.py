@@ -20,7 +20,7 @@ from avlmaps_ros import (
     RosSettings,
     open_ros_driver,
 )
-from avlmaps_ros.goals import ActionGoal, End, SentGoal, Stage
+from avlmaps_ros.goals import ActionGoal, End, SentGoal
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -176,7 +176,7 @@ def test_a_goal_that_takes_too_long_is_cancelled(robot):
 
 
 def test_a_goal_that_the_bridge_has_forgotten_is_cancelled_by_the_name_that_nav2_gave_it():
-    settings = quick(goal_timeout_s=0.3, cancel_timeout_s=2.0)
+    settings = quick(goal_timeout_s=1.5, cancel_timeout_s=2.0)
     with FakeRobot(2, "deaf to ids") as robot, opened(robot, settings=settings) as driver:
         arrival = driver.go_to(PLACE)
         assert not arrival.reached
@@ -241,26 +241,11 @@ def test_a_message_too_large_ends_the_connection_and_not_the_process(robot):
 def test_a_robot_whose_pose_is_no_number_is_not_driven(robot, spoiled):
     with opened(robot, settings=quick(pose_max_age_s=0.3)) as driver:
         robot.spoiled = spoiled
-        robot.soon(lambda: driver._contact.is_unseen_for(0.3))
+        robot.soon(lambda: driver._contact.is_unseen())
         arrival = driver.go_to(PLACE)
         assert not arrival.reached
         assert "is not known" in arrival.note
         assert not goals(robot)
-
-
-def test_a_robot_that_loses_its_way_is_stopped(robot):
-    robot.does[""] = "drive on"
-    with opened(robot, settings=quick(pose_max_age_s=0.5)) as driver:
-
-        def lose_its_way() -> None:
-            robot.soon(lambda: bool(goals(robot)))
-            robot.tf_on = False
-
-        in_thread(lose_its_way)
-        arrival = driver.go_to(PLACE)
-        assert not arrival.reached
-        assert "is not known any more" in arrival.note
-        assert robot.soon(lambda: cancels(robot) > 0)
 
 
 class Clock:
@@ -337,7 +322,8 @@ def test_heartbeats_name_the_active_goal_and_end_with_it(robot):
     with driven_by(robot, clock, heartbeat_s=0.5, pose_max_age_s=60.0, stall_s=60.0) as driver:
         assert not beats(robot)
         thread, _ = in_thread(lambda: driver.go_to(PLACE))
-        assert robot.soon(lambda: len(beats(robot)) == 1)
+        assert robot.soon(lambda: len(beats(robot)) == 1 and bool(goals(robot)))
+        sleep(0.3)  # it is watched now
         for count in (2, 3):
             clock.now_s += 0.6
             assert robot.soon(lambda count=count: len(beats(robot)) == count)
@@ -380,7 +366,7 @@ def test_nothing_waits_behind_a_goal_where_the_bridge_takes_one_message_after_th
         robot.blocks = True
         thread, results = in_thread(lambda: driver.go_to(PLACE))
         assert robot.soon(lambda: len(beats(robot)) >= 2)  # so that no watchdog ends the goal
-        assert not driver._contact.is_unseen_for(5.0)
+        assert not driver._contact.is_unseen()
         stopped = driver.stop()
         assert stopped.reached, stopped.note
         thread.join(20.0)
@@ -390,7 +376,7 @@ def test_nothing_waits_behind_a_goal_where_the_bridge_takes_one_message_after_th
 
 
 def test_a_behaviour_that_is_absent_blocks_nothing_and_is_not_blamed_on_nav2():
-    with FakeRobot(2) as robot, opened(robot, settings=quick(answer_timeout_s=1.0)) as driver:
+    with FakeRobot(2) as robot, opened(robot, settings=quick(answer_timeout_s=2.0)) as driver:
         robot.blocks = True
         robot.does["/spin"] = "silent"  # the bridge waits for ever for a server that is not there
         arrival = driver.turn(1.0)
@@ -686,10 +672,9 @@ def test_a_goal_that_its_server_does_not_know_is_over_only_where_it_was_accepted
     goal = SentGoal(ActionGoal("/navigate_to_pose", "", {}, 60.0), answer_s=10.0)
     if accepted:
         goal.show(1.0)
-    goal.call_off(2.0)
-    goal.unknown(2.5, "unknown")
-    assert goal.stage is (Stage.OVER if accepted else Stage.SENT)
-    goal.unknown(11.9, "unknown")
-    assert goal.stage is (Stage.OVER if accepted else Stage.SENT)
+    goal.called_off_s = 2.0
+    for now_s in (2.5, 11.9):
+        goal.unknown(now_s, "unknown")
+        assert (goal.end is not None, goal.waits) == (accepted, not accepted)
     goal.unknown(12.1, "unknown")
     assert goal.end is End.CANCELLED

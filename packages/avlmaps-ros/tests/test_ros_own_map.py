@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import NavigationError
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps_ros import Frames, GroundTransform, RosSettings, open_ros_driver
-from avlmaps_ros.own_map import OwnGrid, grid_in, on_own_map
+from avlmaps_ros.own_map import OwnGrid, grid_of, on_own_map
 
 OURS = Obstacles(np.eye(3), np.array([-2.0, -2.0]), 0.1, 0.05, np.full((60, 60), CellState.FREE, np.uint8))
 poses = st.tuples(st.floats(-20, 20), st.floats(-20, 20), st.floats(-pi, pi))
@@ -84,11 +84,11 @@ def message(**changes) -> dict:
 def test_what_is_no_grid_is_left_out(changes):
     told = message(**changes) if "info" not in changes else {**message(), **changes}
     with pytest.raises(ValueError):
-        grid_in(msgspec.Raw(msgspec.json.encode(told)))
+        grid_of(msgspec.Raw(msgspec.json.encode(told)))
     told = message()
     told["data"][7] = 300
     with pytest.raises(ValueError):
-        grid_in(msgspec.Raw(msgspec.json.encode(told)))
+        grid_of(msgspec.Raw(msgspec.json.encode(told)))
 
 
 @pytest.mark.parametrize("ros", [1, 2])

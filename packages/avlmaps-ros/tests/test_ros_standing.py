@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps_ros.contact import STILL_M, STILL_S, Stillness
+from avlmaps_ros.contact import STILL_M, STILL_S, stillness
 from avlmaps_ros.messages import Transform
 from avlmaps_ros.session import Echoes
 from avlmaps_ros.tree import LiveTree
@@ -65,10 +65,10 @@ def test_a_body_that_moves_is_never_seen_to_stand_and_one_that_stopped_soon_is(
 ) -> None:
     robot, begun_s = Robot(speed, stops_s, odom_s, map_s, late_s, offset_s), 0.3
     robot.until(begun_s)
-    still, stood_s = Stillness(robot.clock()), None
+    stands, stood_s = stillness(robot.clock()), None
     for now_s in np.arange(begun_s, 6.0, LOOK_S):
         robot.until(now_s)
-        if still.shown(robot.tree.seen("map", "base")):
+        if stands(robot.tree.seen("map", "base")):
             stood_s = now_s
             break
     assert stood_s is not None, "it never stood"

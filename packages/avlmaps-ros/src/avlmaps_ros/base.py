@@ -8,7 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from math import isfinite, pi
+from math import inf, isfinite, pi
 from time import monotonic
 from typing import Self
 
@@ -19,9 +19,8 @@ from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.interrupts import Halt
-from avlmaps_ros import goals
 from avlmaps_ros.contact import Contact
-from avlmaps_ros.goals import ActionGoal, End, MovementPlan, SentGoal, Stage, Track
+from avlmaps_ros.goals import LEAST_M, LONGEST_M, ActionGoal, End, MovementPlan, SentGoal, Standing, Tasks, Track
 from avlmaps_ros.guard import GoalGuard
 from avlmaps_ros.session import AGAIN_S, Opener, Session, call_off, ended_within
 from avlmaps_ros.tree import Sighting
@@ -33,8 +32,7 @@ _NEXT_LIST_S = 0.5
 _BEATS = 2.5  # heartbeats without one, after which nobody watches a goal
 _LEAP_M, _FASTEST_M_S = 0.5, 2.0  # a pose that moves by more than a robot drives has jumped
 _ASK_AFTER = 0.4  # of the time for which a server may be silent
-_IDLE = Halt(True, "no goal was active")
-_UNCONFIRMED = "the robot did not confirm that it gave up its goal"
+_IDLE = "no goal was active"
 
 
 class RosDriver:
@@ -42,16 +40,16 @@ class RosDriver:
 
     Attributes:
         guard: a second process that cancels when this one dies; None where nobody started one.
-        elsewhere: returns why a place of another storey is not driven to, ``""`` for others; None for a map of one.
+        elsewhere: returns why a place of another storey is not driven to, ``""`` for others.
         held: see `Holdable`.
     """
 
     def __init__(
         self,
         opener: Opener,
-        tasks: goals.Tasks,
+        tasks: Tasks,
         *,
-        standing: goals.Standing | None = None,
+        standing: Standing | None = None,
         level_from_world: Float[np.ndarray, "3 3"] | None = None,
         clock: Callable[[], float] = monotonic,
     ) -> None:
@@ -59,13 +57,12 @@ class RosDriver:
         self._standing = standing
         self._level_from_world = np.eye(3) if level_from_world is None else np.asarray(level_from_world, np.float64)
         self._busy, self._halted, self._closing = threading.Lock(), threading.Event(), threading.Event()
-        self._goal: SentGoal | None = None
-        self._owed: SentGoal | None = None  # was sent, and its end is not confirmed
+        self._goal: SentGoal | None = None  # was sent, and its end is not confirmed
         self._ours: deque[SentGoal] = deque(maxlen=50)
-        self._halt = _IDLE
+        self._left = _IDLE  # what became of the last movement's goal
         self._clock = clock
         self.guard: GoalGuard | None = None
-        self.elsewhere: Callable[[Float[np.ndarray, 3]], str] | None = None
+        self.elsewhere: Callable[[Float[np.ndarray, 3]], str] = lambda _: ""
         self.held: Callable[[], str] = lambda: ""
         self._absent: set[str] = set()
         self._mute: set[str] = set()
@@ -77,8 +74,7 @@ class RosDriver:
         return self._contact.pose
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
-        refused = "" if self.elsewhere is None else self.elsewhere(place)
-        if refused:
+        if refused := self.elsewhere(place):
             return self._move(lambda _: refused)
         wanted = self._level(place)
         looked_at = None if face is None else self._level(face)
@@ -89,7 +85,7 @@ class RosDriver:
 
     def forward(self, distance_m: float) -> Arrival:
         """Drive straight ahead; for a negative distance it turns round first, so that it sees where it goes."""
-        if not -goals.LONGEST_M < distance_m <= -goals.LEAST_M:
+        if not -LONGEST_M < distance_m <= -LEAST_M:
             return self._move(lambda start: self._tasks.plan_ahead(start, distance_m))
         turned = self.turn(pi)
         if not turned.reached:
@@ -106,10 +102,11 @@ class RosDriver:
         track, contact, wait_s = Track(self.pose), self._contact, self.settings.cancel_timeout_s
         if not contact.renewed_within(wait_s):
             return self._arrival(False, track, f"{contact.loss()}, and it cannot be reached; use the robot's own stop")
+        owed = None if self._busy.locked() else self._goal
         idle = self._all_called_off(wait_s)
         still = contact.stands_still(wait_s)
-        if idle and self._owed is not None:
-            self._settle(self._owed)
+        if idle and owed is not None:
+            self._settle(owed)
         called = self._tasks.called
         if not still:
             return self._arrival(False, track, "The robot was stopped, but its pose changes or is lost")
@@ -117,7 +114,7 @@ class RosDriver:
             return self._arrival(True, track, "")
         if idle is False:
             return self._arrival(False, track, f"{called} does not give up its goal; the robot pauses")
-        if self._may_go_on():
+        if self._unfinished is not None or any(contact.ear.servers.under_way().values()):
             return self._arrival(False, track, f"{called} does not answer, and was at a goal; the robot pauses")
         return self._arrival(True, track, f"The robot stands, but {called} does not say that it has no goal")
 
@@ -140,21 +137,18 @@ class RosDriver:
 
         Unlike ``stop`` it leaves goals of others alone. It waits at most ``cancel_timeout_s``.
         """
-        if self._owed is not None:
-            return Halt(False, _UNCONFIRMED)
-        halt = self._halt
-        if not halt.stopped:
-            return halt
+        if self._goal is not None:
+            return Halt(False, "the robot did not confirm that it gave up its goal")
         if self._contact.stands_still(self.settings.cancel_timeout_s):
             pose = self.pose
-            return Halt(True, f"{halt.note}; the robot stands at ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+            return Halt(True, f"{self._left}; the robot stands at ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
         moved = "a goal of another client drives the robot" if self._others() else "the robot is not seen to stand"
-        return Halt(False, f"{halt.note}, but {moved}")
+        return Halt(False, f"{self._left}, but {moved}")
 
     @property
     def owes(self) -> bool:
         """Whether a goal was sent whose end the robot has not confirmed, so that it may still be driving."""
-        return self._owed is not None and self._owed.stage is not Stage.OVER
+        return self._unfinished is not None
 
     def close(self) -> None:
         """End the connection; a goal that is not over is called off first, and else left to the guard."""
@@ -164,7 +158,7 @@ class RosDriver:
         self._closing.set()
         self._contact.session.close()
         if self.guard is not None:
-            self.guard.close(dismissed=goal is None or goal.stage is Stage.OVER)
+            self.guard.close(dismissed=goal is None or goal.end is not None)
 
     def __enter__(self) -> Self:
         return self
@@ -174,11 +168,8 @@ class RosDriver:
 
     @property
     def _unfinished(self) -> SentGoal | None:
-        goal = self._goal or self._owed
-        return None if goal is None or goal.stage is Stage.OVER else goal
-
-    def _may_go_on(self) -> bool:
-        return self._unfinished is not None or any(self._contact.ear.servers.under_way().values())
+        goal = self._goal
+        return None if goal is None or goal.end is not None else goal
 
     def _level(self, place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
         known = np.isfinite(place).all()  # NaN stays NaN, without a warning
@@ -189,7 +180,7 @@ class RosDriver:
             return self._arrival(False, Track(self.pose), "The robot is still at another movement")
         try:
             self._halted.clear()
-            self._halt = _IDLE
+            self._left = _IDLE
             if why := self._unready():
                 return self._arrival(False, Track(self.pose), why)
             start = self.pose
@@ -204,14 +195,14 @@ class RosDriver:
         """Return why nothing may be sent now; "" where it may. Connect again, and call off what is owed, first."""
         contact = self._contact
         contact.renew()
-        if self._owed is not None and not self._called_off(self._owed, self.settings.cancel_timeout_s):
-            return "An earlier goal may still be driving the robot: it does not confirm the cancel"
-        if self._owed is not None:
-            self._settle(self._owed)
-        if contact.pose_within(self.settings.pose_max_age_s) is None:
+        if (owed := self._goal) is not None:
+            if not self._called_off(owed, self.settings.cancel_timeout_s):
+                return "An earlier goal may still be driving the robot: it does not confirm the cancel"
+            self._settle(owed)
+        if contact.fresh_pose() is None:
             late = contact.session.lost is None and contact.sighting() is not None
             # A new connection has no queue, and takes the robot's clock as it is now.
-            if not (late and contact.replace() and contact.pose_within(self.settings.pose_max_age_s) is not None):
+            if not (late and contact.replace() and contact.fresh_pose() is not None):
                 return f"Where the robot is is not known: {contact.unseen()}"
         if self._others(_ASK_S):
             return f"{self._tasks.called} is at a goal of another client; wait for its end, or stop it"
@@ -220,10 +211,9 @@ class RosDriver:
     def _others(self, wait_s: float = 0.0) -> bool:
         """Return whether a goal of others is under way, by lists and heartbeats, also after some time."""
         contact, until_s, asked = self._contact, monotonic() + wait_s, False
-        every_s = contact.session.lists_every_s
         while True:
-            names = frozenset(name for goal in self._ours for name in goal.names)
-            lists = contact.ear.servers.under_way(None if every_s is None else 10.0 * every_s)
+            names = frozenset(name for goal in self._ours for name in (goal.id, goal.alias))
+            lists = contact.ear.servers.under_way(10.0 * contact.session.lists_every_s)
             servers = [server for server, goals in lists.items() if goals - names]
             is_driven = bool(servers or contact.ear.beats.within(_BEATS * self.settings.heartbeat_s) - names)
             if not is_driven or monotonic() >= until_s:
@@ -235,11 +225,6 @@ class RosDriver:
             with contact.session.heard:
                 contact.session.heard.wait(_LOOK_EVERY_S)
 
-    def _others_soon(self) -> bool:
-        session = self._contact.session
-        with session.heard:
-            return session.heard.wait_for(lambda: self._others(), _NEXT_LIST_S)
-
     def _done(self, plan: MovementPlan, track: Track) -> Arrival:
         end, note = End.SUCCEEDED, ""
         for task in [task for task in plan.tasks if task.action not in self._absent] or plan.tasks[-1:]:
@@ -248,24 +233,24 @@ class RosDriver:
             if end is not End.ABSENT or self._halted.is_set():
                 break
             self._absent.add(task.action)
+        called, session = self._tasks.called, self._contact.session
         if end is not End.SUCCEEDED:
-            others = ". A goal of another client continues" if self._others_soon() else ""
-            return self._arrival(False, track, (note or f"{self._tasks.called} did not do it") + others)
-        called = self._tasks.called
+            with session.heard:
+                others = session.heard.wait_for(self._others, _NEXT_LIST_S)
+            continues = ". A goal of another client continues" if others else ""
+            return self._arrival(False, track, (note or f"{called} did not do it") + continues)
         now = self._contact.pose_from_now(self.settings.pose_max_age_s)
         if now is None:
             why = f"{called} says that it arrived, but its pose is not reported any more: {self._contact.unseen()}"
             return self._arrival(False, track, why)
         track.passed(now)
-        off = plan.off(now)
-        if off:
+        if off := plan.off(now):
             why = "its goal tolerance is loose, or the frames are wrong"
             return self._arrival(False, track, f"{called} says that it arrived, but {off}; {why}")
         return self._arrival(True, track, plan.note)
 
     def _pursue(self, task: ActionGoal, track: Track) -> SentGoal:
-        listed = self._contact.ear.servers.list_of(task.action)
-        before = frozenset[str]() if listed is None else listed[1]
+        _, before = self._contact.ear.servers.list_of(task.action)
         goal = SentGoal(task, self.settings.answer_timeout_s, before)
         if self._is_absent(task.action):
             goal.over(End.ABSENT, f"No action server takes the goal; start {self._tasks.called}, or name its namespace")
@@ -279,36 +264,32 @@ class RosDriver:
             if goal.end is None:
                 self._give_up(goal, why, absent)
         except BaseException:  # above all KeyboardInterrupt: nobody watches the robot any more
-            agreed = self._called_off(goal, self._patience_s(goal))
-            self._halt = Halt(agreed, "the active goal was cancelled" if agreed else _UNCONFIRMED)
+            self._called_off(goal, self._patience_s(goal))
+            self._left = "the active goal was cancelled"
             raise
         finally:
-            self._goal = None
-            if goal.stage is Stage.OVER:
+            if goal.end is not None:
                 self._settle(goal)
-            else:
-                self._owed = goal
         return goal
 
     def _settle(self, goal: SentGoal) -> None:
         goal.over(End.CANCELLED)
         self._contact.session.beat(goal)
-        if self._owed is goal:
-            self._owed = None
-        if self.guard is not None and self._owed is None:
-            self.guard.rest()
+        if self._goal is goal:
+            self._goal = None
+        if self.guard is not None and self._goal is None:
+            self.guard.beat(None)
 
     def _is_absent(self, server: str) -> bool:
         session, servers = self._contact.session, self._contact.ear.servers
         begun_s = self._clock()
-        served = servers.serves(server)
-        if (server not in self._mute and (served is None or not served[1])) and session.ask(server):
+        if server not in self._mute and not servers.serves(server)[1] and session.ask(server):
             with session.heard:
-                session.heard.wait_for(lambda: (servers.serves(server) or (-1.0, True))[0] >= begun_s, _ASK_S)
-            served = servers.serves(server)
-            if served is None:  # the bridge may hand out no services
+                session.heard.wait_for(lambda: servers.serves(server)[0] >= begun_s, _ASK_S)
+            if servers.serves(server)[0] == -inf:  # the bridge may hand out no services
                 self._mute.add(server)
-        return served is not None and not served[1]
+        at_s, serves = servers.serves(server)
+        return at_s > -inf and not serves
 
     def _watch(self, goal: SentGoal, track: Track) -> tuple[str, bool]:
         """Wait for a goal's end; else return why it is to be given up, and whether nobody is there to take it."""
@@ -331,8 +312,8 @@ class RosDriver:
             silent_s = self._silent_s(goal, sent_s, now_s)
             if why := self._lost_sight(goal, silent_s):
                 return why, False
-            if goal.stage is Stage.SENT and monotonic() - begun_s > settings.answer_timeout_s:
-                says = f" The bridge says: {session.complaint}" if session.complaint else ""
+            if goal.waits and monotonic() - begun_s > settings.answer_timeout_s:
+                says = f" The bridge says: {session.link.complaint}" if session.link.complaint else ""
                 within = f"within {settings.answer_timeout_s:g} s; is {self._tasks.called} running?{says}"
                 return f"Nothing answers at {goal.task.action} {within}", True
             if monotonic() - begun_s > goal.task.limit_s:
@@ -351,7 +332,7 @@ class RosDriver:
             return "The robot was stopped"
         if why := self.held():
             return why
-        if contact.is_unseen_for(settings.pose_max_age_s):
+        if contact.is_unseen():
             return f"Where the robot is is not known any more: {contact.unseen()}"
         if silent_s > settings.server_max_age_s:
             since = f"for {silent_s:.1f} s" if isfinite(silent_s) else "and its action server is gone"
@@ -361,21 +342,19 @@ class RosDriver:
     def _silent_s(self, goal: SentGoal, sent_s: float, now_s: float) -> float:
         if goal.heard_s is None:
             return 0.0
-        served = self._contact.ear.servers.serves(goal.task.action)
-        if served is None or served[0] <= max(sent_s, goal.heard_s):
+        at_s, serves = self._contact.ear.servers.serves(goal.task.action)
+        if at_s <= max(sent_s, goal.heard_s):
             return now_s - goal.heard_s
-        if not served[1]:
-            return float("inf")
-        # A server that listed a goal regularly and does so no more has lost it, also where it runs.
-        return now_s - (goal.heard_s if goal.shown >= _REGULAR else served[0])
+        # A server that showed a goal regularly and does so no more has lost it, also where it runs.
+        return inf if not serves else now_s - (goal.heard_s if goal.shown >= _REGULAR else at_s)
 
     def _give_up(self, goal: SentGoal, why: str, absent: bool) -> None:
         was_lost = self._contact.session.lost is not None
         agreed = self._called_off(goal, goal.answer_s + 2.0 * AGAIN_S if absent else goal.task.limit_s)
-        servers = self._contact.ear.servers
-        if absent and not servers.has_shown(goal.task.action):
+        servers, action = self._contact.ear.servers, goal.task.action
+        if absent and servers.list_of(action)[0] == -inf and not servers.serves(action)[1]:
             goal.over(End.ABSENT)
-        absent = absent and goal.stage is Stage.OVER
+        absent = absent and goal.end is not None
         if absent:
             goal.end = End.ABSENT
         if agreed or absent:
@@ -406,7 +385,7 @@ class RosDriver:
 
     def _patience_s(self, goal: SentGoal) -> float:
         wait_s = 2.0 * self.settings.cancel_timeout_s
-        return wait_s + (goal.answer_s if goal.stage is Stage.SENT else 0.0)
+        return wait_s + (goal.answer_s if goal.waits else 0.0)
 
     def _all_called_off(self, wait_s: float) -> bool | None:
         """Cancel every goal until the servers say that they are at none; return what they said last.
@@ -418,7 +397,7 @@ class RosDriver:
 
         def waits() -> bool:
             goal = self._unfinished
-            return goal is not None and goal.stage is Stage.SENT
+            return goal is not None and goal.waits
 
         def is_idle(session: Session) -> bool | None:
             return False if waits() else session.is_idle(since_s)

@@ -1,100 +1,163 @@
-"""A session over rosbridge: what Nav2 and move_base have in common there."""
+"""Nav2 behind rosbridge, and how late a bridge brings what the robot says."""
 
 import threading
-from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar
+from functools import partial
+from typing import Any
+from uuid import uuid4
 
 import msgspec
 
-from avlmaps_ros.goals import SentGoal
+from avlmaps.core.errors import NavigationError
+from avlmaps_ros.goals import End, SentGoal
 from avlmaps_ros.link import Link
-from avlmaps_ros.messages import Clock, Text
-from avlmaps_ros.session import Ear, heartbeat
+from avlmaps_ros.messages import ActionEnd, CancelAnswer, Clock, Incoming, Text, read, sanitize_line, text_in
+from avlmaps_ros.nav2 import NOBODY_TAKES_IT, Nav2Session, end_of
+from avlmaps_ros.session import Ear, Session
 from avlmaps_ros.settings import RosSettings
 
 _ECHO_EVERY_S = 0.2
 _CLOCK_EVERY_S = 0.1
+_MOST_CALLS = 5
+_OPEN_WITHIN_S = 2.0
 
 
-class BridgeSession(ABC):
-    """One connection to rosbridge, over which topics come and go; nothing on it ever waits for a goal."""
+def measure_delay(link: Link, session: Session) -> None:
+    """Listen from now on to what tells how late messages are: echoes of ours, and the time of a simulation."""
+    ear, between = session.ear, "msg/" if session.ros == 2 else ""
+    echo, text = session.settings.named("avlmaps/echo"), f"std_msgs/{between}String"
+    link.advertise(echo, text)
+    link.subscribe(echo, text, lambda said: ear.echoes.back(read(said, Text).data))
 
-    ros: ClassVar[int]
-    lists_every_s: ClassVar[float | None]
+    def tick(said: Any) -> None:
+        ear.tree.tick(read(said, Clock).clock.seconds)
 
-    def __init__(self, url: str, token: str | None, settings: RosSettings, ear: Ear, timeout_s: float) -> None:
-        self.heard = threading.Condition()
-        self.settings, self.ear = settings, ear
-        self._ours: dict[str, SentGoal] = {}
-        self._url, self._token = url, token
-        self.link = Link(url, token, timeout_s, self.heard)
-        self.name = self.link.url
-        link, tree = self.link, ear.tree
-        self._beats, echo = self._named("avlmaps/heartbeat"), self._named("avlmaps/echo")
-        between = "msg/" if self.ros == 2 else ""
-        transforms, text = f"tf2_msgs/{between}TFMessage", f"std_msgs/{between}String"
-        link.advertise(self._beats, text)
-        if ear.wants_poses:
-            prefix = settings.tf_namespace
-            link.subscribe(f"{prefix}/tf", transforms, lambda told: tree.hear(told, static=False))
-            link.subscribe(f"{prefix}/tf_static", transforms, lambda told: tree.hear(told, static=True))
-            link.subscribe(
-                "/clock", f"rosgraph_msgs/{between}Clock", lambda told: tree.tick(_seconds(told)), _CLOCK_EVERY_S
-            )
-            link.subscribe(self._beats, text, lambda told: ear.beats.hear(_text(told)))
-            link.advertise(echo, text)
-            link.subscribe(echo, text, lambda told: ear.echoes.back(_text(told)))
-            link.repeat(_ECHO_EVERY_S, lambda: link.publish(echo, {"data": ear.echoes.next()}))
-        self._greet()
+    def send() -> None:
+        if link.lost is None:
+            link.publish(echo, {"data": ear.echoes.next()})
+            link.later(_ECHO_EVERY_S, send)
 
-    @abstractmethod
-    def _greet(self) -> None:
-        """Subscribe and advertise what goals need."""
+    link.subscribe("/clock", f"rosgraph_msgs/{between}Clock", tick, _CLOCK_EVERY_S)
+    send()
 
-    def _named(self, name: str) -> str:
-        return f"{self.settings.namespace}/{name}"
+
+class BridgedNav2(Nav2Session):
+    """Nav2 behind rosbridge: topics on one connection, a goal on another, and each call on one of its own.
+
+    A bridge may take what comes behind a goal or a call only when that is over.
+    """
+
+    def __init__(self, link: Link, settings: RosSettings, ear: Ear) -> None:
+        self._beside = link.beside
+        self._carrier: Link | None = None
+        self._sent: SentGoal | None = None  # the goal that its connection is at
+        self._lock = threading.Lock()
+        self._free: list[Link] = []
+        self._calls: dict[str, tuple[Link, Callable[[int | None], None]]] = {}  # and what takes the answer
+        super().__init__(link, settings, ear)
 
     @property
     def lost(self) -> str | None:
-        return self.link.lost
+        return self.link.lost or (None if self._carrier is None or self._sent is None else self._carrier.lost)
 
-    @property
-    def complaint(self) -> str:
-        if self.link.complaint or not self.link.unread:
-            return self.link.complaint
-        return f"{self.link.unread} messages came that cannot be read (is it launched with bson_only_mode?)"
+    def send(self, goal: SentGoal) -> None:
+        self._ours[goal.id] = goal
+        if self._carrier is not None and (self._sent is not None or self._carrier.lost is not None):
+            self._carrier.drop()
+            self._carrier = None
+        self._sent = goal
+        self._carrier = self._carrier or self._taken()
+        if self._carrier is None:
+            goal.over(End.FAILED, "The bridge takes no second connection, over which the goal would go")
+            return
+        task = goal.task
+        sent = {"action": task.action, "action_type": task.kind, "args": task.arguments, "feedback": True}
+        self._carrier.send({"op": "send_action_goal", "id": goal.id, **sent})
 
-    def ask(self, server: str) -> bool:
-        del server
-        return False
+    def cancel(self, goal: SentGoal) -> None:
+        """Cancel a goal by our name at the bridge, which forgets it when it restarts, and by Nav2's where it is known.
 
-    def beat(self, goal: SentGoal) -> None:
-        self.link.publish(self._beats, {"data": heartbeat(goal)})
+        The bridge takes a cancel before the goal where the goal's own connection is slow, and leaves it out; so it goes
+        by that connection as well.
+        """
+        cancel = {"op": "cancel_action_goal", "id": goal.id, "action": goal.task.action}
+        if (link := self._taken()) is not None:
+            link.send(cancel)
+            self._free.append(link)  # a bridge never answers it
+        if self._carrier is not None and self._sent is goal:
+            self._carrier.send(cancel)
+        super().cancel(goal)
+
+    def _call(self, server: str, name: str, goal: SentGoal | None) -> bool:
+        link, call = self._taken(), f"avlmaps-{uuid4().hex}"
+        if link is None:
+            return False
+        self._calls[call] = link, partial(self._answered, server, name, goal)
+        goal_info = {"goal_id": {"uuid": list(bytes.fromhex(name))}, "stamp": {"sec": 0, "nanosec": 0}}
+        service = {"service": f"{server}/_action/cancel_goal", "type": "action_msgs/srv/CancelGoal"}
+        link.send({"op": "call_service", "id": call, **service, "args": {"goal_info": goal_info}})
+        return True
+
+    def _taken(self) -> Link | None:
+        """Take a connection that is free, or a new one; of many that are not, the oldest is given up."""
+        with self._lock:
+            self._free = [link for link in self._free if link.lost is None]
+            if self._free:
+                return self._free.pop()
+            crowded = self._calls.pop(next(iter(self._calls)))[0] if len(self._calls) >= _MOST_CALLS else None
+        if crowded is not None:
+            crowded.drop()
+        return self._opened()
+
+    def _opened(self) -> Link | None:
+        try:
+            link = self._beside(_OPEN_WITHIN_S)
+        except NavigationError:
+            return None
+        link.listener = self._replied
+        return link
 
     def close(self) -> None:
-        self.link.close()
+        links = [*self._free, *(link for link, _ in list(self._calls.values()))]
+        for link in links if self._carrier is None else [*links, self._carrier]:
+            link.drop()
+        super().close()
 
-    # Our goals, as servers list them.
+    # In the network's thread.
 
-    def _adopt(self, goal: SentGoal) -> None:
-        self._ours[goal.id] = goal
+    def _replied(self, message: Incoming) -> None:
+        name = message.id or ""
+        goal = self._ours.get(name)
+        if message.op == "service_response":
+            with self._lock:
+                link, answer = self._calls.pop(name, (None, None))
+            if link is None or answer is None:
+                return
+            self._free.append(link)
+            if message.result:
+                answer(read(message.values, CancelAnswer).return_code)
+            elif "not exist" in text_in(message.values):
+                answer(None)
+        elif message.op == "action_feedback" and goal is not None:
+            goal.show(self.ear.clock())
+        elif message.op == "action_result" and goal is not None:
+            self._sent = None if goal is self._sent else self._sent
+            goal.over(*_end_of(message))
+            self._each()
 
-    def _call_off(self, goal: SentGoal) -> None:
-        self._adopt(goal)
-        goal.call_off(self.ear.clock())
 
-    def _each(self, take: Callable[[SentGoal], None]) -> None:
-        for name, goal in list(self._ours.items()):
-            if goal.end is None:
-                take(goal)
-            if goal.end is not None:
-                self._ours.pop(name, None)
-
-
-def _text(message: msgspec.Raw) -> str:
-    return msgspec.json.decode(message, type=Text).data
-
-
-def _seconds(message: msgspec.Raw) -> float:
-    return msgspec.json.decode(message, type=Clock).clock.seconds
+def _end_of(message: Incoming) -> tuple[End, str]:
+    # Bridges have written a result in three forms; what cannot be read is a failure.
+    if not message.result:
+        why = text_in(message.values)
+        if "no action server" in why.lower():
+            return End.ABSENT, NOBODY_TAKES_IT
+        return End.FAILED, f"Nav2 refused the goal ({why or 'it does not say why'})"
+    try:
+        end = msgspec.json.decode(message.values, type=ActionEnd)
+        inner = msgspec.json.decode(end.result, type=ActionEnd) if bytes(end.result)[:1] == b"{" else end
+    except ValueError:
+        end = inner = ActionEnd()
+    status = message.status if message.status is not None else end.status
+    text = sanitize_line(end.error_msg or inner.error_msg)
+    return end_of(status, end.error_code or inner.error_code, text)

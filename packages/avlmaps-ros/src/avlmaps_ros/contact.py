@@ -4,6 +4,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from time import monotonic, sleep
+from typing import TypeGuard
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose, wrap_angle
@@ -14,26 +15,25 @@ from avlmaps_ros.tree import Sighting
 STILL_M, STILL_RAD, STILL_S = 0.015, 0.02, 0.5
 
 
-class Stillness:
-    """Decides from sightings, one after the other, whether a body stands.
+def stillness(begun_s: float) -> Callable[[Sighting | None], bool]:
+    """Return a function that takes what is seen, one sighting after the other, and says whether the body stands.
 
     Two poses are compared that were taken at least `STILL_S` apart, and every pose between them. When a pose was taken
     is known within bounds: the first no later than it was heard, the last no earlier than every moving transform in it
-    was made. So neither a slow transform nor a queue makes a moving body stand.
+    was made. So neither a slow transform nor a queue makes a moving body stand. What is not seen does not stand.
     """
+    first: Sighting | None = None
 
-    def __init__(self, begun_s: float) -> None:
-        self._begun_s = begun_s
-        self._first: Sighting | None = None
+    def stands(seen: Sighting | None) -> bool:
+        nonlocal first
+        if seen is None or seen.taken_s <= begun_s:
+            return False
+        if first is None or _is_elsewhere(first.pose, seen.pose):
+            first = seen
+            return False
+        return seen.taken_s - first.heard_s >= STILL_S
 
-    def shown(self, seen: Sighting | None) -> bool:
-        """Take in what is seen now; return whether the body stands. A robot that reports nothing does not."""
-        if seen is None or seen.taken_s <= self._begun_s:
-            return False
-        if self._first is None or _is_elsewhere(self._first.pose, seen.pose):
-            self._first = seen
-            return False
-        return seen.taken_s - self._first.heard_s >= STILL_S
+    return stands
 
 
 def _is_elsewhere(before: GroundPose, now: GroundPose) -> bool:
@@ -64,11 +64,11 @@ class Contact:
         self._renewing = threading.Lock()
         self.ear = Ear(clock)
         self.session, self.ear = self._opened(settings.connect_timeout_s)
-        if self.pose_within(settings.pose_timeout_s) is None:
+        if self._seen(settings.pose_timeout_s, self._is_fresh) is None:
             self.session.close()
             raise NavigationError(
-                f"The robot at {self.session.name} does not report its pose: {self.unseen(closed=True)}; start its "
-                "localisation, give it its initial pose, and name its frames as docs/robots.md shows."
+                f"The robot at {self.session.link.name} does not report its pose: {self.unseen(closed=True)}; start "
+                "its localisation, give it its initial pose, and name its frames as docs/robots.md shows."
             )
 
     def _opened(self, within_s: float) -> tuple[Session, Ear]:
@@ -81,7 +81,7 @@ class Contact:
         with self._renewing:
             if self.session.lost is not None:
                 self.session.close()
-                self.session, self.ear = self._opened(self.settings.connect_timeout_s if within_s is None else within_s)
+                self.session, self.ear = self._opened(within_s or self.settings.connect_timeout_s)
 
     def renewed_within(self, wait_s: float) -> bool:
         """Connect again where the connection was lost, and try until some time is over; return whether it stands."""
@@ -99,53 +99,48 @@ class Contact:
         """Connect a second time and leave the first connection, which may be stuck; return whether that succeeded."""
         with self._renewing:
             before = self.session
-            try:
+            with suppress(NavigationError):
                 self.session, self.ear = self._opened(min(_QUICK_S, self.settings.connect_timeout_s))
-            except NavigationError:
-                return False
-        before.close()
-        return True
+                before.close()
+            return self.session is not before
 
     @property
     def pose(self) -> GroundPose:
         """Where the robot is, level frame; where it was last, when that is not reported any more."""
-        self._fresh()
+        if self._is_fresh(seen := self.sighting()):
+            self._last = self.frames.to_level(seen.pose)
         assert self._last is not None, "the constructor waits for it"
         return self._last
 
-    def pose_within(self, wait_s: float) -> GroundPose | None:
-        """Return the pose as soon as it is fresh; None where it is not by then."""
-        until_s = monotonic() + wait_s
-        while not self._fresh():
-            if self.session.lost is not None or monotonic() > until_s:
-                return None
-            sleep(_LOOK_EVERY_S)
-        return self._last
+    def fresh_pose(self) -> GroundPose | None:
+        """Return the pose as soon as it is young enough; None where it is not within that age."""
+        return self._seen(self.settings.pose_max_age_s, self._is_fresh)
 
     def pose_from_now(self, wait_s: float) -> GroundPose | None:
         """Return a pose that was taken after this call; None where none is within that time."""
-        now_s, until_s = self._clock(), monotonic() + wait_s
-        while monotonic() < until_s and self.session.lost is None:
-            seen = self.sighting()
-            if seen is not None and seen.taken_s > now_s:
-                self._last = self.frames.to_level(seen.pose)
-                return self._last
-            sleep(_LOOK_EVERY_S)
-        return None
+        now_s = self._clock()
+        return self._seen(wait_s, lambda seen: seen is not None and seen.taken_s > now_s)
 
     def stands_still(self, wait_s: float) -> bool:
-        """Return whether the robot is seen to come to stand within that time; see `Stillness`."""
-        still, until_s = Stillness(self._clock()), monotonic() + wait_s
-        while monotonic() < until_s and self.session.lost is None:
-            sleep(_LOOK_EVERY_S)
-            if still.shown(self.sighting()):
-                self._fresh()
-                return True
-        return False
+        """Return whether the robot is seen to come to stand within that time; see `stillness`."""
+        return self._seen(wait_s, stillness(self._clock())) is not None
 
-    def is_unseen_for(self, longest_s: float) -> bool:
-        seen = self.sighting()
-        return seen is None or seen.age_s > longest_s
+    def _seen(self, wait_s: float, is_wanted: Callable[[Sighting | None], bool]) -> GroundPose | None:
+        """Look until what is seen is wanted, and return the pose; None where time or the connection ends before."""
+        until_s = monotonic() + wait_s
+        while not is_wanted(seen := self.sighting()):
+            if self.session.lost is not None or monotonic() > until_s:
+                return None
+            sleep(_LOOK_EVERY_S)
+        assert seen is not None, "nothing seen is never wanted"
+        self._last = self.frames.to_level(seen.pose)
+        return self._last
+
+    def _is_fresh(self, seen: Sighting | None) -> TypeGuard[Sighting]:
+        return seen is not None and seen.age_s <= self.settings.pose_max_age_s
+
+    def is_unseen(self) -> bool:
+        return not self._is_fresh(self.sighting())
 
     def unseen(self, closed: bool = False) -> str:
         """Return why the pose is not known, in part of a sentence."""
@@ -157,7 +152,7 @@ class Contact:
             queued = "; they arrive late, behind a bridge or a network that is too slow" if late_s > 1.0 else ""
             return f"its transforms are {seen.age_s:.1f} s old{queued}"
         refused = f"; {tree.refused} transforms were NaN or no rotation" if tree.refused else ""
-        says = f"; {self.session.complaint}" if self.session.complaint else ""
+        says = f"; {self.session.link.complaint}" if self.session.link.complaint else ""
         return tree.why_not(self.frames.map_frame, self.frames.base_frame) + refused + says
 
     def loss(self) -> str:
@@ -166,10 +161,3 @@ class Contact:
     def sighting(self) -> Sighting | None:
         """Return the pose by the transforms now, in the robot's frame."""
         return self.ear.tree.seen(self.frames.map_frame, self.frames.base_frame)
-
-    def _fresh(self) -> bool:
-        seen = self.sighting()
-        if seen is None or seen.age_s > self.settings.pose_max_age_s:
-            return False
-        self._last = self.frames.to_level(seen.pose)
-        return True

@@ -12,24 +12,15 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose, wrap_angle
-from avlmaps_ros.settings import Frames, RosSettings
+from avlmaps_ros.settings import FAR_M, Frames, RosSettings
 
 _STEP_M = 0.05
 _MOST_PLACES = 20_000
 LEAST_M, LEAST_RAD = 0.01, 0.01  # a movement so small is none
 LONGEST_M = 1000.0  # of a straight drive
-_FAR_M = 1e6
 
 # From where to where, level x and y: where a body stops for a place and a note, or why it cannot.
 Standing = Callable[[Float[np.ndarray, "2"], Float[np.ndarray, "2"]], tuple[Float[np.ndarray, "2"], str] | str]
-
-
-class Stage(StrEnum):
-    """How far a goal is, as far as we know."""
-
-    SENT = "sent"  # its server may still accept it, at any moment; also one that does not know it now
-    ACCEPTED = "accepted"
-    OVER = "over"
 
 
 class End(StrEnum):
@@ -71,15 +62,9 @@ class SentGoal:
     note: str = ""
 
     @property
-    def stage(self) -> Stage:
-        if self.end is not None:
-            return Stage.OVER
-        return Stage.SENT if self.heard_s is None else Stage.ACCEPTED
-
-    @property
-    def names(self) -> frozenset[str]:
-        """Each name under which a server may list it."""
-        return frozenset(name for name in (self.id, self.alias) if name)
+    def waits(self) -> bool:
+        """Whether its server may still accept it, at any moment; also one that does not know it now."""
+        return self.end is None and self.heard_s is None
 
     def show(self, now_s: float) -> None:
         self.heard_s = now_s
@@ -90,13 +75,10 @@ class SentGoal:
             self.note = note
             self.end = end
 
-    def call_off(self, now_s: float) -> None:
-        self.called_off_s = now_s if self.called_off_s is None else self.called_off_s
-
     def unknown(self, now_s: float, note: str) -> None:
         """Take note that its server does not know it, or is gone."""
         cancelled_for_s = 0.0 if self.called_off_s is None else now_s - self.called_off_s
-        if self.stage is Stage.ACCEPTED or cancelled_for_s >= self.answer_s:
+        if not self.waits or cancelled_for_s >= self.answer_s:
             self.over(End.FAILED if self.called_off_s is None else End.CANCELLED, note)
 
 
@@ -159,7 +141,7 @@ class Tasks(ABC):
 
         It looks at ``looked_at`` once there, else in the direction of its arrival.
         """
-        if not np.abs(wanted).max() < _FAR_M or (looked_at is not None and not np.abs(looked_at).max() < _FAR_M):
+        if not np.abs(wanted).max() < FAR_M or (looked_at is not None and not np.abs(looked_at).max() < FAR_M):
             return "NaN or a place beyond the Earth cannot be driven to"
         note, xy = "", wanted
         if standing is not None:

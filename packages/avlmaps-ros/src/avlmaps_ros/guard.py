@@ -15,11 +15,12 @@ import subprocess
 import sys
 from contextlib import suppress
 from time import monotonic, sleep
+from typing import Literal
 
 import msgspec
 
 from avlmaps.core.errors import AvlmapsError, NavigationError
-from avlmaps_ros.goals import ActionGoal, SentGoal, Stage
+from avlmaps_ros.goals import SentGoal
 from avlmaps_ros.session import Ear, Session, call_off
 from avlmaps_ros.settings import RosKind, RosSettings
 from avlmaps_ros.transports import session_opener
@@ -27,6 +28,9 @@ from avlmaps_ros.transports import session_opener
 _BETWEEN_TRIES_S = 0.5
 _FIRST_TRY_S = 3.0
 _READY_WITHIN_S = 60.0
+
+Beat = SentGoal | Literal["over"] | None
+"""One line of the driver: the goal that is active, that none is, or that the guard's work is over."""
 
 
 class Orders(msgspec.Struct):
@@ -36,31 +40,6 @@ class Orders(msgspec.Struct):
     url: str
     token: str | None
     settings: RosSettings
-    silence_s: float
-    trying_s: float
-
-
-class Beat(msgspec.Struct, omit_defaults=True):
-    """One line of the driver: that a goal is active, that none is, or that the guard's work is over."""
-
-    id: str = ""  # our name for the active goal; "" where none is active
-    alias: str = ""  # the server's name for it
-    action: str = ""
-    is_accepted: bool = False
-    before: tuple[str, ...] = ()  # the goals that its server listed before it was sent
-    over: bool = False
-
-    @classmethod
-    def of(cls, goal: SentGoal) -> "Beat":
-        accepted = goal.stage is Stage.ACCEPTED
-        return cls(goal.id, goal.alias, goal.task.action, accepted, tuple(sorted(goal.before)))
-
-    def goal(self, orders: Orders) -> SentGoal:
-        """Return the goal, to be called off."""
-        task = ActionGoal(self.action, "", {}, orders.trying_s)
-        goal = SentGoal(task, orders.settings.answer_timeout_s, frozenset(self.before), self.id, self.alias)
-        goal.heard_s = monotonic() if self.is_accepted else None
-        return goal
 
 
 class GoalGuard:
@@ -79,38 +58,31 @@ class GoalGuard:
         )
         self._write(self._orders)
 
-    @property
-    def stands(self) -> bool:
-        return self._process.poll() is None
-
     def require_ready(self) -> None:
         """Wait until the guard is ready. ``NavigationError``: it is not."""
         assert self._process.stdout is not None
         if not (select.select([self._process.stdout], [], [], _READY_WITHIN_S)[0] and self._process.stdout.read(1)):
-            self.close()
             raise NavigationError(
                 f"The guard, which cancels the robot's goals when this program dies, did not start within "
                 f"{_READY_WITHIN_S:g} s; try again on a machine that is less busy."
             )
 
     def revived(self) -> bool:
-        if not self.stands:
+        """Start a guard again that has done its work, or died; return whether it stands."""
+        if self._process.poll() is not None:
             self._start()
-        return self.stands
+        return self._process.poll() is None
 
-    def beat(self, goal: SentGoal) -> None:
-        """Report that a goal is active and watched; a guard that has done its work, or died, is started again."""
-        if not self.stands:
-            self._start()
-        self._write(Beat.of(goal))
-
-    def rest(self) -> None:
-        self._write(Beat())
+    def beat(self, goal: SentGoal | None) -> None:
+        """Report the goal that is active and watched, or that none is."""
+        if goal is not None:
+            self.revived()
+        self._write(goal)
 
     def close(self, dismissed: bool = True) -> None:
         """End the guard. One that is not dismissed cancels the last goal, and ends when the robot confirms that."""
         if dismissed:
-            self._write(Beat(over=True))
+            self._write("over")
         with suppress(OSError):
             if self._process.stdin is not None:
                 self._process.stdin.close()
@@ -118,27 +90,27 @@ class GoalGuard:
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(1.0)
 
-    def _write(self, line: msgspec.Struct) -> None:
-        with suppress(OSError):  # a guard that died: the driver continues, and ``stands`` says so
+    def _write(self, line: Orders | Beat) -> None:
+        with suppress(OSError, ValueError):  # a guard that died, or was closed: the driver continues
             assert self._process.stdin is not None
             self._process.stdin.write(msgspec.json.encode(line) + b"\n")
 
 
-def watch(pipe: int, silence_s: float) -> Beat | None:
+def watch(pipe: int, silence_s: float) -> SentGoal | None:
     """Read beats from a file descriptor until they end, or an active goal has none for ``silence_s``.
 
     Return the goal that was left active, None where none was.
     """
-    last, rest = Beat(), b""
+    last, rest = None, b""
     while True:
-        ready, _, _ = select.select([pipe], [], [], silence_s if last.id else None)
+        ready, _, _ = select.select([pipe], [], [], None if last is None else silence_s)
         content = os.read(pipe, 4096) if ready else b""
         if not content:  # closed, or silent for too long
-            return last if last.id else None
+            return last
         *lines, rest = (rest + content).split(b"\n")
         for line in lines:
             last = msgspec.json.decode(line, type=Beat)
-            if last.over:
+            if last == "over":
                 return None
 
 
@@ -151,27 +123,24 @@ def opened(orders: Orders) -> Session | None:
 
 
 def main() -> None:
-    """Watch, and cancel a goal that is left active; try as long as the orders say."""
-    line = b""
-    while not line.endswith(b"\n"):
-        content = os.read(0, 1)
-        if not content:
-            return
-        line += content
+    """Watch, and cancel a goal that is left active; try as long as the goal could last."""
+    with os.fdopen(0, "rb", buffering=0, closefd=False) as stream:
+        line = stream.readline()  # and not a byte more
+    if not line.endswith(b"\n"):
+        return
     orders = msgspec.json.decode(line, type=Orders)
-    session = opened(orders)
+    session, settings = opened(orders), orders.settings
     os.write(1, b"\n")
-    left = watch(0, orders.silence_s)
-    if left is not None:
-        goal, until_s, patience_s = left.goal(orders), monotonic() + orders.trying_s, _FIRST_TRY_S
-        while goal.stage is not Stage.OVER and monotonic() < until_s:
-            session = session or opened(orders)
-            if session is None:
-                sleep(_BETWEEN_TRIES_S)
-            elif not call_off(goal, session, monotonic() + patience_s):  # the connection may be stuck
-                patience_s *= 2.0
-                session.close()
-                session = None
+    goal = watch(0, settings.stall_s + settings.heartbeat_s)
+    until_s, patience_s = monotonic() + settings.goal_timeout_s, _FIRST_TRY_S
+    while goal is not None and goal.end is None and monotonic() < until_s:
+        session = session or opened(orders)
+        if session is None:
+            sleep(_BETWEEN_TRIES_S)
+        elif not call_off(goal, session, monotonic() + patience_s):  # the connection may be stuck
+            patience_s *= 2.0
+            session.close()
+            session = None
     if session is not None:
         session.close()
 

@@ -1,7 +1,8 @@
-"""One connection to rosbridge: opened, listened to, sent over, and closed. Nothing here knows of robots."""
+"""A way to topics; and one connection to rosbridge: opened, listened to, sent over, and closed."""
 
 import json
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 from urllib.parse import urlsplit
@@ -20,17 +21,55 @@ START_IT = (
 )
 
 
-class Link:
-    """A connection that stands or is over; it never comes back by itself.
+class Line(ABC):
+    """A way to a robot's topics. It stands or is over; it never comes back by itself.
 
-    What arrives is handed to listeners in the network's thread. They keep what they need and notify ``heard``, on
-    which the driver's thread waits; neither sends anything while it holds it.
+    What arrives is handed on in the network's thread, where ``ValueError`` says that a message is unreadable. Who takes
+    it keeps what he needs; neither sends anything while it holds ``heard``, on which the driver's thread waits.
 
     Attributes:
-        lost: why the connection is over; None while it stands.
-        complaint: the latest of the bridge.
+        name: how sentences call it.
+        heard: notified whenever something arrived or changed.
+        lost: why it is over; None while it stands.
+        complaint: the latest that may explain a silence.
         unread: how many messages were none, and were left out.
     """
+
+    def __init__(self, name: str, heard: threading.Condition | None = None) -> None:
+        self.name, self.heard = name, heard or threading.Condition()
+        self.lost: str | None = None
+        self.complaint, self.unread = "", 0
+
+    @abstractmethod
+    def subscribe(self, topic: str, kind: str, hand_on: Callable[[Any], None], every_s: float = 0.0) -> None:
+        """Hand on what is published, over a bridge at most once in ``every_s``."""
+
+    @abstractmethod
+    def advertise(self, topic: str, kind: str) -> None: ...
+
+    @abstractmethod
+    def publish(self, topic: str, message: dict[str, Any]) -> None: ...
+
+    @abstractmethod
+    def later(self, wait_s: float, work: Callable[[], None]) -> None:
+        """Do something in the network's thread after some seconds."""
+
+    @abstractmethod
+    def close(self) -> None: ...
+
+    def ended(self, why: str) -> None:
+        """Take note that it is over, or that nobody answered."""
+        self.lost = self.lost or why or "it was closed"
+        self.note()
+
+    def note(self) -> None:
+        """Wake who waits for what arrives."""
+        with self.heard:
+            self.heard.notify_all()
+
+
+class Link(Line):
+    """One connection to rosbridge; ``listener`` takes what answers goals and calls."""
 
     def __init__(
         self,
@@ -53,14 +92,10 @@ class Link:
             BackendError: autobahn or twisted is not installed.
             NavigationError: nobody answers there, or the address is none.
         """
-        self.url = address(url)
-        headers = {} if token is None else {"Authorization": f"Bearer {_checked(token, self.url)}"}
-        self.heard = heard or threading.Condition()
-        self.lost: str | None = None
-        self.complaint = ""
-        self.unread = 0
-        self._is_open = False
-        self._listeners: list[Callable[[Incoming], None]] = []
+        super().__init__(address(url), heard)
+        self._token, self._is_open = token, False
+        headers = {} if token is None else {"Authorization": f"Bearer {_checked(token, self.name)}"}
+        self.listener: Callable[[Incoming], None] = lambda _: None
         self._topics: dict[str, Callable[[msgspec.Raw], None]] = {}
         try:
             from avlmaps_ros.wire import Websocket
@@ -73,30 +108,27 @@ class Link:
             ) from None
         except RuntimeError as fault:
             raise NavigationError(
-                f"No connection to {self.url} can be made from this process ({fault}); start a new one."
+                f"No connection to {self.name} can be made from this process ({fault}); start a new one."
             ) from None
         with self.heard:
             self.heard.wait_for(lambda: self.lost is not None or self._is_open, timeout_s)
         if not self._is_open:
             self._socket.drop()
             why = (self.lost or f"no answer within {timeout_s:g} s").rstrip(".")
-            raise NavigationError(f"No rosbridge answers at {self.url} ({why}); {START_IT}.")
+            raise NavigationError(f"No rosbridge answers at {self.name} ({why}); {START_IT}.")
 
-    def listen(self, listener: Callable[[Incoming], None]) -> None:
-        """Hand on what answers goals and calls, from now on."""
-        self._listeners.append(listener)
+    def beside(self, timeout_s: float) -> "Link":
+        """Open another connection to the same bridge, which notifies the same ``heard``."""
+        return Link(self.name, self._token, timeout_s, self.heard)
 
-    def subscribe(self, topic: str, kind: str, hand_on: Callable[[msgspec.Raw], None], every_s: float = 0.0) -> None:
-        """Hand on what is published, at most once in ``every_s``; ``ValueError`` says that a message is unreadable."""
+    def subscribe(self, topic: str, kind: str, hand_on: Callable[[Any], None], every_s: float = 0.0) -> None:
         self._topics[topic] = hand_on
         self.send({"op": "subscribe", "topic": topic, "type": kind, "throttle_rate": round(1000.0 * every_s)})
 
     def advertise(self, topic: str, kind: str) -> None:
-        """Announce that something will be published."""
         self.send({"op": "advertise", "topic": topic, "type": kind})
 
     def publish(self, topic: str, message: dict[str, Any]) -> None:
-        """Publish to a topic that was advertised."""
         self.send({"op": "publish", "topic": topic, "msg": message})
 
     def send(self, operation: dict[str, Any]) -> None:
@@ -104,24 +136,12 @@ class Link:
         if self.lost is None:
             self._socket.send(json.dumps(operation).encode())
 
-    def repeat(self, every_s: float, work: Callable[[], None]) -> None:
-        """Do something in the network's thread again and again, until the connection is over."""
-
-        def turn() -> None:
-            if self.lost is None:
-                work()
-                self.later(every_s, turn)
-
-        self.later(0.0, turn)
-
     def later(self, wait_s: float, work: Callable[[], None]) -> None:
-        """Do something in the network's thread after some seconds."""
         from avlmaps_ros.wire import reactor
 
         def then() -> None:
             work()
-            with self.heard:
-                self.heard.notify_all()
+            self.note()
 
         reactor.callFromThread(reactor.callLater, wait_s, then)
 
@@ -135,15 +155,13 @@ class Link:
         self._socket.drop()
         with self.heard:
             self.heard.wait_for(lambda: self.lost is not None, 2.0)
-            self.lost = self.lost or "it was closed"
+        self.ended("it was closed")
 
     # In the network's thread.
 
     def opened(self) -> None:
-        """Take note that messages can go."""
-        with self.heard:
-            self._is_open = True
-            self.heard.notify_all()
+        self._is_open = True
+        self.note()
 
     def received(self, payload: bytes, is_binary: bool) -> None:
         """Read one message as data and hand it on; what is none is counted and left out."""
@@ -153,8 +171,8 @@ class Link:
             self._hand_on(msgspec.json.decode(payload, type=Incoming))
         except (ValueError, TypeError, RecursionError):
             self.unread += 1
-        with self.heard:
-            self.heard.notify_all()
+            self.complaint = self.complaint or "messages came that cannot be read (is it launched with bson_only_mode?)"
+        self.note()
 
     def _hand_on(self, message: Incoming) -> None:
         if message.op == "publish":
@@ -164,14 +182,7 @@ class Link:
             if message.level in ("error", "warning"):
                 self.complaint = text_in(message.msg)
         else:
-            for listener in self._listeners:
-                listener(message)
-
-    def ended(self, why: str) -> None:
-        """Take note that the connection is over, or that nobody answered."""
-        with self.heard:
-            self.lost = self.lost or why or "it was closed"
-            self.heard.notify_all()
+            self.listener(message)
 
 
 def address(url: str) -> str:

@@ -8,7 +8,8 @@ from base64 import b64decode
 from dataclasses import dataclass
 from importlib import import_module
 from math import cos, sin
-from typing import Annotated, Any
+from types import ModuleType
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -18,6 +19,20 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import from_quaternion
 from avlmaps.core.printable import UNSAFE, printable
+from avlmaps_ros.settings import FAR_M
+
+_T = TypeVar("_T")
+
+
+def with_rclpy(module: str, asked: str, otherwise: str) -> ModuleType:
+    """Return a module that needs rclpy. ``BackendError``: this Python has none, and what can be done ``otherwise``."""
+    try:
+        return import_module(module)
+    except ImportError as fault:
+        raise BackendError(
+            f"{asked} needs ROS 2's rclpy in this Python ({fault}); source /opt/ros/$ROS_DISTRO/setup.bash and use the "
+            f"Python that ROS 2 was built for (Jazzy: 3.12), or {otherwise}."
+        ) from None
 
 
 def interface(kind: str) -> Any:
@@ -32,9 +47,15 @@ def interface(kind: str) -> Any:
         ) from None
 
 
+def read(message: Any, kind: type[_T]) -> _T:
+    """Read a message of rosbridge, in JSON, or of rclpy. ``ValueError``: it is none of that kind."""
+    if isinstance(message, msgspec.Raw):
+        return msgspec.json.decode(message, type=kind)
+    return msgspec.convert(message, kind, from_attributes=True)
+
+
 # Nothing that is waited for is larger; a transform tree of a humanoid is about 20 kB.
 MOST_BYTES = 1_000_000
-_FAR_M = 1e6
 _MOST_TRANSFORMS = 2000
 
 _Name = Annotated[str, msgspec.Meta(max_length=256)]
@@ -81,12 +102,9 @@ class Vector(msgspec.Struct):
     z: float
 
 
-class Quaternion(msgspec.Struct):
+class Quaternion(Vector):
     """A geometry_msgs/Quaternion."""
 
-    x: float
-    y: float
-    z: float
     w: float
 
 
@@ -102,7 +120,7 @@ class _TransformStamped(msgspec.Struct):
 
 
 class _Transforms(msgspec.Struct):
-    transforms: Annotated[list[msgspec.Raw], msgspec.Meta(max_length=_MOST_TRANSFORMS)]
+    transforms: Annotated[list[Any], msgspec.Meta(max_length=_MOST_TRANSFORMS)]
 
 
 class Clock(msgspec.Struct):
@@ -122,13 +140,13 @@ class _GoalId(msgspec.Struct):
 
 
 class _Uuid(msgspec.Struct):
-    uuid: str | list[int]
+    uuid: Any  # sixteen numbers, or base 64
 
     @property
     def hex(self) -> str:
         try:
-            raw = b64decode(self.uuid, validate=True) if isinstance(self.uuid, str) else bytes(self.uuid)
-        except ValueError:
+            raw = b64decode(self.uuid, validate=True) if isinstance(self.uuid, str) else bytes(list(self.uuid))
+        except (TypeError, ValueError):
             raise ValueError("no UUID") from None
         return raw.hex()
 
@@ -192,26 +210,25 @@ class Transform:
     stamp_s: float = 0.0
 
 
-def transforms_in(message: msgspec.Raw) -> tuple[list[Transform], int]:
+def transforms_in(message: Any) -> tuple[list[Transform], int]:
     """Return the transforms of a message of /tf or /tf_static, and how many were refused: NaN, no rotation."""
-    read, refused = [], 0
-    for raw in msgspec.json.decode(message, type=_Transforms).transforms:
+    found, refused = [], 0
+    for one in read(message, _Transforms).transforms:
         try:
-            stamped = msgspec.json.decode(raw, type=_TransformStamped)
-            read.append(transform_of(stamped, stamped.header.stamp.seconds))
+            found.append(_transform_of(read(one, _TransformStamped)))
         except ValueError:
             refused += 1
-    return read, refused
+    return found, refused
 
 
-def transform_of(message: Any, stamp_s: float) -> Transform:
-    """Check a TransformStamped of rclpy, or with the same fields. ``ValueError``: it is no rigid transform on Earth."""
-    place, turn = message.transform.translation, message.transform.rotation
+def _transform_of(stamped: _TransformStamped) -> Transform:
+    place, turn = stamped.transform.translation, stamped.transform.rotation
     xyz = np.array([place.x, place.y, place.z], np.float64)
     xyzw = np.array([turn.x, turn.y, turn.z, turn.w], np.float64)
-    if not np.abs(xyz).max() < _FAR_M or not abs(float(np.linalg.norm(xyzw)) - 1.0) < 0.05:
+    if not np.abs(xyz).max() < FAR_M or not abs(float(np.linalg.norm(xyzw)) - 1.0) < 0.05:
         raise ValueError("no rigid transform")
-    return Transform(message.header.frame_id[:256], message.child_frame_id[:256], from_quaternion(xyz, xyzw), stamp_s)
+    parent, child = stamped.header.frame_id.lstrip("/"), stamped.child_frame_id.lstrip("/")
+    return Transform(parent, child, from_quaternion(xyz, xyzw), stamped.header.stamp.seconds)
 
 
 def stamped_pose(pose: GroundPose, frame: str, ros: int) -> dict[str, Any]:
@@ -236,10 +253,9 @@ def duration(seconds: float) -> dict[str, int]:
 def text_in(raw: msgspec.Raw) -> str:
     """Return the text of a value, fit to be shown in one sentence; empty where it is none."""
     try:
-        text = msgspec.json.decode(raw, type=str)
+        return sanitize_line(msgspec.json.decode(raw, type=str))
     except ValueError:
         return ""
-    return sanitize_line(text, 200)
 
 
 def sanitize_line(text: str, most: int = 200) -> str:

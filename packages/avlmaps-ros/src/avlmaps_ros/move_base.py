@@ -1,20 +1,19 @@
 """Driving with move_base (ROS 1): one actionlib server, spoken to over its five topics."""
 
 from time import monotonic
-from typing import ClassVar
-
-import msgspec
+from typing import Any, ClassVar
 
 from avlmaps.core.motion import GroundPose
-from avlmaps_ros.bridge import BridgeSession
-from avlmaps_ros.goals import ActionGoal, End, SentGoal, Stage, Tasks
-from avlmaps_ros.messages import GoalState, GoalStates, GoalUpdate, sanitize_line, stamped_pose
+from avlmaps_ros.goals import ActionGoal, End, SentGoal, Tasks
+from avlmaps_ros.link import Line
+from avlmaps_ros.messages import GoalState, GoalStates, GoalUpdate, read, sanitize_line, stamped_pose
+from avlmaps_ros.session import Ear, Session
+from avlmaps_ros.settings import RosSettings
 
-# actionlib_msgs/GoalStatus
-_PENDING, _ACTIVE, _PREEMPTED, _SUCCEEDED, _ABORTED, _REJECTED, _PREEMPTING, _RECALLING, _RECALLED, _LOST = range(10)
-_UNDER_WAY = (_PENDING, _ACTIVE, _PREEMPTING)  # a goal that is recalled never began
+# actionlib_msgs/GoalStatus: pending, active, preempting; a goal that is recalled never began.
+_UNDER_WAY = (0, 1, 6)
 _SEND_AGAIN_S = 1.0
-_ANYONE = ""
+_NO_TIME = {"secs": 0, "nsecs": 0}
 
 
 class MoveBaseTasks(Tasks):
@@ -27,72 +26,64 @@ class MoveBaseTasks(Tasks):
 
     def pose(self, pose: GroundPose) -> ActionGoal:
         target = stamped_pose(self.frames.to_robot(pose), self.frames.map_frame, ros=1)
-        server = f"{self.settings.namespace}/move_base"
-        return ActionGoal(
-            server, "move_base_msgs/MoveBaseAction", {"target_pose": target}, self.settings.goal_timeout_s
-        )
+        kind, arguments = "move_base_msgs/MoveBaseAction", {"target_pose": target}
+        return ActionGoal(self.settings.named("move_base"), kind, arguments, self.settings.goal_timeout_s)
 
 
-class MoveBaseSession(BridgeSession):
+class MoveBaseSession(Session):
     """A connection to move_base."""
 
     ros: ClassVar[int] = 1
-    lists_every_s: ClassVar[float | None] = 0.2
+    lists_every_s: ClassVar[float] = 0.2
 
-    def _topic(self, name: str) -> str:
-        return self._named(f"move_base/{name}")
-
-    def _greet(self) -> None:
-        self._sent_s = 0.0
-        link = self.link
-        link.advertise(self._topic("goal"), "move_base_msgs/MoveBaseActionGoal")
-        link.advertise(self._topic("cancel"), "actionlib_msgs/GoalID")
-        link.subscribe(self._topic("status"), "actionlib_msgs/GoalStatusArray", self._status)
-        link.subscribe(self._topic("result"), "move_base_msgs/MoveBaseActionResult", self._update)
-        link.subscribe(self._topic("feedback"), "move_base_msgs/MoveBaseActionFeedback", self._update)
+    def __init__(self, link: Line, settings: RosSettings, ear: Ear) -> None:
+        super().__init__(link, settings, ear)
+        self._server, self._sent_s = self.settings.named("move_base"), 0.0
+        link.advertise(f"{self._server}/goal", "move_base_msgs/MoveBaseActionGoal")
+        link.advertise(f"{self._server}/cancel", "actionlib_msgs/GoalID")
+        link.subscribe(f"{self._server}/status", "actionlib_msgs/GoalStatusArray", self._status)
+        link.subscribe(f"{self._server}/result", "move_base_msgs/MoveBaseActionResult", self._update)
+        link.subscribe(f"{self._server}/feedback", "move_base_msgs/MoveBaseActionFeedback", self._update)
 
     def send(self, goal: SentGoal) -> None:
-        self._adopt(goal)
+        self._ours[goal.id] = goal
         self._sent_s = monotonic()
-        stamp = {"secs": 0, "nsecs": 0}
         message = {
-            "header": {"stamp": stamp, "frame_id": ""},
-            "goal_id": {"stamp": stamp, "id": goal.id},
+            "header": {"stamp": _NO_TIME, "frame_id": ""},
+            "goal_id": {"stamp": _NO_TIME, "id": goal.id},
             "goal": goal.task.arguments,
         }
-        self.link.publish(self._topic("goal"), message)
+        self.link.publish(f"{self._server}/goal", message)
 
     def remind(self, goal: SentGoal) -> None:
         """Send a goal again that got no answer: a topic that was just advertised may lose its first message.
 
         The server knows a goal by its id, and takes it only once.
         """
-        if goal.stage is Stage.SENT and monotonic() - self._sent_s > _SEND_AGAIN_S:
+        if goal.waits and monotonic() - self._sent_s > _SEND_AGAIN_S:
             self.send(goal)
 
     def cancel(self, goal: SentGoal) -> None:
         # The server remembers the id, also where the goal comes after its cancel.
         self._call_off(goal)
-        self._publish_cancel(goal.id)
+        self._cancel(goal.id)
 
     def cancel_all(self) -> None:
-        self._publish_cancel(_ANYONE)
+        self._cancel("")  # no name means every goal
 
-    def _publish_cancel(self, name: str) -> None:
-        self.link.publish(self._topic("cancel"), {"stamp": {"secs": 0, "nsecs": 0}, "id": name})
+    def _cancel(self, name: str) -> None:
+        self.link.publish(f"{self._server}/cancel", {"stamp": _NO_TIME, "id": name})
 
     def is_idle(self, since_s: float) -> bool | None:
-        listed = self.ear.servers.list_of(self._named("move_base"))
-        return None if listed is None or listed[0] <= since_s else not listed[1]
+        listed_s, goals = self.ear.servers.list_of(self._server)
+        return None if listed_s <= since_s else not goals
 
     # In the network's thread.
 
-    def _status(self, message: msgspec.Raw) -> None:
-        states = msgspec.json.decode(message, type=GoalStates).status_list
-        listed = {state.name: state for state in states}
-        self.ear.servers.listed(
-            self._named("move_base"), [name for name, state in listed.items() if state.status in _UNDER_WAY]
-        )
+    def _status(self, message: Any) -> None:
+        listed = {state.name: state for state in read(message, GoalStates).status_list}
+        under_way = [name for name, state in listed.items() if state.status in _UNDER_WAY]
+        self.ear.servers.listed(self._server, under_way)
 
         def take(goal: SentGoal) -> None:
             if goal.id in listed:
@@ -102,8 +93,8 @@ class MoveBaseSession(BridgeSession):
 
         self._each(take)
 
-    def _update(self, message: msgspec.Raw) -> None:
-        state = msgspec.json.decode(message, type=GoalUpdate).status
+    def _update(self, message: Any) -> None:
+        state = read(message, GoalUpdate).status
         self._each(lambda goal: self._note(goal, state) if goal.id == state.name else None)
 
     def _note(self, goal: SentGoal, state: GoalState) -> None:
@@ -114,15 +105,13 @@ class MoveBaseSession(BridgeSession):
 
 
 def _end_of(state: GoalState) -> tuple[End, str]:
-    why = f" ({sanitize_line(state.text)})" if sanitize_line(state.text) else ""
+    text = sanitize_line(state.text)
+    why = f" ({text})" if text else ""
     match state.status:
-        case 3:
+        case 3:  # succeeded
             return End.SUCCEEDED, ""
-        case 2 | 7 | 8:
+        case 2 | 7 | 8:  # preempted, recalling, recalled
             return End.CANCELLED, f"The goal was cancelled, by another goal or another user of the robot{why}"
-        case 5:
-            return End.FAILED, f"move_base refused the goal{why}"
-        case 4:
-            return End.FAILED, f"move_base gave up{why}"
         case _:
-            return End.FAILED, f"move_base lost the goal{why}"
+            did = {4: "gave up", 5: "refused the goal"}.get(state.status, "lost the goal")
+            return End.FAILED, f"move_base {did}{why}"

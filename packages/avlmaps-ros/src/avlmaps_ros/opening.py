@@ -2,13 +2,13 @@
 
 import os
 from collections.abc import Callable
+from contextlib import ExitStack
 from time import monotonic
 from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.errors import NavigationError
 from avlmaps_ros.base import RosDriver
 from avlmaps_ros.goals import Standing
 from avlmaps_ros.guard import GoalGuard, Orders
@@ -62,24 +62,18 @@ def open_ros_driver(
         grid = own_grid(kind, url, settings, token)
         own = on_own_map(obstacles, grid, frames)
         standing = standable_goal(own, 0.0 if grid.is_costmap else settings.radius_m, "the robot's own map")
-    silence_s = settings.stall_s + settings.heartbeat_s
-    orders = Orders(kind, url, token, settings, silence_s, settings.goal_timeout_s)
-    guard = GoalGuard(orders) if guarded else None  # it starts while the driver connects
-    try:
-        opener = session_opener(kind, url, settings, token)
-        tasks = {"nav2": Nav2Tasks, "move_base": MoveBaseTasks}[kind](frames, settings)
-        opened = RosDriver(opener, tasks, standing=standing, level_from_world=level_from_world, clock=clock)
-    except BaseException:
+    tasks = {"nav2": Nav2Tasks, "move_base": MoveBaseTasks}[kind](frames, settings)
+    with ExitStack() as undo:
+        guard = GoalGuard(Orders(kind, url, token, settings)) if guarded else None  # it starts while we connect
         if guard is not None:
-            guard.close()
-        raise
-    opened.guard = guard
-    try:
+            undo.callback(guard.close)
+        opener = session_opener(kind, url, settings, token)
+        opened = RosDriver(opener, tasks, standing=standing, level_from_world=level_from_world, clock=clock)
+        undo.callback(opened.close)
         if guard is not None:
             guard.require_ready()
-    except NavigationError:
-        opened.close()
-        raise
+        undo.pop_all()
+    opened.guard = guard
     if obstacles is not None:
         opened.elsewhere = obstacles.elsewhere
     return opened

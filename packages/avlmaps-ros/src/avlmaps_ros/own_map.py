@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from math import atan2
-from threading import Condition
 from typing import Annotated, Any
 
 import msgspec
@@ -11,8 +10,8 @@ from jaxtyping import Int8
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.maps.obstacles import CellState, Obstacles
-from avlmaps_ros.messages import Quaternion, Stamped, Vector, sanitize_line
-from avlmaps_ros.settings import Frames, GroundTransform, RosSettings
+from avlmaps_ros.messages import Quaternion, Stamped, Vector, read, sanitize_line
+from avlmaps_ros.settings import Frames, GroundTransform
 
 MOST_BYTES = 64_000_000  # of a grid as a message of rosbridge, which writes it in digits
 _MOST_CELLS = 16_000_000
@@ -48,35 +47,16 @@ class _Grid(msgspec.Struct):
     data: list[Annotated[int, msgspec.Meta(ge=-128, le=127)]]
 
 
-def grid_in(message: msgspec.Raw) -> OwnGrid:
-    """Read a grid as rosbridge writes it. ``ValueError``: it is none."""
-    return grid_of(msgspec.json.decode(message, type=_Grid))
-
-
 def grid_of(message: Any) -> OwnGrid:
-    """Check a grid that came from outside: of rclpy, or with the same fields. ``ValueError``: it is none."""
+    """Check a grid that came from outside, as `messages.read` does. ``ValueError``: it is none."""
+    if isinstance(message, msgspec.Raw):
+        message = read(message, _Grid)
     info, place, turn = message.info, message.info.origin.position, message.info.origin.orientation
     values, shape, cell_m = np.array(message.data, np.int8), (info.height, info.width), float(info.resolution)
     if not (min(shape) > 0 and len(values) == shape[0] * shape[1] <= _MOST_CELLS and 0.001 <= cell_m <= 10.0):
         raise ValueError(f"a grid of {info.width} x {info.height} cells of {cell_m} m with {len(values)} values")
     corner = GroundTransform(place.x, place.y, 2.0 * atan2(turn.z, turn.w))
     return OwnGrid(values.reshape(shape), cell_m, corner, message.header.frame_id.lstrip("/"))
-
-
-def read_over_bridge(url: str, token: str | None, kind: str, settings: RosSettings) -> OwnGrid | None:
-    """Read a grid over a connection of its own; None where none arrives. Raise as `Link` does."""
-    from avlmaps_ros.link import Link
-
-    found: list[OwnGrid] = []
-    heard = Condition()
-    link = Link(url, token, settings.connect_timeout_s, heard, MOST_BYTES)
-    try:
-        link.subscribe(settings.map_topic, kind, lambda message: found.append(grid_in(message)))
-        with heard:
-            heard.wait_for(lambda: bool(found) or link.lost is not None, settings.pose_timeout_s)
-    finally:
-        link.close()
-    return found[-1] if found else None
 
 
 def on_own_map(ours: Obstacles, grid: OwnGrid, frames: Frames) -> Obstacles:

@@ -1,10 +1,9 @@
 """How a ROS robot is driven: names, patience and tolerances. Its speed is the robot's own affair."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import atan2, cos, degrees, isfinite, pi, radians, sin
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -17,7 +16,7 @@ from avlmaps.core.motion import GroundPose, wrap_angle
 RosKind = Literal["nav2", "move_base"]
 NATIVE = "native"  # in place of an address: this machine is in the robot's ROS 2 network itself
 _MOST_BYTES = 10_000
-_FAR_M = 1e6
+FAR_M = 1e6  # what is farther is not on Earth
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +31,7 @@ class GroundTransform:
     yaw_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.yaw_rad) and abs(self.x_m) < _FAR_M and abs(self.y_m) < _FAR_M):
+        if not (isfinite(self.yaw_rad) and abs(self.x_m) < FAR_M and abs(self.y_m) < FAR_M):
             raise ValueError(f"({self.x_m}, {self.y_m}) m, {self.yaw_rad} rad is not a transform between two floors")
         object.__setattr__(self, "yaw_rad", wrap_angle(self.yaw_rad))
 
@@ -42,16 +41,12 @@ class GroundTransform:
         return GroundTransform(-c * self.x_m - s * self.y_m, s * self.x_m - c * self.y_m, -self.yaw_rad)
 
     def pose(self, pose: GroundPose) -> GroundPose:
-        x_m, y_m = self._moved(pose.x_m, pose.y_m)
+        x_m, y_m = self.points(np.array([pose.x_m, pose.y_m])).tolist()
         return GroundPose(x_m, y_m, pose.heading_rad + self.yaw_rad)
 
     def points(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
         c, s = cos(self.yaw_rad), sin(self.yaw_rad)
         return np.asarray(xy, np.float64) @ np.array([[c, s], [-s, c]]) + (self.x_m, self.y_m)
-
-    def _moved(self, x_m: float, y_m: float) -> tuple[float, float]:
-        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
-        return self.x_m + c * x_m - s * y_m, self.y_m + s * x_m + c * y_m
 
     @classmethod
     def fit(cls, in_a: Float[np.ndarray, "n 2"], in_b: Float[np.ndarray, "n 2"]) -> tuple["GroundTransform", float]:
@@ -106,12 +101,7 @@ class Frames:
     def read(cls, path: Path | str) -> "Frames":
         """Read the frames from a robot's file, as ``RosSettings.read`` does."""
         file = _RobotFile.read(path)
-        shift = file.map_from_avlmap
-        try:
-            lie = GroundTransform(shift.x_m, shift.y_m, radians(shift.yaw_deg))
-        except ValueError as fault:
-            raise _unreadable(path, fault) from None
-        return cls(file.map_frame, file.base_frame, lie)
+        return cls(file.map_frame, file.base_frame, file.map_from_avlmap.ground())
 
     def write(self, path: Path | str) -> None:
         """Write them to a JSON file that ``read`` takes."""
@@ -120,59 +110,48 @@ class Frames:
         write_bytes_atomically(user_path(path), msgspec.json.format(msgspec.json.encode(file), indent=2) + b"\n")
 
 
-# The least and the most that each number may be; beyond lies a slip of the unit (milliseconds, centimetres, degrees).
-_RANGES: Mapping[str, tuple[float, float]] = {
-    "radius_m": (0.01, 3.0),
-    "goal_timeout_s": (0.1, 86_400.0),
-    "answer_timeout_s": (0.1, 600.0),
-    "cancel_timeout_s": (0.1, 60.0),
-    "connect_timeout_s": (0.1, 600.0),
-    "pose_timeout_s": (0.1, 600.0),
-    "pose_max_age_s": (0.1, 60.0),
-    "server_max_age_s": (0.5, 60.0),
-    "heartbeat_s": (0.05, 5.0),
-    "stall_s": (0.5, 60.0),
-    "reached_m": (0.01, 5.0),
-    "reached_rad": (0.01, pi),
-    "speed_m_s": (0.01, 2.0),
-}
-
-
 class RosSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The settings that differ from robot to robot; ``msgspec.structs.replace`` changes some."""
+    """The settings that differ from robot to robot; ``msgspec.structs.replace`` changes some.
+
+    With each number goes the least and the most that it may be; beyond lies a slip of the unit (milliseconds, degrees).
+    """
 
     namespace: str = ""  # of the robot's actions (``/robot1`` for ``/robot1/navigate_to_pose``)
     tf_namespace: str = ""  # of its transforms, where they are not on /tf and /tf_static
     map_topic: str = ""
     """A map or a costmap of the robot (``/map``): on it goals are moved to where the body can stand. Empty: our map."""
-    radius_m: float = 0.25  # of the body, to find where it can stand on our map; the robot plans with its own distances
-    goal_timeout_s: float = 300.0  # a goal that is not over by then is cancelled
-    answer_timeout_s: float = 10.0  # a goal that has no answer by then has nobody to take it, seconds
-    cancel_timeout_s: float = 3.0  # how long to wait until a cancelled goal is over
-    connect_timeout_s: float = 10.0  # how long to wait for the connection
-    pose_timeout_s: float = 10.0  # how long to wait for the first pose
-    pose_max_age_s: float = 3.0  # transforms that are older give no pose; the robot is not driven without one
-    server_max_age_s: float = 3.0  # a goal of which its server has said nothing for this time is lost, and cancelled
-    heartbeat_s: float = 0.5
+    radius_m: Annotated[float, 0.01, 3.0] = 0.25  # of the body, to find where it can stand on our map
+    goal_timeout_s: Annotated[float, 0.1, 86_400.0] = 300.0  # a goal that is not over by then is cancelled
+    answer_timeout_s: Annotated[float, 0.1, 600.0] = 10.0  # a goal that has no answer by then has nobody to take it
+    cancel_timeout_s: Annotated[float, 0.1, 60.0] = 3.0  # how long to wait until a cancelled goal is over
+    connect_timeout_s: Annotated[float, 0.1, 600.0] = 10.0  # how long to wait for the connection
+    pose_timeout_s: Annotated[float, 0.1, 600.0] = 10.0  # how long to wait for the first pose
+    pose_max_age_s: Annotated[float, 0.1, 60.0] = 3.0  # older transforms give no pose, without which it is not driven
+    server_max_age_s: Annotated[float, 0.5, 60.0] = 3.0
+    """A goal of which its server has said nothing for this time is lost, and cancelled."""
+    heartbeat_s: Annotated[float, 0.05, 5.0] = 0.5
     """While a goal is active, a heartbeat is published on ``avlmaps/heartbeat`` once in this time."""
-    stall_s: float = 3.0  # a goal is cancelled when the loop that watches it did not run for this time
-    reached_m: float = 0.5
+    stall_s: Annotated[float, 0.5, 60.0] = 3.0  # a goal is cancelled when the loop that watches it stood for so long
+    reached_m: Annotated[float, 0.01, 5.0] = 0.5
     """A robot that says it has arrived must stand this near; Nav2's own tolerance is 0.25 m by default."""
-    reached_rad: float = 0.35  # and look in the goal's direction within this angle, radians
-    speed_m_s: float = 0.15  # for Nav2's straight drives, which need a speed; the robot's own limits still hold
+    reached_rad: Annotated[float, 0.01, pi] = 0.35  # and look in the goal's direction within this angle
+    speed_m_s: Annotated[float, 0.01, 2.0] = 0.15  # of Nav2's straight drives; the robot's own limits still hold
 
     def __post_init__(self) -> None:
-        namespace, topic = ("namespace", "robot1"), ("topic", "map")
-        for name, (word, such) in {"namespace": namespace, "tf_namespace": namespace, "map_topic": topic}.items():
+        for name, such in (("namespace", "robot1"), ("tf_namespace", "robot1"), ("map_topic", "map")):
             given = getattr(self, name)
             bare = given.strip("/") if isinstance(given, str) else "?"
             if bare and not all(part.isascii() and part.isidentifier() for part in bare.split("/")):
+                word = name.rpartition("_")[2]
                 raise NavigationError(f"{name} is {given!r}, which is not a ROS {word}; write it as /{such}.")
             msgspec.structs.force_setattr(self, name, f"/{bare}" if bare else "")
-        for name, (least, most) in _RANGES.items():
-            value = getattr(self, name)
+        for number in (one for one in msgspec.structs.fields(self) if one.type is not str):
+            value, (least, most) = getattr(self, number.name), number.type.__metadata__
             if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
-                raise NavigationError(f"{name} is {value!r}; it is a number from {least:g} to {most:g}.")
+                raise NavigationError(f"{number.name} is {value!r}; it is a number from {least:g} to {most:g}.")
+
+    def named(self, name: str) -> str:
+        return f"{self.namespace}/{name}"
 
     @classmethod
     def read(cls, path: Path | str) -> "RosSettings":
@@ -184,6 +163,12 @@ class _Shift(msgspec.Struct, forbid_unknown_fields=True):
     x_m: float = 0.0
     y_m: float = 0.0
     yaw_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.ground()  # refused while the file is read
+
+    def ground(self) -> GroundTransform:
+        return GroundTransform(self.x_m, self.y_m, radians(self.yaw_deg))
 
 
 class _RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -203,8 +188,6 @@ class _RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True)
         except (OSError, ValueError, RecursionError) as fault:
             is_setting = str(fault).endswith("`$.settings`")
             known = f"; the settings are {', '.join(RosSettings.__struct_fields__)}" if is_setting else ""
-            raise _unreadable(path, f"{fault}{known}") from None
-
-
-def _unreadable(path: Path | str, fault: Exception | str) -> NavigationError:
-    return NavigationError(f"The robot's file {path} cannot be read ({fault}); write it as docs/robots.md shows.")
+            raise NavigationError(
+                f"The robot's file {path} cannot be read ({fault}{known}); write it as docs/robots.md shows."
+            ) from None

@@ -3,27 +3,24 @@
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import atan2, hypot, isfinite
+from math import atan2, hypot
 from time import monotonic
+from typing import Any
 
-import msgspec
 import numpy as np
-from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose
 from avlmaps_ros.messages import Transform, sanitize_line, transforms_in
+from avlmaps_ros.settings import FAR_M
 
 _MOST_FRAMES = 5000
-_FAR_M = 1e6
 _OVERTAKEN_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class _Edge:
-    parent: str
-    parent_from_child: Float[np.ndarray, "4 4"]
+    transform: Transform
     static: bool
-    stamp_s: float
     heard_s: float
     taken_s: float
 
@@ -75,7 +72,7 @@ class LiveTree:
         self._simulated_s: float | None = None
         self.refused = 0
 
-    def hear(self, message: msgspec.Raw, static: bool) -> None:
+    def hear(self, message: Any, static: bool) -> None:
         """Take in one message. ``ValueError``: it is none."""
         transforms, refused = transforms_in(message)
         self.refused += refused
@@ -85,15 +82,15 @@ class LiveTree:
         now_s = self._clock()
         with self._lock:
             for transform in transforms:
-                parent, child = transform.parent.lstrip("/"), transform.child.lstrip("/")
+                parent, child = transform.parent, transform.child
                 before = self._edges.get(child)
                 if not child or not parent or child == parent or (before is None and len(self._edges) >= _MOST_FRAMES):
                     continue
-                stamp_s = transform.stamp_s if isfinite(transform.stamp_s) else 0.0
+                stamp_s = transform.stamp_s
                 late_s = self._late_s(child, stamp_s, now_s)
-                if before is None or not _is_overtaken(before, stamp_s, now_s):
-                    edge = _Edge(parent, transform.parent_from_child, static, stamp_s, now_s, now_s - late_s)
-                    self._edges[child] = edge
+                is_soon = before is not None and now_s - before.heard_s < _OVERTAKEN_S
+                if before is None or not (is_soon and 0.0 < stamp_s < before.transform.stamp_s):
+                    self._edges[child] = _Edge(transform, static, now_s, now_s - late_s)
 
     def tick(self, simulated_s: float) -> None:
         """Take in the time of a simulation, by which its stamps run: slower than ours, as a rule, or not at all."""
@@ -112,23 +109,19 @@ class LiveTree:
     def fixed(self) -> list[Transform]:
         """Return the static transforms; a bridge may hand them to its first client only."""
         with self._lock:
-            edges = [(child, edge) for child, edge in self._edges.items() if edge.static]
-        return [Transform(edge.parent, child, edge.parent_from_child, edge.stamp_s) for child, edge in edges]
+            return [edge.transform for edge in self._edges.values() if edge.static]
 
     def seen(self, fixed: str, body: str) -> Sighting | None:
         """Return where the body is in the fixed frame; None where no chain of transforms leads there."""
         with self._lock:
-            chain = self._chain(fixed, body)
-        if chain is None:
-            return None
+            chain, top = self._chain(fixed, body)
         fixed_from_body = np.eye(4)
         for edge in chain:
-            fixed_from_body = edge.parent_from_child @ fixed_from_body
+            fixed_from_body = edge.transform.parent_from_child @ fixed_from_body
+        x_m, y_m = fixed_from_body[:2, 3].tolist()
         ahead_x, ahead_y = fixed_from_body[:2, 0]
-        if hypot(ahead_x, ahead_y) < 0.1:  # it stands on end, and heads nowhere
-            return None
-        x_m, y_m = float(fixed_from_body[0, 3]), float(fixed_from_body[1, 3])
-        if max(abs(x_m), abs(y_m)) > _FAR_M:
+        # A body on end heads nowhere.
+        if top != fixed or hypot(ahead_x, ahead_y) < 0.1 or max(abs(x_m), abs(y_m)) > FAR_M:
             return None
         pose = GroundPose(x_m, y_m, atan2(ahead_y, ahead_x))
         moving = [edge for edge in chain if not edge.static]
@@ -146,32 +139,22 @@ class LiveTree:
         with self._lock:
             if not self._edges:
                 return "nothing arrives on /tf"
-            name, passed = body, set()
-            while name in self._edges and name not in passed and name != fixed:
-                passed.add(name)
-                name = self._edges[name].parent
-            known = sorted({*self._edges, *(edge.parent for edge in self._edges.values())})
-        if not passed:
+            chain, top = self._chain(fixed, body)
+            known = sorted({*self._edges, *(edge.transform.parent for edge in self._edges.values())})
+        if not chain:
             return f"/tf has no frame {body!r}; it has {_listed(known)}"
-        return f"/tf leads from {body!r} up to {name!r} and not to {fixed!r}; it has {_listed(known)}"
+        return f"/tf leads from {body!r} up to {top!r} and not to {fixed!r}; it has {_listed(known)}"
 
-    def _chain(self, fixed: str, body: str) -> list[_Edge] | None:
+    def _chain(self, fixed: str, body: str) -> tuple[list[_Edge], str]:
+        """Return the transforms from the body up as far as they lead, and where: a ring of them ends somewhere."""
         chain: list[_Edge] = []
         name = body
-        while name != fixed:
-            edge = self._edges.get(name)
-            if edge is None or len(chain) > len(self._edges):
-                return None
-            chain.append(edge)
-            name = edge.parent
-        return chain
+        while name != fixed and name in self._edges and len(chain) <= len(self._edges):
+            chain.append(self._edges[name])
+            name = chain[-1].transform.parent
+        return chain, name
 
 
-def _is_overtaken(before: _Edge, stamp_s: float, now_s: float) -> bool:
-    return 0.0 < stamp_s < before.stamp_s and now_s - before.heard_s < _OVERTAKEN_S
-
-
-def _listed(names: list[str], most: int = 8) -> str:
-    return ", ".join(sanitize_line(name, 40) for name in names[:most]) + (
-        f" and {len(names) - most} more" if len(names) > most else ""
-    )
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+    return ", ".join(sanitize_line(name, 40) for name in names[:8]) + more

@@ -70,9 +70,8 @@ class Watch:
         for server, goals in self._goals.items():
             for goal in goals:
                 name = self._owner.get(goal)
-                if name is None or now_s - self._beats.get(name, [0.0, -1e9])[1] <= self.silence_s:
-                    continue
-                if now_s - self._asked_s.get(goal, -1e9) >= AGAIN_S:
+                silent = name is not None and now_s - self._beats.get(name, [0.0, -1e9])[1] > self.silence_s
+                if silent and now_s - self._asked_s.get(goal, -1e9) >= AGAIN_S:
                     self._asked_s[goal] = now_s
                     found.append((server, goal))
         return found

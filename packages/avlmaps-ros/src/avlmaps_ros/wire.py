@@ -46,7 +46,7 @@ class Websocket(WebSocketClientFactory):
     isSecure: bool  # noqa: N815 - autobahn's name
 
     def __init__(self, link: "Link", headers: Mapping[str, str], timeout_s: float, most_bytes: int) -> None:
-        super().__init__(link.url, headers=dict(headers))
+        super().__init__(link.name, headers=dict(headers))
         self.link, self._timeout_s = link, timeout_s
         self.current: _Protocol | None = None
         self.close_reason = ""

@@ -9,7 +9,7 @@ from conformance import *  # noqa: F403 - the laws
 from running import Operator, Robot
 
 from avlmaps_ros import RosDriver, RosSettings, open_ros_driver
-from avlmaps_ros.native import NativeSession
+from avlmaps_ros.native import Network
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -46,9 +46,9 @@ class RealField:
 
     def break_off(self) -> None:
         for driver in self.drivers:
-            session = driver._contact.session
-            assert isinstance(session, NativeSession)
-            session._context.try_shutdown()
+            network = driver._contact.session.link
+            assert isinstance(network, Network)
+            network.context.try_shutdown()
 
     def restore(self) -> None:
         """Nothing stands in the way of joining again."""
