@@ -116,43 +116,63 @@ def _refined(direction: Float[np.ndarray, "3"], normals: Float[np.ndarray, "n 3"
     return direction / np.linalg.norm(direction)
 
 
-_FRAMES = 16  # that show whether a given direction is right
+_FRAMES = 16  # that show whether a direction is right
 # Given and found directions closer than this are one; beside it, a slope or a tilted sensor explains the difference.
 _APART_DEG = 20.0
 # Planes count where so large a share of the surface agrees and the camera was held within this angle of them.
-_LEAST_SUPPORT, _HELD_DEG = 0.1, 40.0
+_LEAST_SUPPORT, _HELD_DEG, _UPSIDE_DEG = 0.1, 40.0, 160.0
 # A walk is level: along what is up it spreads less than half as far as along what is not.
 _FLATTER, _STILL_M = 0.5, 0.15
+# Floors and the tops of furniture face up: where this many times as much level surface faces down, at its extremes and
+# between them, and so many voxels at least, the camera hung upside down.
+_OVERTURNED, _FEWEST_LEVEL, _BETWEEN_M = 4.0, 200, 0.25
 
 
 def up_doubts(recording: Recording) -> tuple[Finding, ...]:
-    """Return a finding where the up direction of a recording is not that of what it shows, or nothing.
+    """Return a finding where the up direction of a recording, given or found, is not that of what it shows, or nothing.
 
     A camera that is mounted on its side shows walls where floors are expected; then the walk decides: nobody walks
     up and down as far as along.
     """
-    given = recording.up_in_world
-    if given is None:
-        return ()
+    given, frames = recording.up_in_world, list(spread_frames(recording, _FRAMES))
     try:
-        found = find_up(spread_frames(recording, _FRAMES), np.random.default_rng(0))
+        found = find_up(frames, np.random.default_rng(0))
     except RecordingError:  # too little smooth surface
         return ()
     held = -recording.world_from_camera[:, :3, 1].mean(axis=0)
-    apart = _angle_deg(given, found.direction)
-    if apart < _APART_DEG or found.support < _LEAST_SUPPORT or _angle_deg(held, found.direction) > _HELD_DEG:
+    if found.support < _LEAST_SUPPORT or _angle_deg(held, found.direction) > _HELD_DEG:
+        return ()
+    is_overturned = _overturned(frames, found.direction)
+    is_so, taken = -found.direction if is_overturned else found.direction, found.direction if given is None else given
+    if (apart := _angle_deg(taken, is_so)) < _APART_DEG:
         return ()
     places = recording.world_from_camera[:, :3, 3]
-    along_given_m, along_found_m = (float(np.std(places @ up)) for up in (given, found.direction))
-    if max(along_given_m, along_found_m) > _STILL_M and along_found_m > _FLATTER * along_given_m:
+    along_taken_m, along_found_m = (float(np.std(places @ up)) for up in (taken, is_so))
+    is_level = max(along_taken_m, along_found_m) < _STILL_M or along_found_m < _FLATTER * along_taken_m
+    if not is_level and apart < _UPSIDE_DEG:
         return ()
-    said, is_so = (_words(up) for up in (given, found.direction))
+    why = "so was the camera held"
+    if is_overturned:
+        why = "the tops of furniture and the floor face that way; the camera looks mounted upside down"
     sentence = (
-        f"Up is given as {said}, but {found.support:.0%} of the surface in view is level along {is_so}, {apart:.0f} "
-        "degrees away, and so was the camera held."
+        f"Up is {'found' if given is None else 'given'} as {_words(taken)}, but {found.support:.0%} of the surface in "
+        f"view is level along {_words(is_so)}, {apart:.0f} degrees away, and {why}."
     )
-    up = f"up_in_world=({is_so})" if is_of_program(recording) else option("up", is_so)
-    return (Finding(Reason.UP, Grade.SUSPICIOUS, sentence, f"Give {up}, or fix the poses."),)
+    up = f"up_in_world=({_words(is_so)})" if is_of_program(recording) else option("up", _words(is_so))
+    other = "leave it if the camera hung upside down" if apart > _UPSIDE_DEG and not is_overturned else "fix the poses"
+    return (Finding(Reason.UP, Grade.SUSPICIOUS, sentence, f"Give {up}, or {other}."),)
+
+
+def _overturned(frames: Sequence[Frame], up: Float[np.ndarray, "3"]) -> bool:
+    """Return whether what is level faces down, not up."""
+    counts = list[Int[np.ndarray, "2"]]()
+    for axis in (up, -up):
+        sights = [sight_of(frame, axis) for frame in frames]
+        height_m = Voxelised.union([sight.level for sight in sights]).height_m
+        low_m, high_m = np.quantile(Voxelised.union([sight.surface for sight in sights]).height_m, (0.005, 0.995))
+        between = (height_m > low_m + _BETWEEN_M) & (height_m < high_m - _BETWEEN_M)
+        counts.append(np.array([len(height_m), between.sum()]))
+    return bool((counts[1] > _OVERTURNED * counts[0]).all() and counts[1][0] >= _FEWEST_LEVEL)
 
 
 def spread_frames(recording: Recording, count: int) -> Iterator[Frame]:

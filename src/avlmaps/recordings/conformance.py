@@ -187,7 +187,8 @@ def _check_frame(
     recording: Recording, index: int, truth: Truth, depth_m: float, measured: float, colour: float
 ) -> None:
     frame, name = recording.frame(index), recording.name(index)
-    hold(frame.index == index and frame.name == name, f"frame {index} says that it is {frame.index}, {frame.name!r}")
+    own = f"frame {index} says that it is {frame.index}, {frame.name!r}; name({index}) says {name!r}"
+    hold(frame.index == index and frame.name == name, own)
     hold(frame.stamp_s == recording.stamps_s[index], f"frame {name} has another stamp than the recording says")
     true = truth.depth_m[index]
     known = np.isfinite(frame.depth_m) & (frame.depth_m >= 0.0)

@@ -128,38 +128,26 @@ def _is_rosbag(path: Path) -> bool:
 
 FORMATS: tuple[Format, ...] = (
     Format("folder", "recording.json with rgb/ (or rgb.mp4), depth/ and poses.csv", _is_folder, ".folder:open_folder"),
-    Format(
-        "7scenes",
-        "frame-000000.color.jpg or .png, .depth.png and .pose.txt",
-        lambda path: some_name(path, "frame-*.pose.txt", "frame-*.color.*"),
-        ".layouts:7scenes",
-    ),
+    Format("7scenes", "frame-000000.color.jpg or .png, .depth.png and .pose.txt",
+           lambda path: some_name(path, "frame-*.pose.txt", "frame-*.color.*"), ".layouts:7scenes"),
     Format("tum", "rgb.txt, depth.txt and groundtruth.txt", holds("rgb.txt", "depth.txt"), ".listed:open_tum"),
     Format("replica", "traj.txt and results/", holds("traj.txt", "results"), ".layouts:replica"),
     Format("scannet", "color/, depth/, pose/ and intrinsic/", holds("color", "depth", "pose"), ".layouts:scannet"),
     Format("avlmaps", "poses.txt, rgb/ (and depth/)", holds("poses.txt", "rgb"), ".layouts:open_avlmaps"),
     Format("rosbag", "a .bag, .mcap or .db3 file, or a folder of them", _is_rosbag, ".rosbag:open_rosbag", True),
     Format("record3d", "a .r3d file, or its export", _by("scans:is_record3d"), ".scans:open_record3d"),
-    Format(
-        "stray-scanner",
-        "odometry.csv, camera_matrix.csv, rgb.mp4 and depth/",
-        holds("odometry.csv", "camera_matrix.csv"),
-        ".scans:open_stray_scanner",
-    ),
+    Format("stray-scanner", "odometry.csv, camera_matrix.csv, rgb.mp4 and depth/",
+           holds("odometry.csv", "camera_matrix.csv"), ".scans:open_stray_scanner"),
     Format("nerfstudio", "transforms.json with depth_file_path", holds("transforms.json"), ".scans:open_nerfstudio"),
     Format("polycam", "keyframes/ with images/, depth/, cameras/", _by("scans:is_polycam"), ".scans:open_polycam"),
     Format("redwood", "trajectory.log, color/ and depth/", _by("layouts:find_redwood_log"), ".layouts:redwood"),
     Format("hov-sg", "rgb/, depth/ and pose/ of numbers", holds("rgb", "depth", "pose"), ".layouts:hov-sg"),
     Format("orb-slam", "associations.txt and a trajectory", _by("listed:is_orb_slam"), ".listed:open_orb_slam"),
-    Format(
-        "icl-nuim",
-        "associations.txt, rgb/, depth/ and a .gt.freiburg",
-        holds("associations.txt", "rgb", "depth"),
-        ".listed:open_icl_nuim",
-    ),
+    Format("icl-nuim", "associations.txt, rgb/, depth/ and a .gt.freiburg",
+           holds("associations.txt", "rgb", "depth"), ".listed:open_icl_nuim"),
     Format("rtabmap-export", "NAME_rgb/, NAME_depth/ ...", _by("listed:export_of"), ".listed:open_rtabmap_export"),
     Format("rtabmap", "a .db file of RTAB-Map", _by("rtabmap:is_rtabmap"), ".rtabmap:open_rtabmap"),
-)
+)  # fmt: skip
 _BUILT_IN = frozenset(known.name for known in FORMATS)
 _registered: dict[str, Format] = {}
 

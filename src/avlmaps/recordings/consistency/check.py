@@ -18,7 +18,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.wording import option
 from avlmaps.recordings.channels import level_faults
-from avlmaps.recordings.consistency import agreement
+from avlmaps.recordings.consistency import agreement, readings
 from avlmaps.recordings.consistency.readings import LEAST_OFF, Trial, Trials, cause_of, find_cause, find_closer
 from avlmaps.recordings.memory import is_of_program
 from avlmaps.recordings.types import Recording
@@ -406,7 +406,8 @@ def _contradiction(evidence: Evidence) -> Iterator[Said]:
             f"lie on the surface that another sees, and {after.through_share:.1%} are seen through ({after.pairs} "
             "pairs of frames)."
         )
-        sure = after.same_share < agreement.IMPOSSIBLE_AGREEING
+        is_mirrored = evidence.cause is not None and readings.is_left_handed(evidence.cause.reading)
+        sure = is_mirrored or after.same_share < agreement.IMPOSSIBLE_AGREEING
         yield Said(sentence, evidence.explanation or _other_cause(evidence), sure)
 
 
@@ -468,43 +469,22 @@ def _unlike_colour(evidence: Evidence) -> Iterator[Said]:
 _DOOR = (
     Suspicion(Reason.INTRINSICS, _middle),
     Suspicion(Reason.INTRINSICS, _focal),
-    Suspicion(
-        Reason.INTRINSICS,
-        _without_colour,
-        "Check the intrinsics of both cameras and the transform between them (rgb_from_depth).",
-    ),
-    Suspicion(
-        Reason.DEPTH,
-        _depth,
+    Suspicion(Reason.INTRINSICS, _without_colour,
+        "Check the intrinsics of both cameras and the transform between them (rgb_from_depth)."),
+    Suspicion(Reason.DEPTH, _depth,
         "A map needs depth; check how the depth pictures are stored (16 bits, their unit, order of bytes, no colours, "
-        "no lossy compression).",
-    ),
-    Suspicion(
-        Reason.COLOUR,
-        _dark,
-        "Little or nothing is recognised in such pictures; check the camera and its exposure, or leave them out.",
-    ),
-    Suspicion(
-        Reason.MOTION,
-        _few_posed,
-        "What they show is not in the map: check that pictures and poses are of one drive and one clock.",
-    ),
+        "no lossy compression)."),
+    Suspicion(Reason.COLOUR, _dark,
+        "Little or nothing is recognised in such pictures; check the camera and its exposure, or leave them out."),
+    Suspicion(Reason.MOTION, _few_posed,
+        "What they show is not in the map: check that pictures and poses are of one drive and one clock."),
     Suspicion(Reason.MOTION, _pace, "Check the poses, the intrinsics and the depth unit."),
     Suspicion(Reason.SOUND, _levels),
-    Suspicion(
-        Reason.GEOMETRY,
-        _contradiction,
-        "No usual mistake explains it; check the poses, the depth and the intrinsics, and that they belong together.",
-    ),
-    Suspicion(
-        Reason.GEOMETRY,
-        _drift,
-        "The poses drift, depth and positions have different scales, or much was moved; check them.",
-    ),
+    Suspicion(Reason.GEOMETRY, _contradiction,
+        "No usual mistake explains it; check the poses, the depth and the intrinsics, and that they belong together."),
+    Suspicion(Reason.GEOMETRY, _drift,
+        "The poses drift, depth and positions have different scales, or much was moved; check them."),
     Suspicion(Reason.GEOMETRY, _closer),
-    Suspicion(
-        Reason.COLOUR,
-        _unlike_colour,
-        "Check that colour and depth of a frame belong together (order of names, clock, intrinsics of colour).",
-    ),
-)
+    Suspicion(Reason.COLOUR, _unlike_colour,
+        "Check that colour and depth of a frame belong together (order of names, clock, intrinsics of colour)."),
+)  # fmt: skip

@@ -29,6 +29,7 @@ TURNS: dict[Turn, str] = {
     (True, 3): "transposed",
 }
 UNITS = (0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.1, 10.0, 0.01, 100.0, 0.001, 1000.0)
+_UNITS_M = (1 / 256, 1 / 1000, 1 / 4000, 1 / 5000, 1e-4)  # that cameras and data sets store depth in
 _SCALES = (0.87, 1.15, 0.8, 1.25, 0.63, 1.6, 0.4, 2.5, *UNITS)
 _OFF_CENTRE, _BESIDE_CENTRE = (-0.12, -0.06, 0.06, 0.12), (-0.03, 0.0, 0.03)
 _FOCAL = (0.5, 0.67, 0.8, 0.9, 1.12, 1.25, 1.5, 2.0)
@@ -48,6 +49,9 @@ _CLEARLY, _AS_GOOD = 0.02, 1.15
 # share of the pairs; smaller differences are noise. Between the steps that are tried, the gain is greater.
 _LEAST_GAIN, _MOST_BETTER, LEAST_OFF, _LEAST_STEP, _FEWEST_PAIRS = 0.5, 0.8, 0.006, 0.7, 6
 _PAIRS, _POINTS = 14, 128
+# A camera's place is searched by steps of metres. Two readings fit alike where their differences are this many times
+# one another's; of drawn rooms the true one of a place and a focal length fits 1.9 to 3.3 times better.
+_FIRST_STEP_M, _LAST_STEP_M, _OFF_WEIGHT, _ALIKE = 0.3, 0.02, 5.0, 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +68,8 @@ class Reading:
         rolled_deg: by how much the camera is turned about its axis of view, in its mount.
         k1: of the lens, whose distortion is in the pictures.
         depth_late: by how many frames depth pictures come after what they belong to.
+        beside_m: where the camera sits from what the poses are of, on the camera's axes.
+        or_focal: factor of the focal lengths that explains about as much as ``beside_m``.
     """
 
     given: Corrections = NONE
@@ -77,6 +83,8 @@ class Reading:
     k1: float = 0.0
     along_ray: bool = False
     depth_late: int = 0
+    beside_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    or_focal: float = 1.0
 
 
 AS_IT_IS = Reading()
@@ -140,8 +148,9 @@ class Trials:
         if rig is None or pose is None or seen is None:
             return Trial(reading, agreement.NOTHING, agreement.NOTHING, 0.0)
         half_rad = np.radians(reading.rolled_deg) / 2.0
-        rolled = from_quaternion(np.zeros((1, 3)), np.array([[0.0, 0.0, np.sin(half_rad), np.cos(half_rad)]]))
-        (sample, surfaces), pose = seen, corrections.reread_poses(pose, given) @ rolled
+        turned = np.array([[0.0, 0.0, np.sin(half_rad), np.cos(half_rad)]])
+        mounted = from_quaternion(np.array([reading.beside_m]), turned)
+        (sample, surfaces), pose = seen, corrections.reread_poses(pose, given) @ mounted
         median_m = self.median_m * reading.scale
         after, apart = (
             agreement.compare(sample.only(kind), surfaces, pose, rig, reading.scale, floor * median_m, colour=colour)
@@ -247,9 +256,11 @@ def find_closer(trials: Trials) -> Trial | None:
     readings = (*_SCALED, *_delays(trials.pace_s), *_FOCUSED, *_SHIFTED, *_MOUNTED, *_BENT)
     tried = (trials.run(reading, colour=False) for reading in readings)
     closer = [trial for trial in tried if _is_less_off(trial, as_it_is)]
-    if not closer:
+    found = _refined(trials, trials.run(min(closer, key=lambda trial: trial.off).reading)) if closer else None
+    of_files = Reading(focal=corrections.uncorrected(trials.recording).rig.rgb.fx / trials.recording.rig.rgb.fx)
+    best = _or_beside(trials, found, [AS_IT_IS, *([of_files] if trials.given.intrinsics else [])])
+    if best is None:
         return None
-    best = _refined(trials, trials.run(min(closer, key=lambda trial: trial.off).reading))
     delay_s = best.reading.given.pose_delay_s
     late = -round(delay_s / trials.pace_s) if delay_s and trials.pace_s > 0.0 else 0
     if late:  # depth that is late looks like poses that are early, but for colour
@@ -286,7 +297,7 @@ def find_cause(trials: Trials, enough: Callable[[Trial], bool]) -> Trial | None:
         late = [trials.run(Reading(depth_late=late)) for late in (1, -1, 2, -2, 3, -3)]
         best = _best([*(t for t in late if enough(t) and is_closer(t, trials.as_it_is)), *([best] if best else [])])
     if best is not None:
-        return _refined(trials, best)
+        return _or_beside(trials, _refined(trials, best), [replace(best.reading, focal=1.0, scale=1.0)], enough)
     posed = [
         trials.run(Reading(Corrections(poses=kinds, camera_axes=axes))) for kinds, axes in product(_POSES, all_axes())
     ]
@@ -298,7 +309,40 @@ def find_cause(trials: Trials, enough: Callable[[Trial], bool]) -> Trial | None:
     helped = sorted([*poses, *posed], key=lambda trial: -trial.score)[:3]
     others = [{"scale": scale} for scale in UNITS[:8]] + [{"focal": focal} for focal in _FOCAL] + [{"centred": True}]
     twice = [trials.run(replace(trial.reading, **other)) for trial in helped for other in others]
-    return _best([trial for trial in twice if enough(trial)])
+    best = _best([trial for trial in twice if enough(trial)])
+    return _or_beside(trials, best, [AS_IT_IS, *(trial.reading for trial in helped)], enough)
+
+
+def _or_beside(
+    trials: Trials, found: Trial | None, starts: list[Reading], enough: Callable[[Trial], bool] = lambda _: True
+) -> Trial | None:
+    """Return what was found, or a camera beside what the poses are of, which looks like another focal length."""
+    if found is not None and found.reading.focal == found.reading.scale == 1.0:
+        return found
+    beside = [trial for trial in (_placed(trials, start) for start in starts) if enough(trial)]
+    best = min(beside, key=lambda trial: trial.off, default=None)
+    if found is None or best is None or best.off * _ALIKE < found.off:
+        return best or found
+    if best.off > _ALIKE * found.off or found.reading.focal == 1.0:
+        return found
+    return replace(best, reading=replace(best.reading, or_focal=found.reading.focal))
+
+
+def _placed(trials: Trials, start: Reading) -> Trial:
+    def fit(trial: Trial) -> float:
+        return trial.score - _OFF_WEIGHT * min(trial.off, 0.1)
+
+    best, step_m = trials.run(start, colour=False), _FIRST_STEP_M
+    while step_m > _LAST_STEP_M:
+        moved = best.reading.beside_m + step_m * np.concatenate([np.eye(3), -np.eye(3)])
+        around = (trials.run(replace(start, beside_m=(x, y, z)), colour=False) for x, y, z in moved.tolist())
+        closer = max(around, key=fit)
+        best, step_m = (closer, step_m) if fit(closer) > fit(best) else (best, step_m / 2.0)
+    return trials.run(best.reading)
+
+
+def _is_known(scale: float, unit_m: float) -> bool:
+    return scale in UNITS or any(abs(scale * unit_m / known - 1.0) < 1e-6 for known in _UNITS_M)
 
 
 def _is_delayed(reading: Reading) -> bool:
@@ -338,7 +382,8 @@ def _refined(trials: Trials, best: Trial) -> Trial:
         tried = [replace(reading, given=replace(reading.given, pose_delay_s=s)) for s in around_s]
     elif reading.scale != 1.0:
         fine = np.geomspace(0.8, 1.25, 9) * reading.scale
-        tried = [replace(reading, scale=float(scale)) for scale in (*_SCALES, *fine.tolist())]
+        units = [unit_m / trials.recording.stored_depth_unit_m for unit_m in _UNITS_M]
+        tried = [replace(reading, scale=float(scale)) for scale in (*_SCALES, *units, *fine.tolist())]
     elif reading.focal != 1.0:
         tried = [replace(reading, focal=float(reading.focal * factor)) for factor in np.geomspace(0.88, 1.14, 9)]
     elif any(reading.off_centre):
@@ -349,7 +394,8 @@ def _refined(trials: Trials, best: Trial) -> Trial:
     found = [best, *(trial for trial in map(trials.run, tried) if trial.score >= best.score - _CLEARLY)]
     least = min(found, key=lambda trial: trial.off)
     # a usual unit rather than one beside it that fits hardly better
-    usual = [trial for trial in found if trial.reading.scale in UNITS and trial.off <= _AS_GOOD * least.off]
+    unit_m = trials.recording.stored_depth_unit_m
+    usual = [trial for trial in found if trial.off <= _AS_GOOD * least.off and _is_known(trial.reading.scale, unit_m)]
     return min(usual, key=lambda trial: trial.off) if usual else least
 
 
@@ -402,11 +448,21 @@ def _told(reading: Reading, rig: Rig, median_m: float) -> Iterator[tuple[str, st
         yield f"the intrinsics look like those of a {size} picture, not {camera.width}x{camera.height}", ""
     if reading.focal != 1.0:
         yield f"the focal length looks like {reading.focal:.2f} of what is given", ""
+    if any(reading.beside_m):
+        other = f", or the focal length looks like {reading.or_focal:.2f} of what is given" * (reading.or_focal != 1.0)
+        by_hand = "give the poses of the camera (each times the camera's place on the body; in a bag /tf_static)"
+        by_hand += ", or its true intrinsics if they are" * bool(other)
+        yield f"the camera looks beside what the poses are of{other}", by_hand
     if any(reading.off_centre):
         parts = zip(reading.off_centre, (rig.rgb.width, rig.rgb.height), "xy", strict=True)
         by = " and ".join(f"{share * size:+.0f} pixels in {axis}" for share, size, axis in parts if share)
         yield f"the principal point looks {by} off, or the camera turned by as many in its mount", ""
     yield from _told_of_pictures(reading)
+
+
+def is_left_handed(reading: Reading) -> bool:
+    """Return whether both pictures are mirrored, as those of right-handed cameras with left-handed poses are."""
+    return reading.turn[0] and len(reading.turned) == 2
 
 
 def _told_of_pictures(reading: Reading) -> Iterator[tuple[str, str]]:
@@ -424,7 +480,13 @@ def _told_of_pictures(reading: Reading) -> Iterator[tuple[str, str]]:
         yield "the depth looks like the distance along the ray, not along the camera's axis", by_hand
     if reading.turned:
         what = " and ".join(reading.turned)
-        yield f"the {what} pictures look {TURNS[reading.turn]}", f"turn the {what} pictures back"
+        look, by_hand = f"the {what} pictures look {TURNS[reading.turn]}", f"turn the {what} pictures back"
+        if is_left_handed(reading):
+            look += ", or the poses are left-handed (Unity, Unreal)"
+            kept = {0: "x", 2: "y"}.get(reading.turn[1])
+            signs = f"negate t{kept} and the two of qx, qy, qz but q{kept}" if kept else "exchange two axes"
+            by_hand = f"where writing in them reads rightly, write right-handed poses ({signs}), else {by_hand}"
+        yield look, by_hand
 
 
 def _late(by: float) -> str:
@@ -436,7 +498,7 @@ def _scaled(scale: float, median_m: float) -> tuple[str, str]:
     small, large = ("small", "large") if scale > 1.0 else ("large", "small")
     if _is_positions(scale, median_m):
         return f"the positions look {times} {large} (poses of one camera alone have no scale)", by_hand
-    if _is_unit(scale) and _usual(scale * median_m) and not _usual(median_m):
+    if _usual(scale * median_m) > _usual(median_m):
         return f"the depth looks {times} {small}", ""
     return f"the depth looks {times} {small}, or the positions {times} {large}", f"or {by_hand}"
 
@@ -445,13 +507,10 @@ def _usual(median_m: float) -> bool:
     return USUAL_DEPTH_M[0] <= median_m <= USUAL_DEPTH_M[1]
 
 
-def _is_unit(scale: float) -> bool:
-    return any(abs(scale / unit - 1.0) < _CLOSE for unit in UNITS)
-
-
 def _is_positions(scale: float, median_m: float) -> bool:
-    unusual = _usual(median_m) and not _usual(scale * median_m)
-    return unusual or (not _is_unit(scale) and max(scale, 1.0 / scale) > _SLIGHT)
+    if (before := _usual(median_m)) != _usual(scale * median_m):
+        return before
+    return not any(abs(scale / unit - 1.0) < _CLOSE for unit in UNITS) and max(scale, 1.0 / scale) > _SLIGHT
 
 
 def _options(reading: Reading, recording: Recording, median_m: float) -> Corrections:

@@ -109,28 +109,18 @@ def _blue(evidence: Evidence) -> Iterator[Said]:
 
 
 _SINGLE = (
-    Suspicion(
-        Reason.DEPTH,
-        _cut_off,
-        "They look cut off there, or none was measured: write 0 for these, or the map has a wall there.",
-    ),
-    Suspicion(
-        Reason.DEPTH,
-        _wrapped,
-        "They look cut to too few bits, so that they begin again at 0: write them whole, or 0 where too far.",
-    ),
-    Suspicion(
-        Reason.DEPTH, _frozen, "The camera or its driver may have hung; record again, or leave these frames out."
-    ),
+    Suspicion(Reason.DEPTH, _cut_off,
+        "They look cut off there, or none was measured: write 0 for these, or the map has a wall there."),
+    Suspicion(Reason.DEPTH, _wrapped,
+        "They look cut to too few bits, so that they begin again at 0: write them whole, or 0 where too far."),
+    Suspicion(Reason.DEPTH, _frozen,
+        "The camera or its driver may have hung; record again, or leave these frames out."),
     Suspicion(Reason.MOTION, _frozen_pose, "The poses froze there: check the odometry, or leave these frames out."),
     Suspicion(Reason.COLOUR, _drawn, "They look like drawings of the depth: give what the colour camera saw."),
-    Suspicion(
-        Reason.COLOUR,
-        _blue,
+    Suspicion(Reason.COLOUR, _blue,
         "Red and blue look exchanged in all colour pictures: write them as RGB, not BGR; or the light, the walls or "
-        "the camera's white balance are blue.",
-    ),
-)
+        "the camera's white balance are blue."),
+)  # fmt: skip
 
 
 # Frames against frames

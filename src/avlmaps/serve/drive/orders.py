@@ -27,7 +27,8 @@ from avlmaps.core.errors import AvlmapsError, NavigationError, SeveralFitError, 
 from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable, printable_json
-from avlmaps.language.commands import MOST_CHARACTERS
+from avlmaps.language.commands import MOST_CHARACTERS, is_stop
+from avlmaps.language.lexer import tokenise
 from avlmaps.language.program import Budget, parse_program
 from avlmaps.language.translator import LearnedTranslator, Translation
 from avlmaps.navigate.brake import Brake
@@ -78,7 +79,8 @@ _REFUSALS = {
     "robot-changed": (409, "The plan was made for another robot; plan again."),
     "unstopped": (503, "The robot did not confirm its last stop ({}); stop it until it does."),
     "ending": (503, "The server is ending; it takes no orders."),
-    "busy": (409, "The robot is at another order ({}); wait for its end, or stop it."),
+    "busy": (409, "The robot is at another order ({}); wait for its end, or stop it: /drive/stop (stop_robot)."),
+    "stop": (409, "{}; /drive/stop (stop_robot) stops the robot, without a plan."),
     "moved": (409, "The robot stands {:.2f} m from where the plan begins, turned by {:.0f} degrees; plan again."),
 }
 
@@ -254,6 +256,8 @@ class Dispatcher:
         """
         begun = self.begun if begun is None else begun
         with self._refusing(who, words=words, program=program):
+            if is_stop(tokenise(words)):
+                raise _refused("stop", "Nothing drives" if self._running is None else self.stop(who)["note"])
             with self._preparing:
                 self._require_idle()
                 plan = self._planned(words, program, choose)
