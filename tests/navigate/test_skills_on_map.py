@@ -334,3 +334,11 @@ def test_no_thing_is_nearest_that_is_less_than_half_as_likely_as_the_best(
     assert 2.0 * chosen.probability >= things[0].probability
     near = [one for one in things if one.found and 2.0 * one.probability >= things[0].probability]
     assert all(chosen.place[0] <= one.place[0] for one in near)
+
+
+def test_every_room_of_the_map_is_a_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    views = np.array([[1.0, 0.0]], np.float32)
+    robot = furnished_robot(views=FakeViews(), keyframes=keyframes_at(np.array([[4.0, 2.0, 1.2]]), views))
+    rooms = [SimpleNamespace(name=name, position=(x, 2.0, 1.2)) for name, x in (("hall", 5.0), ("den", 2.5))]
+    monkeypatch.setattr(type(robot.seeker.avlmap), "where", SimpleNamespace(rooms=rooms))
+    assert [place.x for place in robot.get_all_pos(robot.get_major_map(area="room"))] == [2.5, 5.0]

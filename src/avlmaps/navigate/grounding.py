@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError, ProgramError, SeveralFitError
-from avlmaps.core.question import HeardAt
+from avlmaps.core.question import HeardAt, Modality
 from avlmaps.core.wording import option, place_text, the_room
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.language.said_places import said_storeys
@@ -344,6 +344,9 @@ class Seeker:
             known = self._handed_out.get(target, Destination("", Outline.at(level[:2]), level))
             return [known if target in self._instances else replace(known, outline=Outline.at(level[:2]))], True
         heat = self._heat_of(target, "go to")
+        rooms = self._rooms(heat)
+        if rooms:
+            return self._near_first(rooms, heat.found_at), False
         things = things_in(heat, self.guess)
         if isinstance(target, str):
             self._note(heat)
@@ -352,6 +355,13 @@ class Seeker:
             likely_by = f"{things[0].probability:.2f}, below {heat.found_at:.2f}"
             self.note(f"the probability of {things[0].name} is {likely_by}; this is the best guess")
         return things, tells_one(heat)
+
+    def _rooms(self, heat: Heatmap) -> list[Destination]:
+        """Return all rooms of the map where a heatmap asks for rooms of any kind; else none."""
+        if [(one.part.modality, one.part.query.removesuffix("s")) for one in heat.factors] != [(Modality.AREA, "room")]:
+            return []
+        places = [(room.name, self.avlmap.space.level(np.array(room.position))) for room in self.avlmap.where.rooms]
+        return [Destination(name, Outline.at(place[:2]), place) for name, place in places]
 
     def _near_first(self, things: list[Destination], found_at: float) -> list[Destination]:
         """Return the things on the robot's own storey where one of them is found, else all of them."""
