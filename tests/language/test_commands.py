@@ -153,6 +153,11 @@ def test_a_command_may_depend_on_whether_there_is_a_thing(command: str, meant: I
     assert verbalise(read.intents).startswith("I will, if there is ")
 
 
+def test_a_wait_at_each_is_inside_the_visit() -> None:
+    program = command_to_program("stop by every door and wait 5 seconds at each")
+    assert program.endswith("    robot.move_to(place)\n    robot.wait(5)\n")
+
+
 def test_a_condition_in_odd_words_is_offered() -> None:
     stop = read_command("if the chair's in the kitchen, come back, and if it is not, go to the kitchen").stops
     assert isinstance(stop, Clarify)
@@ -193,7 +198,10 @@ def test_a_number_chooses_one_of_several_meanings() -> None:
         ("'Go to the window,' she whispered, and the curtain fell", "tells of a drive"),
         ("At quarter past three the lads will be going to the kitchen", "no order that the robot understands"),
         ("go to the kitchen in the morning", "knows no clock"),
-        ("if it rains go to the sofa", "waits for nothing to happen"),
+        ("if it rains go to the sofa", "waits for no event"),
+        ("go to each door, turn around and wait 2 seconds at each", "knows only to wait"),
+        ("drive in a square", "say its sides"),
+        ("go to the two nearest chairs", "one place at a time"),
         ("never go to the sofa", "nothing to avoid"),
         ("Barge straight into the glass door, it'll give", "could hurt someone"),
     ],
@@ -215,9 +223,8 @@ def test_a_question_has_choices_and_no_program() -> None:
 
 
 def test_a_mended_word_is_said() -> None:
-    assert LearnedTranslator().program_for("go to the refridgerator").notes == (
-        "'refridgerator' is read as 'refrigerator'.",
-    )
+    notes = LearnedTranslator().program_for("go to the refridgerator").notes
+    assert notes == ("'refridgerator' is read as 'refrigerator'.",)
 
 
 def test_an_open_vocabulary_takes_any_noun() -> None:
@@ -226,8 +233,7 @@ def test_an_open_vocabulary_takes_any_noun() -> None:
 
 
 def test_what_has_no_effect_is_reported() -> None:
-    (note,) = read_command("go slowly to the kitchen").notes
-    assert "slowly" in note
+    assert "slowly" in read_command("go slowly to the kitchen").notes[0]
 
 
 @pytest.mark.parametrize("storey", ["first floor", "ground floor", "second floor", "top floor"])
@@ -262,16 +268,13 @@ def test_the_robot_changes_no_storey_and_guesses_none(command: str) -> None:
 
 def test_the_translator_is_one() -> None:
     translator = LearnedTranslator()
-    assert isinstance(translator, Translator)
-    assert translator.name == "learned"
+    assert isinstance(translator, Translator) and translator.name == "learned"
     assert translator.repair("go to the sofa", "robot.move_to_object('sofa')", "no path") is None
 
 
 def test_the_plan_is_in_plain_words() -> None:
-    plan = LearnedTranslator().program_for(
-        "go to the armchair nearest to where breathing was heard, then face the window"
-    )
-    assert plan.plan == "I will go to the armchair nearest to where breathing was heard, then face the window."
+    said = "go to the armchair nearest to where breathing was heard, then face the window"
+    assert LearnedTranslator().program_for(said).plan == f"I will {said}."
 
 
 ORDERS = ["turn left", "go to the sofa", "stop 2 m left of the bed", "find the sound of rain", "go to the kitchen"]

@@ -15,7 +15,7 @@ NO_ORDERS = {
     "cancelled": ["cancel the visit to the sofa", "never mind going to the bed", "Don't bother driving to the desk."],
     "postponed": ["postpone the drive to the sofa", "I may send you to the kitchen later"],
     "asked": ["what if you drove to the sofa?", "imagine going to the kitchen", "are you able to go to the bed?"],
-    "reported": ["my brother went to the kitchen", "the sign says go to the door", "You always go to the sofa."],
+    "reported": ["my brother went to the kitchen", "Anna said 'go to the bed' and left", "You always go to the sofa."],
     "other": ["Alexa, go to the kitchen", "the other robot should go to the bed"],
     "wished": ["I wish you could go to the bed", "You should have gone to the kitchen."],
     "sarcastic": ["as if you could go to the bed", "Good luck going to the sofa"],
@@ -44,9 +44,8 @@ def test_no_front_drives_by_what_is_no_order(kind: str, text: str) -> None:
 
 def test_the_question_offers_the_order_that_would_be_one() -> None:
     asked = read_command("imagine going to the kitchen")
-    assert asked.why == "gate" and asked.stops is not None
-    (order,) = asked.stops.choices  # type: ignore[union-attr]
-    assert read_command(order).intents == read_command("go to the kitchen").intents
+    (order,) = getattr(asked.stops, "choices", ())
+    assert asked.why == "gate" and read_command(order).intents == read_command("go to the kitchen").intents
 
 
 @pytest.mark.parametrize("text", ORDERS)

@@ -104,6 +104,7 @@ def test_each_alternative_has_the_context(names: list[str], tail: str) -> None:
         ("what is between the sofa and the tv", []),
         ("the sofa near the sound of water and the phone", []),
         ("where is the blorb and quux", []),
+        ("how many beds are there and how many sofas", ["how many beds", "how many sofas"]),
     ],
 )  # fmt: skip
 def test_what_is_asked_of_two_things_is_two_questions(text: str, said: list[str]) -> None:

@@ -182,6 +182,17 @@ def lacking(tokens: Sequence[Token], named: frozenset[int]) -> act.Clarify:
     return found
 
 
+def at_each(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tuple[act.Intent, ...]:
+    """Return intents with a wait inside the visit before it where the words say so: "wait 5 seconds at each"."""
+    told = list(intents)
+    says = _pattern("{at_each}").search(f" {' '.join(token.text for token in tokens)} ")
+    for at in range(len(told) - 2, -1, -1) if says else ():
+        visit, there = told[at : at + 2]
+        if isinstance(visit, act.VisitEach) and isinstance(there, act.Wait):
+            told[at : at + 2] = [replace(visit, body=(there,))]
+    return tuple(told)
+
+
 def in_direction(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tuple[act.Intent, ...] | act.Clarify:
     """Return intents whose circles run in the direction that is said, or the question which one is meant."""
     ways = [_WAYS[token.text] for at, token in enumerate(tokens) if token.text in _WAYS and not _turns(tokens, at)]
@@ -248,8 +259,6 @@ def _facts(intents: Sequence[act.Intent], targets: Sequence[act.Target]) -> Iter
     for intent in act.every(intents):
         if isinstance(intent, act.If):
             yield from ("if", "if alive") if is_alive(intent.of.name) else ("if",)
-    steps = act.steps_of(intents)
-    if len(steps) == 1:
+        yield from act.facts_of(intent)
+    if len(act.steps_of(intents)) == 1:
         yield "one step"
-    for step in steps:
-        yield from act.facts_of(step)

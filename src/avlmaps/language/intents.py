@@ -195,9 +195,10 @@ class Circle(Step):
 
 @dataclass(frozen=True, slots=True)
 class VisitEach(Step):
-    """Drive to every instance of a target, the nearest first."""
+    """Drive to every instance of a target, the nearest first, and do something there."""
 
     of: Target
+    body: "tuple[Intent, ...]" = ()
 
 
 @dataclass(frozen=True, slots=True)

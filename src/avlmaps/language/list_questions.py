@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cache
+from itertools import dropwhile
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
@@ -207,11 +208,10 @@ def said_both(text: str) -> tuple[str, ...]:
         return ()
     at = words.index("and")
     begin = next((number for number, word in enumerate(words) if word not in asking), len(words))
-    name, behind = " ".join(words[begin:at]), words[at + 1 :]
-    while behind and behind[0] in articles:
-        del behind[0]
-    ends = (end for end in range(len(behind), 0, -1) if _is_named(" ".join(behind[:end])))
-    end = next(ends, 0)
+    name, behind = " ".join(words[begin:at]).removesuffix(" are there"), words[at + 1 :]
+    again = begin if behind[:begin] == words[:begin] else 0  # "how many beds and how many sofas"
+    behind = list(dropwhile(articles.__contains__, behind[again:]))
+    end = next((end for end in range(len(behind), 0, -1) if _is_named(" ".join(behind[:end]))), 0)
     if not end or not _is_named(name):
         return ()
     asked, rest = " ".join(words[:begin]), " ".join(behind[end:])

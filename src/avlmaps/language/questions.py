@@ -20,13 +20,7 @@ from avlmaps.language.word_classes import listed, load_word_classes, pattern, wo
 
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
 _NO_USE = f"What serves that purpose is not known; name the thing, like: {_EXAMPLE}."
-_MODALITIES = {
-    TargetKind.OBJECT: Modality.OBJECT,
-    TargetKind.SOUND: Modality.SOUND,
-    TargetKind.CLIP: Modality.SOUND,
-    TargetKind.AREA: Modality.AREA,
-    TargetKind.IMAGE: Modality.IMAGE,
-}
+_MODALITIES = {kind: Modality(kind.replace("clip", "sound")) for kind in TargetKind if kind is not TargetKind.HERE}
 _OWN: Mapping[str, str] = dict.fromkeys(("his", "her", "their", "our", "your", "its"), "my")
 _LONGEST_ACTOR = 3  # words of who does it: "an old lady"
 _TABLE = "list_questions"

@@ -26,6 +26,11 @@ _MADE = {
     TargetKind.SOUND: "where the sound of {} comes from", TargetKind.CLIP: "where a sound like {} comes from"
 }  # fmt: skip
 
+_ALONE: dict[tuple[Intent, ...], str] = {
+    (act.Wait(),): "I will stop and stay here.",
+    (act.Return(),): "I will stay here, where this command begins.",
+}
+
 
 def verbalise(intents: Sequence[Intent]) -> str:
     """Return one sentence that says what the robot will do, or why it does nothing."""
@@ -33,9 +38,7 @@ def verbalise(intents: Sequence[Intent]) -> str:
         return intents[0].said
     if intents and isinstance(intents[0], Clarify):
         return intents[0].question
-    if tuple(intents) == (act.Wait(),):
-        return "I will stop and stay here."
-    return f"I will {_steps(intents)}.".replace(" ,", ",")
+    return _ALONE.get(tuple(intents)) or f"I will {_steps(intents)}.".replace(" ,", ",")
 
 
 class _Words(act.Filled):

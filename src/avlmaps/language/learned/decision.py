@@ -14,7 +14,7 @@ from avlmaps.core.wording import option
 from avlmaps.core.words import singulars_of, stem_of
 from avlmaps.language import intents as act
 from avlmaps.language import lexer
-from avlmaps.language.claims import claimed_words, in_direction, reasons, unmet
+from avlmaps.language.claims import at_each, claimed_words, in_direction, reasons, unmet
 from avlmaps.language.intents import Clarify, Intent, Pick, RefusalReason, Refuse, Target, TargetKind, on_targets
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.reader import Read, ReadingLimits
@@ -29,9 +29,7 @@ REFUSALS = {
     RefusalReason.ENDLESS: "The robot does not drive without an end; say how often.",
     RefusalReason.HARM: "The robot does not do what could hurt someone or break something.",
     RefusalReason.FLYING: "The robot stays on its floor; it cannot fly, jump or climb stairs.",
-    RefusalReason.CONDITION: (
-        "The robot waits for nothing to happen; it can look up whether the map has a thing. Say what to do now."
-    ),
+    RefusalReason.CONDITION: "The robot waits for no event and chooses by the map alone: if there is a sofa, go to it.",
     RefusalReason.NEGATION: "Say only what to do: nothing to avoid, no choice between two.",
     RefusalReason.CHAT: "The robot does not talk; say where it should go.",
     RefusalReason.QUESTION: 'This is a question; ask the map: avlmaps query MAP "QUESTION".',
@@ -39,13 +37,7 @@ REFUSALS = {
 }
 _FAR_M, _LONG_TIMES = 100.0, 50
 _ROOM_WORDS = frozenset({"room", "area", "zone", "hall", "corner", "wing", "bay", "ward", "lab", "office", "aisle"})
-DANGERS = (
-    RefusalReason.HARM,
-    RefusalReason.FLYING,
-    RefusalReason.ENDLESS,
-    RefusalReason.CONDITION,
-    RefusalReason.NEGATION,
-)
+DANGERS = tuple(map(RefusalReason, ("harm", "flying", "endless", "condition", "negation")))
 _SMALL_WORDS = frozenset({"a", "an", "one", "some", "first", "second", "half", "couple", "few", "several"})
 _WORTH_ASKING = 0.1
 _MEANT: dict[type[Intent], tuple[str, ...]] = {
@@ -158,7 +150,7 @@ def weighed(read: Read, names: NameResolver) -> Weighed:
     elif any(isinstance(one, Clarify) for one in intents):
         stop = unclear(tokens)
     else:
-        intents = tuple(on_targets(one, names.resolve) for one in intents)
+        intents = at_each(tokens, [on_targets(one, names.resolve) for one in intents])
         stop = names.problem or _too_much(intents) or unmet(tokens, intents, read.used)
     if stop is None:
         turned = in_direction(tokens, intents)
@@ -183,7 +175,7 @@ def refusal_of(stop: Refuse | Clarify, tokens: Sequence[Token]) -> Refuse | Clar
 
 
 def _too_much(intents: Sequence[Intent]) -> Clarify | None:
-    for one in intents:
+    for one in act.every(intents):
         metres = one.metres if isinstance(one, act.Move | act.StopAt | act.Beside) else None
         if metres is not None and not 0.0 < abs(metres) <= _FAR_M:
             return Clarify(f"{metres:g} m is too far, or no distance; say a distance of up to {_FAR_M:g} m.")
@@ -193,9 +185,6 @@ def _too_much(intents: Sequence[Intent]) -> Clarify | None:
             return Clarify(f"{one.degrees:g} degrees is too far to turn.")
         if isinstance(one, act.Repeat) and one.times > _LONG_TIMES:
             return Clarify(f"{one.times} times is too often; say up to {_LONG_TIMES}.")
-        inner = _too_much(act.blocks_of(one))
-        if inner is not None:
-            return inner
     return None
 
 
@@ -260,6 +249,8 @@ def _rounded(intent: Intent) -> Intent:
     match intent:
         case act.Move(metres=metres):
             return act.Move(round(metres, 2))
+        case act.VisitEach(of=of):
+            return act.VisitEach(of)
         case act.Turn(degrees=degrees) if degrees is not None:
             return act.Turn(180.0 if degrees == -180.0 else round(degrees, 1))
         case _:
@@ -268,7 +259,7 @@ def _rounded(intent: Intent) -> Intent:
 
 def _plain(target: Target) -> Target:
     """Return a target that is the same however it is written."""
-    near = tuple(sorted({_plain(one) for one in _flat_near(target)}, key=str))
+    near = tuple(sorted({_plain(one) for one in target.near}, key=str))
     own = target.name.lower().replace("-", " ").split()
     if target.kind is TargetKind.SOUND:
         name = " ".join(sorted(stem_of(word) for word in own if word not in claimed_words("round_sounds")))
@@ -279,10 +270,6 @@ def _plain(target: Target) -> Target:
     kind = TargetKind.OBJECT if target.kind is TargetKind.AREA else target.kind
     pick = Pick.ANY if target.pick is Pick.NEAREST and target.number == 1 else target.pick
     return Target(kind, name, near, pick, target.number)
-
-
-def _flat_near(target: Target) -> list[Target]:
-    return [part for one in target.near for part in (replace(one, near=()), *_flat_near(one))]
 
 
 def is_doubtful(tokens: Sequence[Token], used: frozenset[int], meant: frozenset[str] = frozenset()) -> bool:
