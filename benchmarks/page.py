@@ -195,9 +195,9 @@ README_ROWS = {"sounds": 2, "objects": 2, "rooms": 2, "language": 1, "outside": 
 
 INTRODUCTION = """# Benchmarks
 
-`make bench` measures every row anew in an afternoon, and writes this page and the README's table from
-[benchmarks.json](benchmarks.json), all that each command printed. Speed is of one core of a shared machine with two, as
-a ratio to another way in the same run. Intervals are 95 %: few homes or missions make them wide.
+`make bench` measures what has a command anew in an afternoon, and writes this page and the README's table from
+[benchmarks.json](benchmarks.json), all that each command printed. Speed is of one core of a shared machine with two.
+Intervals are 95 %: few homes or missions make them wide. *Another hand* has no command: its rows say which reader.
 
 *Weights* says whether a row was measured with the weights that ship; *older* is not to be relied on.
 
@@ -247,7 +247,7 @@ def weights_of(found: Mapping[str, Any], shipped: Mapping[str, str], *, photos: 
     """Say whether an entry was measured with the weights that ship; those of photos count where they are located."""
     answer = found.get("answer")
     if answer is None or answer.get("weights") == {}:
-        return "none" if answer is not None or found["command"].startswith("python") else "shipped"
+        return "none" if answer is not None or found["command"].startswith("python") else "-"
     if answer.get("weights") is None:
         return "not recorded"
     others = set(outdated(answer["weights"], shipped)) - (set() if photos else _OF_PHOTOS)

@@ -4,6 +4,7 @@ import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ from avlmaps_sim.bench.indexing.runs import (
     scored,
 )
 from avlmaps_sim.bench.indexing.scene_queries import QueriedScene
-from avlmaps_sim.bench.indexing.suite import open_tasks, score_others, tables
+from avlmaps_sim.bench.indexing.suite import columns, open_tasks, score_others, tables
 from avlmaps_sim.bench.indexing.tasks import (
     Task,
     TaskKind,
@@ -257,7 +258,10 @@ def test_another_system_is_judged_by_saved_tasks_as_ours_is(tmp_path: Path):
     chance, yours, _ = (dict(zip(table["columns"], row, strict=True)) for row in table["rows"])
     assert (chance["R@1 < 0.5 m %"], yours["R@1 < 0.5 m %"], yours["answered %"]) == (50.0, 50.0, 50.0)
     assert yours["mean m"] == pytest.approx((0.2 + np.hypot(10, 1)) / 2, abs=0.01)
-    for wrong in ({"t1": (0, 0, 0)}, {"t0": (float("nan"), 0, 0)}, {"t0": ()}):
+    (table,) = score_others(read[:1], {}).values()  # a chair 1 m wide, not answered: no hit within 2 m
+    assert table["rows"][1][columns().index("R@1 < 2 m %")] == 0.0
+    wrongs: list[dict[str, Any]] = [{"t1": (0, 0)}, {"t0": (float("nan"), 0)}, {"t0": ()}, {"t0": "1, 2, 3"}]
+    for wrong in wrongs:
         with pytest.raises(TaskError):
             score_others(read, wrong)
 

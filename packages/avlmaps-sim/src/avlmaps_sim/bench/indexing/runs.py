@@ -187,8 +187,9 @@ class Score:
 def scored(answers: Sequence[Answered], seed: int = 0, *, by_centre: bool = False) -> Score:
     """Sum up answers, by the nearest face of the right thing or by its centre."""
     off_m = np.array([answer.centre_m if by_centre else answer.off_m for answer in answers], np.float64)
-    hits = tuple(int((off_m < limit).sum()) for limit in LIMITS_M)
-    answered = sum(answer.position is not None for answer in answers)
+    is_answered = np.array([answer.position is not None for answer in answers], bool)
+    hits = tuple(int((is_answered & (off_m < limit)).sum()) for limit in LIMITS_M)
+    answered = int(is_answered.sum())
     mean = float(off_m.mean()) if len(off_m) else 0.0
     return Score(len(answers), answered, hits, mean, bootstrapped_mean(off_m, np.random.default_rng(seed)))
 

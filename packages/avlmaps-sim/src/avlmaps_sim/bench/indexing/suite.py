@@ -1,6 +1,7 @@
 """Tables III, IV and V as ``avlmaps bench indexing`` writes them, the paper's own figures beside ours."""
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -87,15 +88,17 @@ def score_others(tasks: Sequence[Task], places: Mapping[str, Sequence[float]]) -
     """Judge another system's answers by the rules of ours.
 
     ``places`` are first goals by the task's name, metres, in the world of the recording; the height does not count.
-    A task that is left out is as wrong as its scene's targets lie apart. Returns a table of each kind of task.
+    A task that is left out is no hit, and counts in the mean as far as its scene's targets lie apart. Returns a
+    table of each kind of task.
 
     Raises:
         TaskError: a place belongs to no task, or is none.
     """
     if strange := sorted(places.keys() - {task.name for task in tasks}):
         raise TaskError(f"{len(strange)} of {len(places)} answers belong to no task, such as {strange[0]!r}.")
-    if wrong := [name for name, at in places.items() if len(at) < 2 or not np.isfinite(at).all()]:
-        raise TaskError(f"The answer to {wrong[0]} is {places[wrong[0]]}; give x, y and z in metres.")
+    for name, at in places.items():
+        if len(at) < 2 or not all(isinstance(v, Real) and np.isfinite(v) for v in at):
+            raise TaskError(f"The answer to {name} is {at}; give x, y and z in metres.")
     ends: dict[str, list[Sequence[float]]] = {task.scene: [] for task in tasks}
     for task in tasks:
         ends[task.scene] += [end[:2] for box in task.targets for end in (box.low, box.high)]
