@@ -35,7 +35,7 @@ class Robot:
     """Gives messages to what puts frames together."""
 
     def __init__(self, told: Callable[[str], None] = lambda _: None, knows: bool = True) -> None:
-        self.frames, self.now_s = RosFrames("/rgb", "/depth", "", told), 100.0
+        self.frames, self.now_s = RosFrames({"rgb": "/rgb", "depth": "/depth"}, told), 100.0
         if knows:
             self.give("tf_static", ros.mount())
             for kind in ("rgb_info", "depth_info"):
@@ -194,7 +194,7 @@ def test_pictures_of_two_moments_are_no_frame() -> None:
         robot.see(number, off_s=0.055)
     assert len(robot.wait(PARTNER_WITHIN_S + 0.1)) <= 2  # the last colour picture is 45 ms before the next depth
     assert robot.frames.unpaired >= 1
-    assert "no colour picture has come" in RosFrames("/rgb", "/depth", "", print).missing()
+    assert "no colour picture has come" in RosFrames({"rgb": "/rgb", "depth": "/depth"}, print).missing()
 
 
 @pytest.mark.parametrize("off_s", [0.25, -3600.0])
@@ -344,7 +344,7 @@ class Played:
 
     def __init__(self, messages: list, chosen: dict[str, str] | None = None) -> None:
         self.chosen = {"rgb": "/rgb", "depth": "/depth"} if chosen is None else chosen
-        self.fault, self._messages = "", messages
+        self.fault, self.described, self._messages = "", "The network has nothing", messages
 
     def __enter__(self) -> "Played":
         return self
@@ -355,9 +355,6 @@ class Played:
     def take(self, wait_s: float) -> list:
         some, self._messages = self._messages[:6], self._messages[6:]
         return some
-
-    def described(self) -> str:
-        return "The network has nothing"
 
 
 def messages(count: int, sound: bool = False) -> list:
@@ -380,7 +377,7 @@ def test_a_robot_is_mapped_and_what_never_arrived_is_told(tmp_path: Path) -> Non
     with live:
         every = messages(18)
         del every[3 + 3 * 10 : 3 + 3 * 13]  # three frames, with their transforms
-        follow_ros2(live, RosTopics(), 1.0, told.append, join=lambda _: Played(every))
+        follow_ros2(live, RosTopics(), Played(every), 1.0, told.append)
     status = live.status()
     assert status.frames_in == status.fused == 15
     assert not status.dropped
@@ -395,7 +392,7 @@ def test_a_live_map_hears_when_its_coding_is_known_after_its_sound(tmp_path: Pat
     with live, pytest.MonkeyPatch.context() as patch:
         heard: list[float] = []
         patch.setattr(live, "add_audio", lambda chunk, stamp_s: heard.append(stamp_s))
-        follow_ros2(live, RosTopics(), 1.0, told.append, join=lambda _: Played(messages(12, sound=True)))
+        follow_ros2(live, RosTopics(), Played(messages(12, sound=True)), 1.0, told.append)
     np.testing.assert_allclose(heard, START_S + 0.1 * np.arange(6, 12))
     assert any("used from now on" in said for said in told)
     assert "note: 6 messages of sound could not be used and are left out." in told
@@ -417,12 +414,12 @@ def test_a_live_map_takes_directions_of_a_topic_and_says_what_is_no_direction(tm
 
         patch.setattr(live, "add_directions", add)
         chosen = {"rgb": "/rgb", "depth": "/depth", "directions": "/doa"}
-        follow_ros2(live, RosTopics(directions="/doa"), 1.0, told.append, join=lambda _: Played(every, chosen))
+        follow_ros2(live, RosTopics(directions="/doa"), Played(every, chosen), 1.0, told.append)
     np.testing.assert_allclose(np.rad2deg([azimuth for _, azimuth in said]), [10.0, 20.0, -160.0], atol=1e-6)
     assert any("azimuth of row 1 is nan" in one for one in told)
     assert any("directions /doa" in one for one in told)
     with LiveMap(tmp_path / "none", ENCODERS, up_in_world=UP) as live:
-        follow_ros2(live, ros_topics({"directions": "/doa"}), 1.0, told.append, join=lambda _: Played(messages(6)))
+        follow_ros2(live, ros_topics({"directions": "/doa"}), Played(messages(6)), 1.0, told.append)
     assert "No direction came on /doa" in told[-1]
 
 
@@ -441,7 +438,7 @@ def test_ctrl_c_loses_no_direction_that_is_held_back(tmp_path: Path) -> None:
         said: list[float] = []
         patch.setattr(live, "add_directions", lambda stamp_s, azimuth_rad: said.append(azimuth_rad))
         with pytest.raises(KeyboardInterrupt):
-            follow_ros2(live, RosTopics(directions="/doa"), 9.0, told.append, join=lambda _: Stopped(every, chosen))
+            follow_ros2(live, RosTopics(directions="/doa"), Stopped(every, chosen), 9.0, told.append)
     assert said == pytest.approx([0.1, 0.1, 0.1])
 
 
@@ -450,7 +447,7 @@ def test_samples_a_second_that_cannot_be_are_refused_before_the_drive(tmp_path: 
         pytest.raises(RecordingError, match="audio_pcm takes samples a second"),
         LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP) as live,
     ):
-        follow_ros2(live, RosTopics(audio_pcm="loud"), 1.0, lambda _: None, join=lambda _: Played([]))
+        follow_ros2(live, RosTopics(audio_pcm="loud"), Played([]), 1.0, lambda _: None)
 
 
 @pytest.mark.parametrize(
@@ -466,7 +463,7 @@ def test_a_robot_that_gives_no_frame_is_said(tmp_path: Path, given: list, chosen
         pytest.raises(RecordingError, match="No frame came from ROS 2 within 1 s") as fault,
         LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP) as live,
     ):
-        follow_ros2(live, RosTopics(), 0.7, lambda _: None, join=lambda _: Played(given, chosen))
+        follow_ros2(live, RosTopics(), Played(given, chosen), 0.7, lambda _: None)
     assert said in str(fault.value)
     assert not (tmp_path / "map" / "map.json").exists()
 

@@ -40,4 +40,4 @@ class Ros2Source:
     def play(self, live: "LiveMap", give_up_s: float, over: Callable[[], bool]) -> None:
         from avlmaps_ros.live.source import follow_ros2
 
-        follow_ros2(live, self._topics, give_up_s, over=over, join=lambda _: self._inbox)
+        follow_ros2(live, self._topics, self._inbox, give_up_s, over=over)

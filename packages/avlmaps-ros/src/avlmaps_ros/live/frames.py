@@ -4,13 +4,12 @@ Messages are those of rclpy or have the same fields. What cannot become a frame 
 """
 
 from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from avlmaps.core.arrays import Float32, Float64, UInt8
+from avlmaps.core.arrays import Float64
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.live.growing_folder import Once
@@ -24,8 +23,7 @@ from avlmaps.recordings.formats.ros_messages import (
     stamp_of,
 )
 from avlmaps.recordings.formats.ros_transforms import TransformTree, body_of
-
-Kind = Literal["rgb", "depth", "rgb_info", "depth_info", "tf", "tf_static", "pose"]
+from avlmaps.recordings.types import Frame
 
 PARTNER_WITHIN_S = 1.0  # a depth picture waits this long for the colour picture of its moment
 POSE_WITHIN_S = 0.5  # a pair of pictures waits this long for the pose of its moment, while no older pose comes
@@ -37,26 +35,13 @@ KEPT_S = 30.0  # transforms are kept this long: pictures may come late, since th
 PAUSE_S, LEAST_GAPS = 3.0, 10  # a longer time without a picture is a pause; from fewer gaps no period is known
 
 
-@dataclass(frozen=True, slots=True)
-class RosFrame:
-    """A frame as ``LiveMap.add_frame`` takes it."""
-
-    rgb: UInt8[np.ndarray, "h w 3"]
-    depth_m: Float32[np.ndarray, "hd wd"]
-    rig: Rig
-    world_from_camera: Float64[np.ndarray, "4 4"]
-    stamp_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Picture:
+class _Picture(NamedTuple):
     stamp_s: float
     message: Any
     came_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class _Pair:
+class _Pair(NamedTuple):
     colour: _Picture
     depth: _Picture
     came_s: float
@@ -71,11 +56,10 @@ class RosFrames:
         unread: pairs that cannot be read.
     """
 
-    def __init__(self, rgb_topic: str, depth_topic: str, pose_topic: str, tell: Callable[[str], None]) -> None:
-        """Take the topics' names, for sentences; that of poses is empty where only transforms move the robot."""
+    def __init__(self, topics: Mapping[str, str], tell: Callable[[str], None]) -> None:
+        """Take the topics' names as far as they are known, for sentences: ``rgb``, ``depth`` and ``pose``."""
         self.unpaired = self.unplaced = self.unread = 0
-        self._topics = {"rgb": rgb_topic, "depth": depth_topic, "pose": pose_topic}
-        self._once = Once(tell)
+        self._topics, self._once = topics, Once(tell)
         self._tree, self._moved, self._world = TransformTree(), 0, ""
         self._infos: dict[str, Any] = {}
         self._rig: Rig | None = None
@@ -98,7 +82,7 @@ class RosFrames:
         lost = int((np.rint(gaps_s / np.quantile(gaps_s, 0.05)) - 1).clip(0).sum())
         return lost, len(self._gaps_s) + 1 + lost
 
-    def take(self, kind: Kind, message: Any, now_s: float) -> None:
+    def take(self, kind: str, message: Any, now_s: float) -> None:
         """Take a message; ``now_s`` is when it came, by a clock that never goes back."""
         match kind:
             case "rgb" | "depth":
@@ -113,15 +97,14 @@ class RosFrames:
                 self._moved_s = now_s
                 self._take_pose(message)
 
-    def ready(self, now_s: float) -> list[RosFrame]:
+    def ready(self, now_s: float) -> list[Frame]:
         """Return the frames that are whole now, in the order of time, by the clock of ``take``."""
         self._pair(now_s)
-        found: list[RosFrame] = []
+        found: list[Frame] = []
         while self._pairs:
             pair = self._pairs[0]
-            rig, pose = self._rig_of(pair, now_s), None
-            if rig is not None:
-                pose = self._pose_of(pair, now_s)
+            rig = self._rig_of(pair, now_s)
+            pose = None if rig is None else self._pose_of(pair, now_s)
             if pose is None and self._may_be_placed(pair, now_s):
                 break
             self._pairs.popleft()
@@ -182,7 +165,7 @@ class RosFrames:
             f"pose; check that both have one clock, and that poses come within {POSE_WITHIN_S:g} s"
         )
 
-    def _take_picture(self, kind: Literal["rgb", "depth"], message: Any, now_s: float) -> None:
+    def _take_picture(self, kind: str, message: Any, now_s: float) -> None:
         stamp_s = stamp_of(message)
         if kind == "depth" and kind in self._last_s:
             self._gaps_s.append(stamp_s - self._last_s[kind])
@@ -200,7 +183,7 @@ class RosFrames:
             self._camera_frame = message.header.frame_id
 
     def _take_pose(self, message: Any) -> None:
-        named, topic = getattr(message, "child_frame_id", ""), self._topics["pose"]
+        named, topic = getattr(message, "child_frame_id", ""), self._topics.get("pose", "")
         if not named:
             named, assumed = body_of(message, topic, self._camera_frame, self._tree.mounts())
             if assumed:
@@ -274,7 +257,7 @@ class RosFrames:
         pose, known = self._tree.root_from(frame, np.array([stamp_s]), self._world)
         return pose[0] if known[0] else None
 
-    def _read(self, pair: _Pair, rig: Rig, pose: Float64[np.ndarray, "4 4"]) -> RosFrame | None:
+    def _read(self, pair: _Pair, rig: Rig, pose: Float64[np.ndarray, "4 4"]) -> Frame | None:
         rgb_topic, depth_topic = self._topics["rgb"], self._topics["depth"]
         try:
             rgb = colour_of(pair.colour.message, rgb_topic, rig.rgb)
@@ -289,4 +272,4 @@ class RosFrames:
             self.unread += 1
             self._once(str(fault))
             return None
-        return RosFrame(rgb, depth_m, rig, pose, pair.depth.stamp_s)
+        return Frame(len(self._gaps_s), "", pair.depth.stamp_s, rgb, depth_m, pose, rig)

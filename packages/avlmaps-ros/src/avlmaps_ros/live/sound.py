@@ -118,11 +118,11 @@ class RosSound:
 
     def take(self, message: Any, ahead_s: float | None, now_s: float) -> tuple[Sound | ChannelSound, float] | None:
         """Return a message's sound, and when it begins; None where it cannot be used. See `RosDirections.take`."""
-        pcm, samples = self._samples(message, now_s)
-        is_stamped = getattr(message, "header", None) is not None
-        if pcm is None or not (is_stamped or ahead_s is not None):
+        found, is_stamped = self._samples(message, now_s), getattr(message, "header", None) is not None
+        if found is None or not (is_stamped or ahead_s is not None):
             self.unheard += 1
             return None
+        pcm, samples = found
         if not len(samples):
             return None
         length_s = len(samples) / pcm.rate_hz
@@ -146,23 +146,21 @@ class RosSound:
             )
         return Sound(samples.mean(axis=1).astype(np.float32), pcm.rate_hz), begin_s
 
-    def _samples(self, message: Any, now_s: float) -> tuple[Pcm | None, np.ndarray]:
-        """Return the samples of a message, (n, channels); no coding where nothing says how to read them."""
+    def _samples(self, message: Any, now_s: float) -> tuple[Pcm, np.ndarray] | None:
+        """Return the samples of a message, (n, channels); None where nothing says how to read them."""
         if hasattr(getattr(message, "audio", None), "audio_data"):
             try:
                 return next(iter(sampled_pieces([message], self._topic)))
             except RecordingError as fault:
                 self._once(str(fault))
-                return None, np.zeros((0, 1))
-        return self._plain(getattr(message, "audio", message), now_s)
-
-    def _plain(self, message: Any, now_s: float) -> tuple[Pcm | None, np.ndarray]:
+                return None
         if self._pcm is None:
             self._first_s = min(self._first_s, now_s)
             if now_s - self._first_s > INFO_WITHIN_S:
                 self._once(self._why)
-            return None, np.zeros((0, 1))
-        content = self._rest + np.asarray(message.data, np.uint8).tobytes()  # a message may end within a sample
+            return None
+        content = np.asarray(getattr(message, "audio", message).data, np.uint8).tobytes()
+        content = self._rest + content  # a message may end within a sample
         size = 2 * self._pcm.channels
         whole = len(content) // size * size
         self._rest = content[whole:]
