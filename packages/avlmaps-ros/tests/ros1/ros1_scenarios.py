@@ -126,13 +126,15 @@ def slow_bridge(folder: Path) -> Outcome:
         }
 
 
-def server_dies(folder: Path) -> Outcome:
+def server_dies(folder: Path, restarts: bool = False) -> Outcome:
     """move_base dies; the body stops by itself, and its transforms go on."""
     with Field(folder) as field:
         client = field.client("drive")
         field.until_moving()
         sleep(1.0)
         field.kill("move_base")
+        if restarts:
+            field.start("move_base")
         killed = now()
         arrival = client.said("arrival", 30.0)
         return {"noticed after s": arrival and round(arrival["t"] - killed, 1), "note": arrival and arrival["note"]}
@@ -140,15 +142,7 @@ def server_dies(folder: Path) -> Outcome:
 
 def server_restarts(folder: Path) -> Outcome:
     """move_base dies and another takes its place, which knows nothing of the goal."""
-    with Field(folder) as field:
-        client = field.client("drive")
-        field.until_moving()
-        sleep(1.0)
-        field.kill("move_base")
-        field.start("move_base")
-        killed = now()
-        arrival = client.said("arrival", 30.0)
-        return {"noticed after s": arrival and round(arrival["t"] - killed, 1), "note": arrival and arrival["note"]}
+    return server_dies(folder, restarts=True)
 
 
 def operator_takes_over(folder: Path) -> Outcome:

@@ -39,7 +39,9 @@ class Robot:
 
     def __enter__(self) -> "Robot":
         ready = [self._begin(role) for role in ("body", "nav2")]
-        assert self.soon(lambda: all(holds() for holds in ready)), "the robot did not start"
+        if not self.soon(lambda: all(holds() for holds in ready)):
+            self.__exit__()  # or no other test could join
+            raise AssertionError("the robot did not start")
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -92,7 +94,7 @@ class Robot:
         moved = [row["t"] for row in self.rows("body") if abs(row["v"]) > 0.01 or abs(row["w"]) > 0.02]
         return moved[-1] if moved else 0.0
 
-    def soon(self, holds: Callable[[], bool], within_s: float = 20.0) -> bool:
+    def soon(self, holds: Callable[[], bool], within_s: float = 60.0) -> bool:
         until_s = time.monotonic() + within_s
         while not holds() and time.monotonic() < until_s:
             time.sleep(0.02)

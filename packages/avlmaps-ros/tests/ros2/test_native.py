@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from running import HERE, Operator, Robot, in_thread
+from running import HERE, Robot, in_thread
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose, wrap_angle
@@ -111,30 +111,6 @@ def test_a_server_that_refuses_to_cancel_is_told_of(robot):
         assert driver.stop().reached
 
 
-def test_a_robot_that_loses_its_transforms_is_stopped(robot):
-    with opened() as driver:
-        thread, results = in_thread(lambda: driver.go_to(FAR))
-        assert robot.soon(lambda: robot.moves)
-        lost_s = time.time()
-        robot.mode("no tf")
-        thread.join(30.0)
-        assert "is not known any more" in results[0].note
-        assert robot.soon(lambda: not robot.moves)
-        assert robot.last_moved_s() - lost_s < 15.0
-
-
-def test_a_server_that_dies_in_mid_drive_is_noticed_and_its_goal_is_not_called_finished(robot):
-    with opened() as driver:
-        thread, results = in_thread(lambda: driver.go_to(FAR))
-        assert robot.soon(lambda: robot.moves)
-        robot.end("nav2")
-        died_s = time.time()
-        thread.join(30.0)
-        assert time.time() - died_s < 30.0
-        assert not results[0].reached
-        assert "may still be driving" in results[0].note or "gone" in results[0].note
-
-
 def test_a_server_that_starts_again_does_not_know_the_goal_and_that_ends_it(robot):
     with opened(server_max_age_s=10.0) as driver:
         thread, results = in_thread(lambda: driver.go_to(FAR))
@@ -144,30 +120,6 @@ def test_a_server_that_starts_again_does_not_know_the_goal_and_that_ends_it(robo
         thread.join(40.0)
         assert "restarted" in results[0].note or "has said nothing" in results[0].note
         assert robot.soon(lambda: not robot.moves)
-
-
-def test_an_operator_who_takes_over_keeps_the_robot(robot):
-    operator = Operator(robot)
-    with opened() as driver:
-        thread, results = in_thread(lambda: driver.go_to(FAR))
-        assert robot.soon(lambda: robot.moves)
-        theirs = operator.send()
-        thread.join(20.0)
-        assert not results[0].reached
-        refused = driver.go_to(FAR)
-        assert "another client" in refused.note
-    time.sleep(1.0)
-    assert robot.moves
-    assert not robot.rows("cancelled")
-    assert [row["id"] for row in robot.rows("goal")][-1] == theirs
-
-
-def test_a_stop_ends_an_operators_goal_as_well(robot):
-    Operator(robot).send()
-    with opened() as driver:
-        assert robot.soon(lambda: robot.moves)
-        assert driver.stop().reached
-        assert not robot.moves
 
 
 def test_a_goal_that_only_the_robots_own_map_has_blocked_is_moved(robot):
