@@ -260,7 +260,7 @@ def test_another_system_is_judged_by_saved_tasks_as_ours_is(tmp_path: Path):
     assert yours["mean m"] == pytest.approx((0.2 + np.hypot(10, 1)) / 2, abs=0.01)
     (table,) = score_others(read[:1], {}).values()  # a chair 1 m wide, not answered: no hit within 2 m
     assert table["rows"][1][columns().index("R@1 < 2 m %")] == 0.0
-    wrongs: list[dict[str, Any]] = [{"t1": (0, 0)}, {"t0": (float("nan"), 0)}, {"t0": ()}, {"t0": "1, 2, 3"}]
+    wrongs: list[dict[str, Any]] = [{"t1": (0, 0, 0)}, {"t0": (float("nan"), 0, 0)}, {"t0": ()}, {"t0": "1, 2, 3"}]
     for wrong in wrongs:
         with pytest.raises(TaskError):
             score_others(read, wrong)

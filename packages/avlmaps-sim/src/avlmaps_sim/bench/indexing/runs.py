@@ -189,9 +189,10 @@ def scored(answers: Sequence[Answered], seed: int = 0, *, by_centre: bool = Fals
     off_m = np.array([answer.centre_m if by_centre else answer.off_m for answer in answers], np.float64)
     is_answered = np.array([answer.position is not None for answer in answers], bool)
     hits = tuple(int((is_answered & (off_m < limit)).sum()) for limit in LIMITS_M)
-    answered = int(is_answered.sum())
     mean = float(off_m.mean()) if len(off_m) else 0.0
-    return Score(len(answers), answered, hits, mean, bootstrapped_mean(off_m, np.random.default_rng(seed)))
+    return Score(
+        len(answers), int(is_answered.sum()), hits, mean, bootstrapped_mean(off_m, np.random.default_rng(seed))
+    )
 
 
 def chance(tasks: Sequence[Task]) -> float:

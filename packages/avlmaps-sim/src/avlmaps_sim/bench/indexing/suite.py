@@ -84,12 +84,11 @@ def open_tasks(path: Path) -> tuple[Task, ...]:
     return load_versioned(path, TaskSet, SCHEMA_VERSION).tasks
 
 
-def score_others(tasks: Sequence[Task], places: Mapping[str, Sequence[float]]) -> dict[str, dict[str, Any]]:
+def score_others(tasks: Sequence[Task], places: Mapping[str, Triple]) -> dict[str, dict[str, Any]]:
     """Judge another system's answers by the rules of ours.
 
     ``places`` are first goals by the task's name, metres, in the world of the recording; the height does not count.
-    A task that is left out is no hit, and counts in the mean as far as its scene's targets lie apart. Returns a
-    table of each kind of task.
+    A task left out is no hit, in the mean as far off as its scene's targets lie apart. Returns a table of each kind.
 
     Raises:
         TaskError: a place belongs to no task, or is none.
@@ -97,7 +96,7 @@ def score_others(tasks: Sequence[Task], places: Mapping[str, Sequence[float]]) -
     if strange := sorted(places.keys() - {task.name for task in tasks}):
         raise TaskError(f"{len(strange)} of {len(places)} answers belong to no task, such as {strange[0]!r}.")
     for name, at in places.items():
-        if len(at) < 2 or not all(isinstance(v, Real) and np.isfinite(v) for v in at):
+        if len(at) != 3 or not all(isinstance(v, Real) and np.isfinite(v) for v in at):
             raise TaskError(f"The answer to {name} is {at}; give x, y and z in metres.")
     ends: dict[str, list[Sequence[float]]] = {task.scene: [] for task in tasks}
     for task in tasks:
@@ -106,15 +105,11 @@ def score_others(tasks: Sequence[Task], places: Mapping[str, Sequence[float]]) -
     made: dict[str, dict[str, Any]] = {}
     for kind in dict.fromkeys(task.kind for task in tasks):
         own = [task for task in tasks if task.kind is kind]
-        answers = [judged(task, "yours", _at(places.get(task.name)), largest_m[task.scene]) for task in own]
+        answers = [judged(task, "yours", places.get(task.name), largest_m[task.scene]) for task in own]
         by_centre = _row("yours, by the centre", scored(answers, by_centre=True))
         rows = [_chance(own), _row("yours", scored(answers)), by_centre]
         made[TITLE[kind]] = {"columns": columns(), "rows": rows}
     return made
-
-
-def _at(place: Sequence[float] | None) -> Triple | None:
-    return None if place is None else (place[0], place[1], 0.0)
 
 
 def _chance(tasks: Sequence[Task]) -> list[Any]:
