@@ -18,6 +18,7 @@ from query_fakes import (
     sounds_of,
     voxels_of,
 )
+from walled_rooms import storeys_at, two_rooms
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Role
@@ -26,6 +27,7 @@ from avlmaps.perception.embedded.pixels import EmbeddedPixels, features_of
 from avlmaps.query.answer import Answer, PartAnswer
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import SoundEvent, Thing
+from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.goals import Goal
 from avlmaps.query.lists import answer_list
 from avlmaps.query.settings import QuerySettings
@@ -133,17 +135,46 @@ def test_a_sentence_is_answered_like_its_parts(furnished: AVLMap) -> None:
     assert answer.goals[0].position == pytest.approx(furnished.things(["chair"])[0].position, abs=0.3)
 
 
-def test_what_a_wall_hides_is_not_near_and_who_asks_for_sounds_is_told_sounds() -> None:
+def test_a_wall_hides_what_an_open_plan_shows_and_who_asks_for_sounds_is_told_sounds() -> None:
     def thing(name: str, x: float) -> Thing:
-        return Thing(name, 0.9, (x, 0.0, 0.5), (0.4, 0.4, 0.4), (0, 0, 0), np.zeros(0, np.int64), np.zeros((0, 3)))
+        return Thing(name, 0.9, (x, 1.5, 0.5), (0.4, 0.4, 0.4), (0, 0, 0), np.zeros(0, np.int64), np.zeros((0, 3)))
 
-    heard = [SoundEvent((f"dog {x}",), (0.9,), x, 9.0, (x, 0.0, 0.5), np.zeros((0, 3)), Path()) for x in (0.2, 2.0)]
-    there = [thing("sink", 1.1), thing("chair", 0.0), thing("door", 1.2)]
-    rooms, space = SimpleNamespace(rooms_of=lambda at: at[:, 0] > 1.0), SimpleNamespace(level=lambda at: at)
-    lists = {"where": rooms, "space": space, "things": lambda: there, "sounds": lambda: heard}
-    avlmap: Any = SimpleNamespace(**lists, settings=QuerySettings(), has=bool)
-    part = PartAnswer(Part(Modality.OBJECT, "sofa", Role.PRIMARY), 1.0, True)
-    sofa = Answer((Goal((0.6, 0.0, 0.5), 0.8, (0.4, 0.4, 0.4), {}, 0.8),), True, (part,))
-    for of, how, told in ((Listed.BESIDE, "", ["chair", "door"]), (Listed.HEARD, "near", ["dog 0.2"])):
+    def told(walled: bool, of: Listed, how: str = "") -> list[str]:
+        plan = FloorPlan.of(two_rooms(0.0, walled), storeys_at(0.0))
+        assert plan is not None
+        lists = {"space": plan.space, "things": lambda: there, "sounds": lambda: heard}
+        rooms = SimpleNamespace(rooms_of=lambda at: at[:, 0] > 2.95)  # the window's number is that of the other side
+        avlmap: Any = SimpleNamespace(
+            **lists, where=rooms, room_votes=SimpleNamespace(plan=plan), settings=QuerySettings(), has=bool
+        )
         answer = answer_list(avlmap, ListQuestion(of, "sofa", how=how), 9, lambda words: sofa)
-        assert sorted(goal.name for goal in answer.goals) == told
+        return [goal.name for goal in answer.goals]
+
+    heard = [SoundEvent((f"dog {x}",), (0.9,), x, 9.0, (x, 1.5, 0.5), np.zeros((0, 3)), Path()) for x in (2.2, 3.8)]
+    there = [thing("sink", 3.5), thing("chair", 1.9), thing("window", 3.0)]
+    part = PartAnswer(Part(Modality.OBJECT, "sofa", Role.PRIMARY), 1.0, True)
+    sofa = Answer((Goal((2.5, 1.5, 0.5), 0.8, (0.4, 0.4, 0.4), {}, 0.8),), True, (part,))
+    assert told(True, Listed.BESIDE) == ["window", "chair"] and told(True, Listed.HEARD, "near") == ["dog 2.2"]
+    assert told(False, Listed.BESIDE) == ["window", "chair", "sink"]
+    assert told(False, Listed.HEARD, "near") == ["dog 2.2", "dog 3.8"]
+
+
+@pytest.mark.parametrize(
+    ("sentence", "of"),
+    [
+        ("what is next to the sound system?", Listed.BESIDE), ("what is next to the sound bar?", Listed.BESIDE),
+        ("what sounds are near the sofa?", Listed.HEARD), ("what did you hear near the sound system?", Listed.HEARD),
+    ],
+)  # fmt: skip
+def test_a_thing_whose_name_holds_sound_is_a_thing(
+    sentence: str, of: Listed, furnished: AVLMap, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked_for: list[Listed] = []
+
+    def answered(avlmap: AVLMap, question: ListQuestion, *_: object) -> Answer:
+        asked_for.append(question.of)
+        return Answer((), False, ())
+
+    monkeypatch.setattr("avlmaps.query.lists.answer_list", answered)
+    furnished.ask(sentence)
+    assert asked_for == [of]

@@ -53,8 +53,23 @@ def test_legs_and_a_back_over_them_are_one_chair() -> None:
     assert things(*legs, seat) == 1
 
 
+def test_two_things_side_by_side_stay_two() -> None:
+    assert things(((0.0, 0.0, 0.0), (0.4, 0.4, 0.5)), ((0.6, 0.0, 0.0), (1.0, 0.4, 0.5))) == 2
+
+
 def test_a_cabinet_hung_high_over_another_stays_another() -> None:
     assert things(((0.0, 0.0, 0.0), (1.0, 0.4, 0.9)), ((0.0, 0.0, 1.4), (1.0, 0.4, 2.0))) == 2
+
+
+def test_a_chair_before_a_row_of_cabinets_along_two_walls_is_none_of_them() -> None:
+    long, side, chair = (
+        ((0.0, 0.0, 0.0), (3.0, 0.5, 0.8)),
+        ((0.0, 0.5, 0.0), (0.5, 3.0, 0.8)),
+        ((1.5, 1.5, 0), (2, 2, 0.8)),
+    )
+    points, instance = pieces(long, side, chair)
+    instance = np.where(instance == 2, 1, 0)  # the two rows are one instance, whose box holds the chair
+    assert len(set(joined_columns(points, instance, CELL_M, JOIN_M))) == 2
 
 
 def test_nothing_has_no_pieces() -> None:

@@ -47,6 +47,15 @@ def test_what_is_long_and_alike_stays_whole() -> None:
     assert (cut(index, score, longest=0.6) == 0).all()
 
 
+def test_others_keep_to_themselves() -> None:
+    index, score = row_of((10, 0.8), (4, 0.3), (10, 0.7), (10, 0.9))
+    instance = np.where(index[:, 0] >= 24, 1, 0)
+    found = cut(index, score, 0.6, instance)
+    assert len(set(found[instance == 1])) == 1
+    assert not set(found[instance == 1]) & set(found[instance == 0])
+    assert set(found) == {0, 1, 2}
+
+
 @given(seed=st.integers(0, 1000), count=st.integers(1, 300), longest=st.floats(0.1, 2.0))
 def test_numbers_have_no_gaps_and_only_what_is_too_long_changes(seed: int, count: int, longest: float) -> None:
     rng = np.random.default_rng(seed)

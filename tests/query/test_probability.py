@@ -10,7 +10,7 @@ from training.found.fit import fitted, held_out
 from training.found.rows import balanced, read_rows
 
 from avlmaps.core.question import Modality
-from avlmaps.query.goals import FACTORS, GoalEvidence, probability_of, weights
+from avlmaps.query.goals import FACTORS, GoalEvidence, logit, probability_of, weights
 from avlmaps_sim.bench.found.suite import brier
 
 logits, logs = st.floats(-4, 4), st.floats(-4, 0)
@@ -34,6 +34,11 @@ def test_more_of_any_evidence_makes_a_goal_no_less_likely(evidence: GoalEvidence
 def test_a_part_alone_has_its_own_confidence(evidence: GoalEvidence, other: GoalEvidence) -> None:
     alone = replace(evidence, context=(), near=other.near, marks=other.marks)
     assert probability_of(alone) == pytest.approx(evidence.alone, abs=1e-3)
+
+
+@given(st.floats(0.0, 1.0))
+def test_log_odds_stay_finite(probability: float) -> None:
+    assert abs(logit(probability)) <= 4.0
 
 
 def test_the_weights_that_ship_are_those_of_the_rows() -> None:

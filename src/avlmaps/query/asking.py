@@ -297,7 +297,8 @@ def _read_list(asking: _Asking) -> "ListQuestion | None":
     with suppress(QueryError):  # `_read` says why a sentence is not understood
         listed = list_question(_reading(asked, asked.sentence, own).inquiry)
         how = listed and {Listed.BESIDE: "near", Listed.CONTENTS: "in"}.get(listed.of)
-        if listed and how and _HEARD.search(asked.sentence) and not listed.name.startswith("sound of "):
+        unnamed = re.sub(re.escape(listed.name), "", asked.sentence, flags=re.I) if listed else ""  # a "sound system"
+        if listed and how and _HEARD.search(unnamed) and not listed.name.startswith("sound of "):
             return replace(listed, of=Listed.HEARD, how=how)  # who asks for sounds is told of no things
         return listed
     return None
@@ -433,7 +434,7 @@ def _related(sentence: str, question: Question) -> Question:
         ends = [part for part in ends if part.query.casefold() in sentence[said.end() :].casefold()]
     named = dict(zip(map(id, ends), ENDS, strict=True)) if len(ends) == len(ENDS) else {}
     rooms = "near" if question.lead.modality is Modality.AREA else ""
-    near = {id(part): "near" for part in context if re.search(rf"{_NEAR} {re.escape(part.query)}\b", sentence.lower())}
+    near = {id(part): "near" for part in context if re.search(rf"{_NEAR} {re.escape(part.query)}\b", sentence, re.I)}
     return Question(tuple(replace(part, relation=(near | named).get(id(part), rooms)) for part in question.parts))
 
 

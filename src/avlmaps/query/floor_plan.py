@@ -5,7 +5,7 @@ Gaussian. So nothing has to decide where the rooms of an open plan end. A fine c
 where a camera looked over it at a wall, so that rooms are whole though half of their floor was never seen.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import cast
@@ -79,11 +79,18 @@ class FloorPlan:
 
     def cells_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return the open cell nearest to each point on its storey: a picture hangs in the wall itself."""
+        return self._nearest_open[self._cells(points_world)]
+
+    def _cells(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         level = self.space.level(points_world)
         storey = self.storeys.of(level[:, 2])
-        cell = np.floor((level[:, :2] - self.origin_m) / CELL_M)
-        i, j = (np.clip(cell, 0, np.array(self.wall.shape[1:]) - 1)).astype(np.int64).T
-        return self._nearest_open[np.ravel_multi_index((storey, i, j), self.wall.shape)]
+        i, j = np.floor((level[:, :2] - self.origin_m) / CELL_M).astype(np.int64).T
+        return np.ravel_multi_index((storey, i, j), self.wall.shape, mode="clip")
+
+    def parts(self, one: Sequence[float], other: Sequence[float]) -> bool:
+        """Return whether a wall stands between two places; what is in a wall, a window, is on both its sides."""
+        clear = np.flatnonzero(~self.wall.reshape(-1)[self._cells(np.linspace(one, other, 100))])  # steps of a line
+        return bool((np.diff(clear) > 1).any())
 
     def storeys_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return the storey of each point, from 0, the lowest."""

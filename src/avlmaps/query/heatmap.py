@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_CONDITIONS = 5  # parts of a query of which some are left out in turn
+_CONDITIONS = 5  # the first parts of a query, left out in turn: what more parts do to its likelihood is not bounded
 
 
 class Heat(ABC):

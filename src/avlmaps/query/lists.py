@@ -26,7 +26,6 @@ from avlmaps.query.contents import NOWHERE, Whereabouts
 from avlmaps.query.edits import means
 from avlmaps.query.goals import MOST_GOALS, Goal
 from avlmaps.query.places import lies_between
-from avlmaps.query.words import is_a
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Stay
@@ -187,11 +186,8 @@ def _heard(lists: _Lists) -> Answer:
         is_so = one < other if question.how == "before" else one > other
         text = f"{'Yes' if is_so else 'No'}: {question.name} at {one:.1f} s, {question.other} at {other:.1f} s."
         return lists.answer(goals, text)
-    room_of = lists.avlmap.where.name_of
-    rooms = [room_of(sound.position) for sound in found]
-    times = [
-        f"at {sound.onset_s:.1f} s{f' in the {room}' if room else ''}" for sound, room in zip(found, rooms, strict=True)
-    ]
+    rooms = [f" in the {room}" if (room := lists.avlmap.where.name_of(sound.position)) else "" for sound in found]
+    times = [f"at {sound.onset_s:.1f} s{room}" for sound, room in zip(found, rooms, strict=True)]
     often = "once" if len(found) == 1 else f"{len(found)} times"
     text = f"{goals[0].name.capitalize()} was heard {often}: {', '.join(times)}."
     return lists.answer(goals, text, count=len(found))
@@ -337,11 +333,10 @@ def _contents(lists: _Lists) -> Answer:
     subject = lists.ask(name)
     if not subject.found:
         return replace(subject, goals=())
-    things = lists.things()
-    inside = lists.avlmap.where.inside(name, [thing.position for thing in things])
+    where, things = lists.avlmap.where, lists.things()
+    inside = where.inside(name, [thing.position for thing in things])
     goals = [_thing_goal(thing) for thing, is_in in zip(things, inside, strict=True) if is_in]
-    is_there = lists.avlmap.where.has(name)
-    text = f"In {the_room(name)}: {counted([goal.name for goal in goals])}." if is_there else _no_room(name)
+    text = f"In {the_room(name)}: {counted([goal.name for goal in goals])}." if where.has(name) else _no_room(name)
     return lists.answer(goals, text, subject)
 
 
@@ -360,14 +355,13 @@ def _beside(lists: _Lists) -> Answer:
 
 
 def _near(lists: _Lists, mark: Goal, goals: Sequence[Goal], most_m: float) -> list[tuple[float, int]]:
-    # The gap to each goal near a thing and its number, the nearest first. Walls part things; a door is in two rooms.
-    own, boxes = _Box(lists.avlmap, mark), [_Box(lists.avlmap, goal) for goal in goals]
+    # The gap to each goal near a thing and its number, the nearest first. A wall between two
+    # rooms parts things; an open plan, however many rooms it is, parts none.
+    votes, (own, *boxes) = lists.avlmap.room_votes, [_Box(lists.avlmap, one) for one in (mark, *goals)]
     room, *rooms = lists.avlmap.where.rooms_of(np.array([one.position for one in (mark, *goals)])).tolist()
-    of_two = [is_a(goal.name, "door") or is_a(lists.question.name, "door") for goal in goals]
-    each = zip(boxes, rooms, of_two, strict=True)
-    gaps = [own.gap_m(box) if at == room or both else math.inf for box, at, both in each]
-    near = (number for number, gap in enumerate(gaps) if gap <= most_m and not own.overlaps(boxes[number]))
-    return sorted((gaps[number], number) for number in near)
+    near = [(gap, n) for n, box in enumerate(boxes) if (gap := own.gap_m(box)) <= most_m and not own.overlaps(box)]
+    apart = {n for _, n in near if votes and rooms[n] != room and votes.plan.parts(mark.position, goals[n].position)}
+    return sorted(one for one in near if one[1] not in apart)
 
 
 def _between(lists: _Lists, one: Answer) -> Answer:

@@ -71,8 +71,7 @@ def region_features(avlmap: AVLMap, recording: Recording) -> Float32[np.ndarray,
         cut = [cut_out(frame, label == number) for number in range(1, int(label.max()) + 1)]
         return np.concatenate([whole[None], mixed(whole, _encoded(encoder, cut, len(whole)))]), label
 
-    # Each keyframe costs a dozen encodings, and its neighbours show the same surfaces.
-    return _spread(avlmap, recording, rows, every=4)
+    return _spread(avlmap, recording, rows)
 
 
 def _encoded(encoder: ViewEncoder, cut: list[Frame], dim: int) -> Float32[np.ndarray, "r d"]:
@@ -130,13 +129,13 @@ def mixed(whole: Float32[np.ndarray, " d"], regions: Float32[np.ndarray, "r d"])
     return (both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-12)).astype(np.float32)
 
 
-def _spread(avlmap: AVLMap, recording: Recording, rows_of: _Rows, every: int = 1) -> Float32[np.ndarray, "n d"]:
+def _spread(avlmap: AVLMap, recording: Recording, rows_of: _Rows) -> Float32[np.ndarray, "n d"]:
     """Add up rows over the voxels that their pixels lie in: each row counts once a voxel and keyframe."""
     stored = avlmap.data
     key = packed(np.asarray(stored.voxels.index, np.int64))
     total = np.zeros((len(key), stored.keyframes.view.shape[1]), np.float32)
     frame_of = np.searchsorted(recording.stamps_s, np.asarray(stored.keyframes.stamp_s) - 1e-6)
-    for keyframe in progress(range(0, len(frame_of), every), "views by voxel", unit="keyframe"):
+    for keyframe in progress(range(len(frame_of)), "views by voxel", unit="keyframe"):
         frame = recording.frame(int(min(frame_of[keyframe], len(recording) - 1)))
         rows, label = rows_of(frame, keyframe)
         depth_m = frame.depth_m[::_STRIDE_PX, ::_STRIDE_PX].astype(np.float64)
