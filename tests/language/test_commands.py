@@ -177,6 +177,27 @@ def test_what_a_map_cannot_say_is_no_condition(command: str) -> None:
     assert read_command(command).stops is not None
 
 
+@pytest.mark.parametrize(
+    "body",
+    ["don't go there", "don't go to the sofa", "do not go to it", "dont go there", "don't circle it", "don't move",
+     "do not stop 1 m from it", "never go there", "avoid it", "ignore it", "leave it alone", "you must not go there",
+     "you shouldn't approach it", "you needn't go there", "it is not to be visited", "no going there",
+     "nobody should go there", "stop", "spare it"],
+)  # fmt: skip
+def test_what_a_condition_forbids_is_never_driven(body: str) -> None:
+    for told in ("if there is a sofa, {}, else go to the kitchen", "if we have a sofa {}", "{} if there is a sofa",
+                 "if there is no sofa, {}, else come back", "if there is a bed go to it, if not, {}"):  # fmt: skip
+        assert read_command(told.format(body)).stops is not None
+
+
+@pytest.mark.parametrize(
+    "said", ["seventh nearest chair", "7th nearest chair", "ninth window from the north", "last chair from the left",
+             "second to last chair from the left", "umpteenth farthest chair", "twenty-second nearest chair"],
+)  # fmt: skip
+def test_an_order_that_cannot_be_counted_is_asked_back(said: str) -> None:
+    assert isinstance(read_command(f"go to the {said}").stops, Clarify)
+
+
 def test_a_number_chooses_one_of_several_meanings() -> None:
     command = "circle the desk, then chair, then back to the start"
     with pytest.raises(UnclearError, match="Which one, or none of these") as caught:
@@ -234,6 +255,11 @@ def test_an_open_vocabulary_takes_any_noun() -> None:
 
 def test_what_has_no_effect_is_reported() -> None:
     assert "slowly" in read_command("go slowly to the kitchen").notes[0]
+
+
+def test_a_circle_keeps_its_way_and_a_name_near_itself_is_reported() -> None:
+    assert read_command("circle the table, turning clockwise").intents == read_command("circle the table cw").intents
+    assert "'near table' has no effect" in read_command("go to the table next to the table").notes[0]
 
 
 @pytest.mark.parametrize("storey", ["first floor", "ground floor", "second floor", "top floor"])

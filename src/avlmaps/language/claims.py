@@ -195,8 +195,11 @@ def at_each(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tuple[act
 
 def in_direction(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tuple[act.Intent, ...] | act.Clarify:
     """Return intents whose circles run in the direction that is said, or the question which one is meant."""
-    ways = [_WAYS[token.text] for at, token in enumerate(tokens) if token.text in _WAYS and not _turns(tokens, at)]
-    circles = sum(isinstance(step, act.Circle) for step in act.steps_of(intents))
+    steps = act.steps_of(intents)
+    turns = any(isinstance(step, act.Turn) for step in steps)
+    said = ((at, token.text) for at, token in enumerate(tokens))
+    ways = [_WAYS[word] for at, word in said if word in _WAYS and not (turns and _turns(tokens, at))]
+    circles = sum(isinstance(step, act.Circle) for step in steps)
     if not circles or not ways:
         return tuple(intents)
     if len(ways) != circles:
@@ -216,7 +219,8 @@ def _turns(tokens: Sequence[Token], at: int) -> bool:
     start = max((cut for cut in cuts if cut < at), default=-1)
     clause = list(tokens[start + 1 : min((cut for cut in cuts if cut > at), default=len(tokens))])
     turns = load_word_classes().words["TURN_HERE"]
-    return any(token.text in turns or lexer.angle_at(clause, number) for number, token in enumerate(clause))
+    orders = {token.text for token in clause} & turns - {"turning", "rotating"}  # "circle it, turning clockwise"
+    return bool(orders) or any(lexer.angle_at(clause, number) for number in range(len(clause)))
 
 
 def _sounds(name: str) -> bool:
@@ -235,7 +239,7 @@ def _facts_of_targets(targets: Sequence[act.Target]) -> Iterator[str]:
         if target.pick:
             yield str(target.pick)
         if target.number > 1:
-            yield "number"
+            yield from ("number", f"number {target.number}")
         if target.pick in _ENDS:
             yield "end"
         if target.near:

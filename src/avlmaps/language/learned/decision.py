@@ -72,20 +72,27 @@ class NameResolver:
 
     def resolve(self, target: Target) -> Target:
         """Return a target with the name that is meant; what is not known becomes a question."""
-        near = tuple(self.resolve(one) for one in target.near if (one.kind, one.name) != (target.kind, target.name))
+        near = tuple(map(self.resolve, target.near))
+        own = self._resolved(target)
+        others = tuple(one for one in near if (one.kind, one.name) != (own.kind, own.name))
+        if others != near:
+            self.notes.append(f"'near {own.name}' has no effect: it has the name of what is near it.")
+        return replace(own, near=others)
+
+    def _resolved(self, target: Target) -> Target:
         match target.kind:
             case TargetKind.IMAGE | TargetKind.CLIP if not target.name:
                 given = self.sentence.given
                 path = given.image if target.kind is TargetKind.IMAGE else given.clip
                 if path is None:
                     self._ask(missing_file(target.kind))
-                return replace(target, name=path or "", near=near, at=self._place(target))
+                return replace(target, name=path or "", at=self._place(target))
             case TargetKind.OBJECT | TargetKind.AREA:
-                return replace(self._thing(target), near=near)
+                return self._thing(target)
             case TargetKind.SOUND:
-                return replace(target, name=_sound(target.name), near=near, at=self._place(target))
+                return replace(target, name=_sound(target.name), at=self._place(target))
             case _:
-                return replace(target, near=near, at=self._place(target))
+                return replace(target, at=self._place(target))
 
     def _place(self, target: Target) -> HeardAt | None:
         """Return the place of a sound that is meant: the one that was chosen for all, else as the words say."""
