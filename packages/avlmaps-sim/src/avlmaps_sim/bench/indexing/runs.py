@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
-from time import perf_counter
 
 import msgspec
 import numpy as np
@@ -190,9 +189,8 @@ def scored(answers: Sequence[Answered], seed: int = 0, *, by_centre: bool = Fals
     is_answered = np.array([answer.position is not None for answer in answers], bool)
     hits = tuple(int((is_answered & (off_m < limit)).sum()) for limit in LIMITS_M)
     mean = float(off_m.mean()) if len(off_m) else 0.0
-    return Score(
-        len(answers), int(is_answered.sum()), hits, mean, bootstrapped_mean(off_m, np.random.default_rng(seed))
-    )
+    interval_m = bootstrapped_mean(off_m, np.random.default_rng(seed))
+    return Score(len(answers), int(is_answered.sum()), hits, mean, interval_m)
 
 
 def chance(tasks: Sequence[Task]) -> float:
@@ -253,7 +251,6 @@ class SceneOutcome:
     frames: int
     voxels: int
     sounds: tuple[int, int]
-    seconds: float
     clips: tuple[tuple[str, str], ...] = ()
 
 
@@ -351,7 +348,6 @@ def scene_tasks(job: SceneJob, open_spec: Callable[[str], Scene], most: int) -> 
 
 
 def _run_scene(todo: _Todo) -> SceneOutcome:
-    begin = perf_counter()
     place = Workplace(todo.job, todo.open_spec)
     info = place.avlmap.data.info
     fingerprint = sha256(msgspec.json.encode(todo.tasks)).hexdigest()
@@ -360,10 +356,9 @@ def _run_scene(todo: _Todo) -> SceneOutcome:
         write_bytes_atomically(path, msgspec.json.encode(_answers(place, todo.tasks)))
     answers = msgspec.json.decode(path.read_bytes(), type=tuple[Answered, ...])
     sounds = (info.counts.sounds, len(place.truth.events))
-    seconds = perf_counter() - begin
     clips = tuple((event.category, event.clip) for event in place.truth.events)
     counts = info.counts
-    return SceneOutcome(todo.job.spec, todo.tasks, answers, counts.frames, counts.voxels, sounds, seconds, clips)
+    return SceneOutcome(todo.job.spec, todo.tasks, answers, counts.frames, counts.voxels, sounds, clips)
 
 
 def _answers(place: Workplace, tasks: Sequence[Task]) -> list[Answered]:
