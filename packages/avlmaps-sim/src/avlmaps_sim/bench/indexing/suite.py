@@ -80,7 +80,7 @@ def _table(outcome: Outcome, kind: TaskKind) -> dict[str, Any]:
 
 
 def open_tasks(path: Path) -> tuple[Task, ...]:
-    """Read what ``--save-tasks`` wrote. ``TaskError``: the file holds no tasks."""
+    """Read what ``--save-tasks`` wrote; ``TaskError`` where the file holds none."""
     return load_versioned(path, TaskSet, SCHEMA_VERSION).tasks
 
 
@@ -89,9 +89,7 @@ def score_others(tasks: Sequence[Task], places: Mapping[str, Triple]) -> dict[st
 
     ``places`` are first goals by the task's name, metres, in the world of the recording; the height does not count.
     A task left out is no hit, in the mean as far off as its scene's targets lie apart. Returns a table of each kind.
-
-    Raises:
-        TaskError: a place belongs to no task, or is none.
+    ``TaskError``: a place belongs to no task, or is none.
     """
     if strange := sorted(places.keys() - {task.name for task in tasks}):
         raise TaskError(f"{len(strange)} of {len(places)} answers belong to no task, such as {strange[0]!r}.")
@@ -106,21 +104,19 @@ def score_others(tasks: Sequence[Task], places: Mapping[str, Triple]) -> dict[st
     for kind in dict.fromkeys(task.kind for task in tasks):
         own = [task for task in tasks if task.kind is kind]
         answers = [judged(task, "yours", places.get(task.name), largest_m[task.scene]) for task in own]
-        by_centre = _row("yours, by the centre", scored(answers, by_centre=True))
-        rows = [_chance(own), _row("yours", scored(answers)), by_centre]
-        made[TITLE[kind]] = {"columns": columns(), "rows": rows}
+        centre = _row("yours, by the centre", scored(answers, by_centre=True))
+        made[TITLE[kind]] = {"columns": columns(), "rows": [_chance(own), _row("yours", scored(answers)), centre]}
     return made
 
 
 def _chance(tasks: Sequence[Task]) -> list[Any]:
-    coin = ["chance: one of the candidates", len(tasks), _percent(chance(tasks))]
-    return [*coin, *[""] * (len(columns()) - len(coin))]
+    return ["chance: one of the candidates", len(tasks), _percent(chance(tasks)), *[""] * (len(columns()) - 3)]
 
 
 def _row(name: str, score: Score) -> list[Any]:
-    recalls: list[Any] = []
-    for limit in LIMITS_M:
-        recalls += [_percent(score.recall(limit)), in_percent(score.recall_interval(limit))]
+    recalls = [
+        cell for limit in LIMITS_M for cell in (_percent(score.recall(limit)), in_percent(score.recall_interval(limit)))
+    ]
     mean = [round(score.mean_m, 2), "{:.2f} to {:.2f}".format(*score.mean_interval_m)]
     return [name, score.count, *recalls, *mean, _percent(score.answered / score.count)]
 
@@ -146,7 +142,7 @@ def _figures(outcome: Outcome) -> dict[str, Any]:
         best = max(by_role.get("baseline", []), default=None)
         lead = None if ours is None or best is None else ours - best
         share = None if ours is None or not ceiling else 100 * ours / ceiling
-        rows.append([TITLE[kind], *[_shown(v) for v in (ours, best, lead, ceiling, share)]])
+        rows.append([TITLE[kind], *["" if v is None else round(v, 1) for v in (ours, best, lead, ceiling, share)]])
     titles = ["table", "ours %", "best single modality %", "lead, points", "ceiling %", "of it %"]
     return {"columns": titles, "rows": rows}
 
@@ -186,10 +182,6 @@ def _percent(share: float) -> float:
     return round(100.0 * share, 1)
 
 
-def _shown(value: float | None) -> object:
-    return "" if value is None else round(value, 1)
-
-
 NOTE = (
     "An answer is the first goal. Its distance is horizontal, to the nearest point of the box round the right thing, "
     "or to where the robot was while the right sound was heard; "
@@ -220,16 +212,10 @@ def run_indexing(settings: IndexingSettings | None, out: Path) -> dict[str, Any]
 
 def _answers(outcome: Outcome) -> bytes:
     by_task: dict[str, list[Any]] = {}
-    for scene in outcome.scenes:
-        for given in scene.answers:
-            by_task.setdefault(given.task, []).append(
-                {
-                    "configuration": given.configuration,
-                    "position": given.position,
-                    "off_m": round(given.off_m, 3),
-                    "centre_off_m": round(given.centre_m, 3),
-                }
-            )
+    for given in (one for scene in outcome.scenes for one in scene.answers):
+        off_m = {"off_m": round(given.off_m, 3), "centre_off_m": round(given.centre_m, 3)}
+        named = {"configuration": given.configuration, "position": given.position}
+        by_task.setdefault(given.task, []).append({**named, **off_m})
     listed = [
         {"task": task.name, "asked": task.sentence, "rivals": task.rivals, "answers": by_task.get(task.name, [])}
         for task in outcome.tasks.tasks

@@ -211,7 +211,9 @@ def run(settings: NavigationSettings, out: Path, open_spec: OpenSpec = open_scen
         for job in _jobs(settings, missions, out)
     ]
     total = sum(len(_pairs(one.missions)) for one in todo)
-    scenes = side_by_side(_sent, todo, settings.jobs, "navigation", lambda: _count(todo), total)
+    scenes = side_by_side(
+        _sent, todo, settings.jobs, "navigation", lambda: sum(Journal(one.journal).count() for one in todo), total
+    )
     return Outcome(settings, missions, tuple(scenes), weights)
 
 
@@ -225,10 +227,6 @@ def _journal(settings: NavigationSettings, out: Path, job: SceneJob) -> Path:
 
 def _pairs(missions: Sequence[Mission]) -> list[tuple[Mission, Configuration]]:
     return [(mission, one) for mission in missions for one in configurations(mission.series)]
-
-
-def _count(todo: Sequence[_Todo]) -> int:
-    return sum(Journal(one.journal).count() for one in todo)
 
 
 def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> MissionSet:
