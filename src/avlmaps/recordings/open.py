@@ -320,10 +320,14 @@ def _unknown(path: Path) -> str:
             f"{path} is a video, which has neither depth nor poses; make a folder of it, as rgb{path.suffix.lower()} "
             f"beside {layout.DESCRIPTION}, {layout.POSES} and depth/, or give it as the sound track of a recording."
         )
+    if path.is_file() and path.suffix.lower() in images.COLOUR_SUFFIXES:
+        return f"{path} is a picture, not a recording; `avlmaps locate MAP {path.name}` finds where it was taken."
     if path.is_file():
         return f"{path} is a file of no known format; known are: {looked_for}."
     if (path / _MAP).is_file():
         return f"{path} is a map, not a recording; ask it with `avlmaps query`, or give its recording."
+    if not any(path.iterdir()):
+        return f"{path} is empty."
     with os.scandir(path) as entries:
         folders = sorted(Path(e.path) for e in islice(entries, LOOKED_AT) if e.is_dir())
     below = [folder.name for folder in folders[:50] if _recognised(folder)]

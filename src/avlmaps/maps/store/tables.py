@@ -103,8 +103,9 @@ def read_arrays(path: Path) -> tuple[dict[str, np.ndarray], str]:
             header = int.from_bytes(stream.read(8), "little")
             entries: dict[str, Any] = msgspec.json.decode(stream.read(header))
             content = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-    except FileNotFoundError:
-        raise MapError(f"{path} is missing; {RESTORE}.") from None
+    except FileNotFoundError:  # safetensors says so of what may not be read, too
+        what = "may not be read; give yourself the right to, or" if path.exists() else "is missing;"
+        raise MapError(f"{path} {what} {RESTORE}.") from None
     except (SafetensorError, msgspec.DecodeError, ValueError) as fault:
         raise MapError(f"{path} is damaged ({fault}); {RESTORE}.") from fault
     except OSError as fault:
