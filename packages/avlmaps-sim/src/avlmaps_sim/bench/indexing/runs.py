@@ -218,7 +218,7 @@ PAPER_SIZES: Mapping[TaskKind, int] = {
 }
 _PHOTOS_A_TASK = 12  # tried for each that is wanted
 _MAKING = 3  # raised when tasks are made by other rules
-_QUERYING = 8  # raised when they are queried by other rules
+_QUERYING = 9  # raised when they are queried by other rules
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
