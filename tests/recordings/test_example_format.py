@@ -62,6 +62,7 @@ def test_a_registered_format_is_found_and_keeps_its_promises(tmp_path: Path, sho
     check_damage(path, open_recording, tmp_path / "damaged", most_files=2)
     nothing = tmp_path / "nothing"
     nothing.mkdir()
+    (nothing / "notes.txt").touch()
     with pytest.raises(RecordingError, match=r"looked for: folder: .*; shoebox: shot_\*\.npz\."):
         open_recording(nothing)
 
