@@ -61,8 +61,7 @@ def test_a_registered_format_is_found_and_keeps_its_promises(tmp_path: Path, sho
     check(lambda: open_recording(path), truth)
     check_damage(path, open_recording, tmp_path / "damaged", most_files=2)
     nothing = tmp_path / "nothing"
-    nothing.mkdir()
-    (nothing / "notes.txt").touch()
+    (nothing / "photos").mkdir(parents=True)
     with pytest.raises(RecordingError, match=r"looked for: folder: .*; shoebox: shot_\*\.npz\."):
         open_recording(nothing)
 
