@@ -78,7 +78,7 @@ def _driven(table: str, label: str, in_a_row: int) -> Figure:
 
 HOMES = tuple(f"house:{1_000_000 + number}:held-out" for number in range(12))
 FEW = 2  # of them, in the standing size
-# Figures by people who had read neither the code nor its lists, on data that nothing learnt from: lines of their text.
+# Figures by hands that had read neither the code nor its lists, on data that nothing learnt from: lines of their text.
 OTHER_HANDS = (
     "NYUv2, 654 test frames",
     "ESC-50 fold 1, 400 clips, 50 names",
@@ -197,7 +197,7 @@ INTRODUCTION = """# Benchmarks
 
 `make bench` measures what has a command anew in an afternoon, and writes this page and the README's table from
 [benchmarks.json](benchmarks.json), all that each command printed. Speed is of one core of a shared machine with two.
-Intervals are 95 %: few homes or missions make them wide. *Another hand* has no command: its rows say which reader.
+Intervals are 95 %: few homes or missions make them wide. *Another hand* has no command: its rows name older readers.
 
 *Weights* says whether a row was measured with the weights that ship; *older* is not to be relied on.
 
