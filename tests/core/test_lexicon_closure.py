@@ -69,11 +69,12 @@ def test_the_training_tables_are_those_of_the_shipped_notes(monkeypatch: pytest.
     labels, words = (importlib.import_module(f"training.pixels.{name}") for name in ("labels", "lexicon"))
     sounds = importlib.import_module("training.sounds.kinds")
     notes = weights("scene_encoder.json")
-    assert list(labels.CATEGORIES) == notes["categories"]
+    assert list(labels.CATEGORIES)[: len(notes["categories"])] == notes["categories"]  # new names wait at the end
     assert list(labels.ROOMS) == notes["rooms"]
     assert {name: list(called) for name, called in words.CALLED.items()} == notes["called"]
-    for word, names in words.KINDS.items():
-        assert set(notes["kinds"][word]) == set(names)
+    for word, names in notes["kinds"].items():
+        known = {*notes["categories"], *notes["rooms"]}
+        assert set(names) == set(words.KINDS[word]) & known, word
     assert [labels.room_of(area) for area in ("study", "storage", "toilets", "copy corner", "lounge", "garage")] == [
         "office", "storage room", "bathroom", "copy room", "living room", "",
     ]  # fmt: skip

@@ -25,6 +25,12 @@ CATEGORIES = (
     "other",
     # Homes hold none of these; training worlds add them (``sim/homes/lived_in.py``).
     "clothing", "paper", "person", "shower curtain",
+    # Small things by other hands (``things.py``).
+    "plate", "drinking glass", "can", "food", "fruit", "cutlery", "pan", "jug", "chopping board", "knife block",
+    "mobile phone", "remote control", "tablet", "headphones", "camera", "games console", "backpack", "suitcase",
+    "umbrella", "hat", "key", "eyeglasses", "scissors", "tool", "flashlight", "medicine", "soap", "toilet paper",
+    "brush", "broom", "fire extinguisher", "power socket", "light switch", "smoke detector", "racket", "stapler",
+    "pen", "blender", "computer mouse",
 )  # fmt: skip
 
 ROOMS = (

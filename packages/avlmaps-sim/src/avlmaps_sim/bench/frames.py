@@ -90,7 +90,7 @@ KINDS_OF_CLASS: dict[str, tuple[str, ...]] = {
     "sink": ("sink",),
     "lamp": ("lamp",),
     "bathtub": ("bathtub",),
-    "bag": ("bag",),
+    "bag": ("bag", "backpack", "suitcase"),
     "other structure": ("column", "stairs", "railing", "fireplace", "radiator", "air conditioner", "shower"),
     "other furniture": ("ottoman", "coat rack", "piano", "play tent", "aquarium", "fitness equipment", "stove",
                         "dishwasher", "washing machine", "baby stroller", "ironing board"),
@@ -98,7 +98,12 @@ KINDS_OF_CLASS: dict[str, tuple[str, ...]] = {
                    "water heater", "laptop", "computer", "printer", "loudspeaker", "keyboard", "telephone", "clock",
                    "chandelier", "plant", "vase", "candle", "bottle", "cup", "bowl", "pot", "basket", "trash can",
                    "toy", "shoes", "laundry basket", "tableware", "guitar", "dumbbell", "ball", "bicycle",
-                   "rocking horse", "pet bed", "water dispenser", "other"),
+                   "rocking horse", "pet bed", "water dispenser", "other", "plate", "drinking glass", "can", "food",
+                   "fruit", "cutlery", "pan", "jug", "chopping board", "knife block", "mobile phone",
+                   "remote control", "tablet", "headphones", "camera", "games console", "umbrella", "hat", "key",
+                   "eyeglasses", "scissors", "tool", "flashlight", "medicine", "soap", "toilet paper", "brush",
+                   "broom", "fire extinguisher", "power socket", "light switch", "smoke detector", "racket",
+                   "stapler", "pen", "blender", "computer mouse"),
 }  # fmt: skip
 
 # The data set's colour camera, undistorted (its toolbox); depth is registered to it.
