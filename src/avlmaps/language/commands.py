@@ -59,7 +59,7 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
     if closed is None or (stop is not None and (closed.is_unsure or _harms(stop))):
         return read
     refused = act.Refuse(act.RefusalReason.UNKNOWN, _not_ordered(closed))
-    answer = _asked(closed, read.intents) if stop is None else refused
+    answer = refused if closed.refuses or stop is not None else _asked(closed, read.intents)
     return replace(read, intents=(answer,), why="gate")
 
 

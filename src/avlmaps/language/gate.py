@@ -16,6 +16,7 @@ from avlmaps.language.sentence import rewritten
 from avlmaps.language.word_classes import filled, table, words_of
 
 _ORDER = "order"
+_QUOTE = re.compile(r"""(?<=\w) ["'“‘](?=\w)""")
 _UNSURE = "unsure"
 _UNSURE_ANSWER = "Is this an order, to me, now?"
 
@@ -28,6 +29,11 @@ class NoOrder:
     answer: str
 
     @property
+    def refuses(self) -> bool:
+        """Whether it offers nothing to choose: a quoted order is nobody's."""
+        return bool(table("gate").get(self.kind, {}).get("refuses"))
+
+    @property
     def is_unsure(self) -> bool:
         """Whether the network says so, and no row."""
         return self.kind == _UNSURE
@@ -35,10 +41,10 @@ class NoOrder:
 
 def no_order(text: str) -> NoOrder | None:
     """Return why a sentence may be no order, to the robot, now; None where it is one."""
-    said = " ".join(token.text for token in tokenise(text))
     # What is said of the robot ("send the rover to the door") is judged as if it were said to it.
-    ordered = " ".join(token.text for token in tokenise(rewritten(text, only_robot=True)[0]))
-    closed = (kind for kind, rows in _rows().items() if kind != _ORDER and any(row.search(said) for row in rows))
+    forms = (text, _QUOTE.sub(": ", text), rewritten(text, only_robot=True)[0])
+    said, quoted, ordered = (" ".join(token.text for token in tokenise(form)) for form in forms)
+    closed = (kind for kind, rows in _rows().items() if kind != _ORDER and any(row.search(quoted) for row in rows))
     kind = next(closed, None)
     if kind is not None:
         return NoOrder(kind, table("gate")[kind]["answer"])

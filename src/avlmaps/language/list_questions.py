@@ -57,7 +57,7 @@ class ListQuestion:
     since: str = ""  # the day after which changes count, as it was said; "" for the first
     change: str = ""  # ``new``, ``gone`` or ``moved``; "" for any change
     # Of ``USUAL`` ``on``, ``in`` or ``near`` the name ("": where it usually is); of ``HEARD`` ``before`` or ``after``
-    # another sound, or ``in`` the room of that name; of ``BESIDE`` ``rooms`` where these are sought.
+    # another sound, ``in`` the room or ``near`` the thing of that name; of ``BESIDE`` ``rooms`` where these are sought.
     how: str = ""
     other: str = ""  # the other sound, or the other of two things between which all are sought
 
@@ -139,6 +139,8 @@ def _heard(said: Mapping[str, str | None]) -> ListQuestion | None:
     if room:
         known = lexicon().find(mended(room) or room, EntryKind.ROOM) is not None
         return ListQuestion(Listed.HEARD, mended(room) or room, how="in") if known else None
+    if said.get("thing"):
+        return ListQuestion(Listed.HEARD, said["thing"] or "", how="near")
     name, other = said.get("heard") or said.get("sounded") or "", said.get("other") or ""
     name = f"{name} {said.get('sounding') or ''}".strip()
     if pattern(_TABLE, "tail").search(f"{name} {other}") is not None:  # "... near the buffet" is read by the networks

@@ -45,7 +45,6 @@ _STOREY_STEMS = ("floor", "stor", "level", "stair")
 _AS_NEAR = "distance counts, the side does not."
 _BETWEEN = re.compile(r"\bbetween\b", re.IGNORECASE)
 _NEAR = r"\b(?:near|next to|beside|by|close to)(?: the)?"
-_HEARD = re.compile(r"\b(?:hear|heard|sounds?|noises?)\b", re.IGNORECASE)
 # "There is no chair in the kitchen, right?"
 _STATED = re.compile(
     r"(?:so,? |and )?there (?P<verb>is|are)(?P<no>n't| not| no)?(?: any)? (?P<what>.+?),? "
@@ -288,19 +287,14 @@ def _of_lists(asking: _Asking) -> Answer | None:
 
 
 def _read_list(asking: _Asking) -> "ListQuestion | None":
-    from avlmaps.language.list_questions import Listed, list_question, read_list
+    from avlmaps.language.list_questions import list_question, read_list
 
     asked, own = asking.asked, own_names(asking.avlmap, asking.asked.sentence)
     by_rows = read_list(asked.sentence, own)
     if by_rows is not None or not asked.sentence.strip():
         return by_rows
     with suppress(QueryError):  # `_read` says why a sentence is not understood
-        listed = list_question(_reading(asked, asked.sentence, own).inquiry)
-        how = listed and {Listed.BESIDE: "near", Listed.CONTENTS: "in"}.get(listed.of)
-        unnamed = re.sub(re.escape(listed.name), "", asked.sentence, flags=re.I) if listed else ""  # a "sound system"
-        if listed and how and _HEARD.search(unnamed) and not listed.name.startswith("sound of "):
-            return replace(listed, of=Listed.HEARD, how=how)  # who asks for sounds is told of no things
-        return listed
+        return list_question(_reading(asked, asked.sentence, own).inquiry)
     return None
 
 

@@ -165,7 +165,7 @@ class AVLMap:
     ) -> Heatmap:
         primary, named = part.role is Role.PRIMARY, part.query
         if part.modality is Modality.OBJECT:
-            return self.object(named, primary)
+            return self._object_heat(named, primary)
         if part.modality is Modality.AREA:
             return self.area(named, primary)
         if part.modality is Modality.SOUND and not part.is_file:
@@ -180,7 +180,16 @@ class AVLMap:
 
     @checked(QueryError)
     def object(self, word: str, primary: bool = False, vocabulary: Sequence[str] | None = None) -> Heatmap:
-        """Return the heat of an object; ``vocabulary``: what its word competes with, instead of the encoder's list."""
+        """Return the heat of an object; ``vocabulary``: what its word competes with, instead of the encoder's list.
+
+        ``QueryError``: neither the encoder nor a person knows the word.
+        """
+        heat = self._object_heat(word, primary, vocabulary)
+        if not heat.factors[0].understood:
+            contents.require_known(lambda _: False, [word])
+        return heat
+
+    def _object_heat(self, word: str, primary: bool, vocabulary: Sequence[str] | None = None) -> Heatmap:
         part, heat = Part(Modality.OBJECT, word, _role(primary)), self.settings.heat
         factor = self.edited.pinned(part, heat)
         if factor is None and self.edited.is_room(word):
