@@ -105,11 +105,7 @@ def test_what_waits_is_located_the_newest_first_and_again_after_a_correction(
 
 def hearing_until(end_s: float) -> Hearing:
     ears = Hearing(Encoders(), HearingSettings(), None, name_first=False)
-    ears.add(
-        Sound(np.zeros(round(end_s * 1000), np.float32), 1000),
-        0.0,
-        Walked(),
-    )
+    ears.add(Sound(np.zeros(round(end_s * 1000), np.float32), 1000), 0.0, Walked())
     return ears
 
 

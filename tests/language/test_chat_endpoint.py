@@ -11,17 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from chat_server import (
-    ChatServer,
-    chat_server,
-    endless,
-    failed,
-    half,
-    hung_up,
-    sent,
-    silent,
-    trickle,
-)
+from chat_server import ChatServer, chat_server, endless, failed, half, hung_up, sent, silent, trickle
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -148,14 +138,7 @@ def test_an_answer_without_end_is_not_read_to_its_end(server: ChatServer, status
     assert ("more than 1024 KiB" if status == 200 else f"HTTP {status}") in sentence
 
 
-@pytest.mark.parametrize(
-    "reply",
-    [
-        silent,
-        trickle(200),
-        trickle(500),
-    ],
-)
+@pytest.mark.parametrize("reply", [silent, trickle(200), trickle(500)])
 def test_the_deadline_holds_however_slow_the_answer_is(server: ChatServer, reply: Any) -> None:
     server.answer(reply)
     sentence = _sentence(server, timeout_s=0.4, retries=5)

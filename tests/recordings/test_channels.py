@@ -14,13 +14,7 @@ from hypothesis import strategies as st
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.channels import (
-    ChannelSound,
-    GrowingTrack,
-    level_faults,
-    read_channels,
-    with_microphones,
-)
+from avlmaps.recordings.channels import ChannelSound, GrowingTrack, level_faults, read_channels, with_microphones
 from avlmaps.recordings.microphones import Microphones, microphones_named
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame

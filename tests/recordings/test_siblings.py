@@ -61,11 +61,7 @@ CAMERAS = (write_polycam, "keyframes/cameras/*.json")
         (NERF, lambda p: p.update(integer_depth_scale=0.001, depth_unit_scale_factor=0.25), "one positive number"),
         (R3D, lambda p: p.update(frameTimestamps=p["frameTimestamps"][:3]), "3 frameTimestamps for 6 poses"),
         (R3D, lambda p: p.update(frameTimestamps=[1e3 * s for s in p["frameTimestamps"]]), "look like milliseconds"),
-        (
-            R3D,
-            lambda p: p.update(perFrameIntrinsicCoeffs=[p["K"]] * 6),
-            "a row of perFrameIntrinsicCoeffs of",
-        ),
+        (R3D, lambda p: p.update(perFrameIntrinsicCoeffs=[p["K"]] * 6), "a row of perFrameIntrinsicCoeffs of"),
     ],
 )
 def test_what_may_change_the_map_is_refused(tmp_path: Path, kind: tuple[Writer, str], edit: Edit, said: str) -> None:

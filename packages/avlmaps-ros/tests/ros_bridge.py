@@ -409,6 +409,7 @@ MALFORMED = (
     b'{"op": "publish", "topic": "close", "msg": {}}',
     b'{"op": "publish", "topic": "/unknown", "msg": {}}',
     b'{"op": "publish", "topic": "/tf", "msg": {"transforms": NaN}}',
+    b'{"op": "publish", "topic": "/clock", "msg": {"clock": {"sec": 1' + 400 * b"0" + b"}}}",
     b'{"op": "action_result", "id": "another", "values": [1e999]}',
     b'{"op": "action_result", "id": {}}',
     b'{"op": "service_response", "id": "avlmaps-0", "values": null}',

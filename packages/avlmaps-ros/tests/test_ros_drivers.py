@@ -1,26 +1,25 @@
 """Nav2 and move_base, driven over a websocket: a robot of the test's own obeys, fails, hangs, lies and vanishes."""
 
 import _thread
+import os
 import signal
 from math import pi
-from time import sleep
+from socket import create_server
+from time import monotonic, sleep
 
 import numpy as np
 import pytest
-from ros_bridge import FakeRobot, in_thread
+from ros_bridge import FakeRobot, in_thread, reactor
+from twisted.internet.threads import blockingCallFromThread
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.driver import Driver
-from avlmaps_ros import (
-    Frames,
-    GroundTransform,
-    RosSettings,
-    open_ros_driver,
-)
+from avlmaps_ros import Frames, GroundTransform, RosSettings, open_ros_driver
 from avlmaps_ros.goals import ActionGoal, End, SentGoal
+from avlmaps_ros.guard import GoalGuard, Orders
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -182,6 +181,15 @@ def test_a_goal_that_the_bridge_has_forgotten_is_cancelled_by_the_name_that_nav2
         assert not arrival.reached
         assert "may still be driving" not in arrival.note
         assert all(goal["status"] in (2, 5) for goal in robot.goals.values()), robot.goals
+
+
+def test_a_list_from_before_a_goal_does_not_say_that_it_is_over():
+    settings = quick(goal_timeout_s=2.0, cancel_timeout_s=1.0)
+    with FakeRobot(2) as robot, opened(robot, settings=settings) as driver:
+        assert driver.go_to(PLACE).reached
+        robot.does[""], robot.listing = "deaf to ids", False
+        driver.go_to(2 * PLACE)
+        assert driver.owes or all(goal["status"] != 1 for goal in robot.goals.values())
 
 
 def test_a_robot_that_will_not_stop_is_told_of(robot):
@@ -549,6 +557,8 @@ def test_stopping_from_another_thread_ends_a_drive(robot):
         busy = driver.forward(1.0)
         assert not busy.reached
         assert "another movement" in busy.note
+        assert "still at a movement" in driver.fault()
+        assert not cancels(robot)
         assert driver.stop().reached
         thread.join(20.0)
         (arrival,) = results
@@ -556,6 +566,50 @@ def test_stopping_from_another_thread_ends_a_drive(robot):
         assert not robot.moves_on
         robot.does[""] = "succeed"
         assert driver.go_to(PLACE).reached
+
+
+def test_a_stop_before_a_goal_goes_out_or_between_two_of_a_movement_keeps_it_back(robot):
+    with opened(robot) as driver:
+        for before, move, sent in (
+            ("_unready", lambda: driver.go_to(PLACE), 0),
+            ("turn", lambda: driver.forward(-1.0), 1),
+        ):
+            done = getattr(driver, before)
+            setattr(driver, before, lambda *given, done=done: (done(*given), driver.stop())[0])
+            assert "was stopped" in move().note
+            delattr(driver, before)
+            assert len(goals(robot)) == sent
+
+
+def test_a_goal_that_is_stopped_while_its_connection_opens_is_not_sent():
+    with FakeRobot(2) as robot, opened(robot) as driver:
+        goal = SentGoal(ActionGoal("/navigate_to_pose", "", {}, 9.0), called_off_s=1.0)
+        driver._contact.session.send(goal)
+        assert driver.stop().reached and goal.end is End.FAILED
+        assert not goals(robot)
+
+
+def test_a_bridge_that_takes_no_more_connections_is_stopped_over_those_that_stand():
+    with FakeRobot(2, "drive on") as robot, opened(robot, settings=quick(cancel_timeout_s=3.0)) as driver:
+        thread, _ = in_thread(lambda: driver.go_to(PLACE))
+        assert robot.soon(lambda: driver._goal is not None and not driver._goal.waits)
+        blockingCallFromThread(reactor, robot._listener.stopListening)
+        with create_server(("127.0.0.1", robot.port)):
+            begun_s = monotonic()
+            driver.stop()
+            assert monotonic() - begun_s < 12.0
+            assert all(goal["status"] == 5 for goal in robot.goals.values())
+            thread.join(20.0)
+
+
+def test_a_guard_that_hangs_does_not_hold_up_the_drive():
+    guard = GoalGuard(Orders("nav2", "ws://127.0.0.1:9", None, QUICK))
+    os.kill(guard._process.pid, signal.SIGSTOP)
+    goal = SentGoal(ActionGoal("/navigate_to_pose", "", {"": 999 * "x"}, 9.0))
+    thread, _ = in_thread(lambda: [guard.beat(goal) for _ in range(100)])
+    thread.join(10.0)
+    guard._process.kill()
+    assert not thread.is_alive()
 
 
 @pytest.fixture

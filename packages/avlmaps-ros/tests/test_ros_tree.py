@@ -175,10 +175,7 @@ json_values = st.recursive(
 @given(json_values)
 def test_no_json_raises_anything_but_value_errors(value):
     payload = json.dumps(value).encode()
-    for read in (
-        lambda: msgspec.json.decode(payload, type=Incoming),
-        lambda: transforms_in(msgspec.Raw(payload)),
-    ):
+    for read in (lambda: msgspec.json.decode(payload, type=Incoming), lambda: transforms_in(msgspec.Raw(payload))):
         with contextlib.suppress(ValueError):
             read()
 

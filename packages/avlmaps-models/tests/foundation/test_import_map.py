@@ -369,14 +369,8 @@ def test_few_bad_voxels_can_be_left_out(arrays: dict[str, np.ndarray], scene: Pa
     ("spoil", "sentence"),
     [
         (lambda a: _without(a, "robot_pose_list"), "has no robot_pose_list"),
-        (
-            lambda a: {**a, "clip_sparse_map": a["clip_sparse_map"][:, :512]},
-            r"is float32 of \(14, 512\)",
-        ),
-        (
-            lambda a: {**a, "clip_sparse_map": a["clip_sparse_map"] * np.nan},
-            "14 of 14 features .* hold NaN",
-        ),
+        (lambda a: {**a, "clip_sparse_map": a["clip_sparse_map"][:, :512]}, r"is float32 of \(14, 512\)"),
+        (lambda a: {**a, "clip_sparse_map": a["clip_sparse_map"] * np.nan}, "14 of 14 features .* hold NaN"),
         (lambda a: {**a, "robot_pose_list": a["robot_pose_list"] * 2.0}, "robot_pose_list 0 is not a rigid transform"),
         (lambda a: {k: v[1:] for k, v in a.items()}, "begins with another pose than"),
     ],

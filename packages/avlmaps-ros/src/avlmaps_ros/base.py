@@ -90,7 +90,7 @@ class RosDriver:
         turned = self.turn(pi)
         if not turned.reached:
             return turned
-        driven = self.forward(-distance_m)
+        driven = self._move(lambda start: self._tasks.plan_ahead(start, -distance_m), goes_on=True)
         return replace(driven, path=np.concatenate([turned.path, driven.path]))
 
     def stop(self) -> Arrival:
@@ -124,7 +124,7 @@ class RosDriver:
         A lost connection is made again, and a guard that ended is started again.
         """
         try:
-            if why := self._unready():
+            if why := "it is still at a movement" if self._busy.locked() else self._unready():
                 return why[:1].lower() + why[1:]
         except NavigationError as fault:
             return str(fault)
@@ -152,8 +152,7 @@ class RosDriver:
 
     def close(self) -> None:
         """End the connection; a goal that is not over is called off first, and else left to the guard."""
-        goal = self._unfinished
-        if goal is not None:
+        if (goal := self._unfinished) is not None:
             self._called_off(goal, self.settings.cancel_timeout_s)
         self._closing.set()
         self._contact.session.close()
@@ -175,11 +174,12 @@ class RosDriver:
         known = np.isfinite(place).all()  # NaN stays NaN, without a warning
         return (self._level_from_world @ np.asarray(place, np.float64))[:2] if known else np.full(2, np.nan)
 
-    def _move(self, planned: Callable[[GroundPose], MovementPlan | str]) -> Arrival:
+    def _move(self, planned: Callable[[GroundPose], MovementPlan | str], goes_on: bool = False) -> Arrival:
         if not self._busy.acquire(blocking=False):
             return self._arrival(False, Track(self.pose), "The robot is still at another movement")
         try:
-            self._halted.clear()
+            if not goes_on:  # a stop between two parts of a movement ends both
+                self._halted.clear()
             self._left = _IDLE
             if why := self._unready():
                 return self._arrival(False, Track(self.pose), why)
@@ -239,8 +239,7 @@ class RosDriver:
                 others = session.heard.wait_for(self._others, _NEXT_LIST_S)
             continues = ". A goal of another client continues" if others else ""
             return self._arrival(False, track, (note or f"{called} did not do it") + continues)
-        now = self._contact.pose_from_now(self.settings.pose_max_age_s)
-        if now is None:
+        if (now := self._contact.pose_from_now(self.settings.pose_max_age_s)) is None:
             why = f"{called} says that it arrived, but its pose is not reported any more: {self._contact.unseen()}"
             return self._arrival(False, track, why)
         track.passed(now)
@@ -258,6 +257,9 @@ class RosDriver:
         self._goal = goal
         self._ours.append(goal)
         try:
+            if why := self._lost_sight(goal, 0.0):  # it was stopped while it was planned
+                goal.over(End.CANCELLED, why)
+                return goal
             self._beat(goal)
             self._contact.session.send(goal)
             why, absent = self._watch(goal, track)
@@ -354,8 +356,7 @@ class RosDriver:
         servers, action = self._contact.ear.servers, goal.task.action
         if absent and servers.list_of(action)[0] == -inf and not servers.serves(action)[1]:
             goal.over(End.ABSENT)
-        absent = absent and goal.end is not None
-        if absent:
+        if absent := absent and goal.end is not None:
             goal.end = End.ABSENT
         if agreed or absent:
             goal.note = f"{why}; it was reached again and stopped" if was_lost and not absent else why
@@ -378,14 +379,12 @@ class RosDriver:
             if tries and not contact.replace():
                 continue
             session = contact.session
-            patience_s = self._patience_s(goal) / 2.0
-            call_off(goal, session, min(until_s, monotonic() + patience_s), self._closing.is_set)
+            call_off(goal, session, min(until_s, monotonic() + self._patience_s(goal) / 2.0), self._closing.is_set)
             tries += session.lost is None
         return goal.end is not None
 
     def _patience_s(self, goal: SentGoal) -> float:
-        wait_s = 2.0 * self.settings.cancel_timeout_s
-        return wait_s + (goal.answer_s if goal.waits else 0.0)
+        return 2.0 * self.settings.cancel_timeout_s + (goal.answer_s if goal.waits else 0.0)
 
     def _all_called_off(self, wait_s: float) -> bool | None:
         """Cancel every goal until the servers say that they are at none; return what they said last.
@@ -396,8 +395,7 @@ class RosDriver:
         contact, since_s, idle = self._contact, self._clock(), None
 
         def waits() -> bool:
-            goal = self._unfinished
-            return goal is not None and goal.waits
+            return (goal := self._goal) is not None and goal.waits
 
         def is_idle(session: Session) -> bool | None:
             return False if waits() else session.is_idle(since_s)
@@ -412,8 +410,7 @@ class RosDriver:
                     session.cancel(goal)
                 with session.heard:
                     session.heard.wait_for(lambda s=session: is_idle(s) or s.lost is not None, AGAIN_S)
-                idle = is_idle(session)
-                if idle:
+                if idle := is_idle(session):
                     return True
         return idle
 

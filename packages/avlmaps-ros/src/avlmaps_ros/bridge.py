@@ -58,17 +58,19 @@ class BridgedNav2(Nav2Session):
 
     @property
     def lost(self) -> str | None:
-        return self.link.lost or (None if self._carrier is None or self._sent is None else self._carrier.lost)
+        carrier = self._carrier  # which others may replace meanwhile
+        return self.link.lost or (None if carrier is None or self._sent is None else carrier.lost)
 
     def send(self, goal: SentGoal) -> None:
-        self._ours[goal.id] = goal
+        self._ours[goal.id], goal.sent_s = goal, self.ear.clock()
         if self._carrier is not None and (self._sent is not None or self._carrier.lost is not None):
             self._carrier.drop()
             self._carrier = None
         self._sent = goal
         self._carrier = self._carrier or self._taken()
-        if self._carrier is None:
-            goal.over(End.FAILED, "The bridge takes no second connection, over which the goal would go")
+        if self._carrier is None or goal.called_off_s is not None:
+            none = "The bridge takes no second connection, over which the goal would go"
+            goal.over(End.FAILED, none if self._carrier is None else "It was called off before it was sent")
             return
         task = goal.task
         sent = {"action": task.action, "action_type": task.kind, "args": task.arguments, "feedback": True}
@@ -81,11 +83,11 @@ class BridgedNav2(Nav2Session):
         by that connection as well.
         """
         cancel = {"op": "cancel_action_goal", "id": goal.id, "action": goal.task.action}
+        if self._carrier is not None and self._sent is goal:
+            self._carrier.send(cancel)
         if (link := self._taken()) is not None:
             link.send(cancel)
             self._free.append(link)  # a bridge never answers it
-        if self._carrier is not None and self._sent is goal:
-            self._carrier.send(cancel)
         super().cancel(goal)
 
     def _call(self, server: str, name: str, goal: SentGoal | None) -> bool:
@@ -101,10 +103,10 @@ class BridgedNav2(Nav2Session):
     def _taken(self) -> Link | None:
         """Take a connection that is free, or a new one; of many that are not, the oldest is given up."""
         with self._lock:
-            self._free = [link for link in self._free if link.lost is None]
-            if self._free:
-                return self._free.pop()
-            crowded = self._calls.pop(next(iter(self._calls)))[0] if len(self._calls) >= _MOST_CALLS else None
+            while self._free:
+                if (link := self._free.pop()).lost is None:
+                    return link
+            crowded = self._calls.pop(next(iter([*self._calls])))[0] if len(self._calls) >= _MOST_CALLS else None
         if crowded is not None:
             crowded.drop()
         return self._opened()
@@ -131,9 +133,9 @@ class BridgedNav2(Nav2Session):
         if message.op == "service_response":
             with self._lock:
                 link, answer = self._calls.pop(name, (None, None))
-            if link is None or answer is None:
-                return
-            self._free.append(link)
+                if link is None or answer is None:
+                    return
+                self._free.append(link)
             if message.result:
                 answer(read(message.values, CancelAnswer).return_code)
             elif "not exist" in text_in(message.values):

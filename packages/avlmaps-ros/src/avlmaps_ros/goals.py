@@ -55,6 +55,7 @@ class SentGoal:
     before: frozenset[str] = frozenset()  # the goals that its server listed before it was sent, by the server's names
     id: str = field(default_factory=lambda: f"avlmaps-{uuid4().hex}")  # our name for it, unlike any other client's
     alias: str = ""  # the server's name for it, where that is another and is known
+    sent_s: float = 0.0  # when it was sent, by the driver's clock
     called_off_s: float | None = None  # when it was first cancelled
     heard_s: float | None = None  # when the server last showed that it is at it, by the driver's clock
     shown: int = 0  # how often it did

@@ -56,6 +56,8 @@ class GoalGuard:
         self._process = subprocess.Popen(
             command, stdin=pipe, stdout=pipe, stderr=silent, start_new_session=True, bufsize=0
         )
+        assert self._process.stdin is not None
+        os.set_blocking(self._process.stdin.fileno(), False)  # a guard that hangs does not hold up the driver
         self._write(self._orders)
 
     def require_ready(self) -> None:

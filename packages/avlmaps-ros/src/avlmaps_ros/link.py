@@ -169,7 +169,7 @@ class Link(Line):
             if is_binary:
                 raise ValueError("binary")
             self._hand_on(msgspec.json.decode(payload, type=Incoming))
-        except (ValueError, TypeError, RecursionError):
+        except (ValueError, TypeError, RecursionError, OverflowError):
             self.unread += 1
             self.complaint = self.complaint or "messages came that cannot be read (is it launched with bson_only_mode?)"
         self.note()

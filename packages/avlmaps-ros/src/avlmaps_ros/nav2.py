@@ -2,7 +2,6 @@
 
 from abc import abstractmethod
 from functools import partial
-from math import inf
 from typing import Any, ClassVar
 from uuid import uuid4
 
@@ -119,8 +118,7 @@ class Nav2Session(Session):
         self._call(goal.task.action, goal.alias or uuid4().hex, goal)
 
     def cancel_all(self) -> None:
-        for action in MOVING:
-            self._call(self.settings.named(action), _EVERYONE, None)
+        all(self._call(self.settings.named(action), _EVERYONE, None) for action in MOVING)  # until no way is left
 
     def is_idle(self, since_s: float) -> bool | None:
         fresh = [agreed for at_s, agreed in list(self._agreed_s.values()) if at_s >= since_s]
@@ -142,8 +140,7 @@ class Nav2Session(Session):
             if status in _UNDER_WAY:
                 goal.heard_s = self.ear.clock()  # a list comes at a change only: no sign of life that recurs
             elif status is not None:  # its result, which says why, comes to whoever sent it
-                wait_s = _RESULT_WITHIN_S if goal.task.kind else 0.0
-                self.link.later(wait_s, lambda: goal.over(*_end_listed(status)))
+                self.link.later(_RESULT_WITHIN_S, lambda: goal.over(*_end_listed(status)))
 
         self._each(take)
 
@@ -165,7 +162,7 @@ class Nav2Session(Session):
         if goal is not None and code is None:
             goal.unknown(now_s, "Its action server is gone")
         elif goal is not None and code in (_UNKNOWN, _ENDED):
-            has_list = self.ear.servers.list_of(server)[0] > -inf
+            has_list = self.ear.servers.list_of(server)[0] > goal.sent_s  # an older one does not tell
             if goal.alias or ((has_list or goal.waits) and not self._new(goal)):
                 goal.unknown(now_s, "Nav2 is not at the goal any more")
         self._each()

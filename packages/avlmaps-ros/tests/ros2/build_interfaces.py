@@ -30,11 +30,7 @@ def main(packages: list[str]) -> None:
             numpys = f"{BUILT_WITH}/lib/python3.12/site-packages/numpy/_core/include"
             text = text.replace(numpys, np.get_include()).replace(f"{BUILT_WITH}/include/python3.12", str(include))
             exported.write_text(text)
-    environment = {
-        **os.environ,
-        "AMENT_PREFIX_PATH": str(PREFIX),
-        "PATH": f"{PREFIX / 'bin'}:{os.environ['PATH']}",
-    }
+    environment = {**os.environ, "AMENT_PREFIX_PATH": str(PREFIX), "PATH": f"{PREFIX / 'bin'}:{os.environ['PATH']}"}
     for package in packages:
         build = PREFIX / "build" / Path(package).name
         settings = [

@@ -169,11 +169,7 @@ def test_commands_and_questions_choose_the_same_place(mapped: tuple[Path, Path])
     avlmap = AVLMap.open(mapped[1])
     name = max(avlmap.sources(), key=lambda one: one.probability).name
     paper = AVLMap.open(mapped[1], query_settings("paper"))
-    for known, at in (
-        (avlmap, "source"),
-        (paper, None),
-        (AVLMap(avlmap, settings=QuerySettings(sounds=ROBOT)), None),
-    ):
+    for known, at in ((avlmap, "source"), (paper, None), (AVLMap(avlmap, settings=QuerySettings(sounds=ROBOT)), None)):
         said = f"where the sound of {name} comes from"
         plan = LearnedTranslator(given_by(known)).program_for(f"go to {said}")
         assert ('at="source"' in plan.program) == (at == "source") and plan.notes == ()
