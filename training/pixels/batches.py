@@ -13,7 +13,7 @@ from training.pixels.faults import degraded, mistaken
 from training.pixels.labels import CATEGORIES, FIRST_COARSE, UNLABELLED
 
 # A frame shows a category with at least this many of its 320x240 pixels.
-FEWEST_PIXELS = 160
+FEWEST_PIXELS = 120
 # Batches after which a process looks for new shards.
 LOOK_EVERY = 30
 # How evenly categories are drawn: 0 each as often as any other, 1 as often as frames show it.
@@ -45,6 +45,10 @@ class Frames:
     def is_real(self) -> bool:
         """Return whether the frames are real ones; their cameras have one number more."""
         return self.camera.shape[1] > 8
+
+    def has_depth(self, index: int) -> bool:
+        """Return whether a frame has a depth anywhere; a photograph has none."""
+        return bool(self.depth[index, ::16, ::16].any())
 
     def height_is_known(self, index: int) -> bool:
         """Return whether a camera's height is true; for some real frames it is an estimate."""
@@ -255,7 +259,8 @@ def _sample(frames: Frames, index: int, category: int, view: View, rng: np.rando
     camera = np.array([fx * scale, fy * scale, cx, cy, *believed_up, height + off], np.float32)
     i, j = rng.integers(2, size=2)  # a cell of the output stands for four pixels
     label, z = np.array(label[i::2, j::2]), depth[i::2, j::2]
-    label[z == 0.0] = UNLABELLED
+    if frames.has_depth(index):  # a photograph teaches colour alone
+        label[z == 0.0] = UNLABELLED
     weight = np.minimum(1.0, 3.0 / np.maximum(z, 0.5)).astype(np.float32)
     floor = np.float32(off if known else np.nan)
     return depth, camera, rgb, np.float32(kept), label, weight, np.array(frames.room[index]), floor

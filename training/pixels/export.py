@@ -34,6 +34,11 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
 FEWEST = 64
 
 
+def notes_of(weights: Path) -> Notes:
+    """Return the notes beside a file of weights."""
+    return msgspec.json.decode(weights.with_suffix(".json").read_bytes(), type=Notes)
+
+
 class Shipped:
     """A file that ``write_onnx`` wrote, queried like the network.
 
@@ -43,7 +48,7 @@ class Shipped:
 
     def __init__(self, path: Path) -> None:
         self._session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
-        self.fineness = msgspec.json.decode(path.with_suffix(".json").read_bytes(), type=Notes).fineness
+        self.fineness = notes_of(path).fineness
 
     def __call__(self, geometry: Tensor, colour: Tensor) -> tuple[Tensor, ...]:
         """Return the scores of categories and of rooms, and the floor's height."""

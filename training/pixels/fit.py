@@ -18,8 +18,9 @@ import torch
 import tyro
 from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
-from training.pixels.batches import Shards, View, batches, draw_batch
-from training.pixels.export import load_network
+from training.pixels.batches import Batch, Shards, View, batches, draw_batch
+from training.pixels.distil import Teachers
+from training.pixels.export import load_network, notes_of
 from training.pixels.labels import CATEGORIES, ROOMS
 from training.pixels.light import in_other_light
 from training.pixels.losses import Losses, coarse_weights, fine_weights
@@ -51,6 +52,12 @@ class Options:
     """Pictures in a step."""
     real_share: float = 0.5
     """Share of them that are real, where there are real ones."""
+    photos: Path | None = None
+    """Folder with photographs as real frames without depth (``training.pixels.teachers``)."""
+    photo_share: float = 0.08
+    """Share of the pictures in a step that are photographs, where there are any."""
+    teachers: Path | None = None
+    """Folder of the weights that ship, whose probabilities are learnt beside the labels (``distil.py``)."""
     rate: float = 2e-3
     """Highest learning rate."""
     optimiser: Literal["muon", "adamw"] = "muon"
@@ -102,8 +109,8 @@ def optimisers_of(network: nn.Module, options: Options) -> list[torch.optim.Opti
     return [Muon(inside, lr=options.rate, weight_decay=options.decay), adam] if inside else [adam]
 
 
-# Batches from which the statistics inside a network that ships are taken: 600 pictures.
-_LOOKED_AT = 40
+# Pictures from which the statistics inside a network that ships are taken.
+_LOOKED_AT = 600
 
 
 def _begun(options: Options, device: torch.device, sources: list[tuple[Shards, int]]) -> RoomNetwork:
@@ -113,7 +120,7 @@ def _begun(options: Options, device: torch.device, sources: list[tuple[Shards, i
     if options.resume:
         state = load_network(options.out, "last").state_dict()
     elif options.start is not None:
-        state = _shipped(options, sources) if options.start.suffix == ".onnx" else _mean_of(options.start)
+        state = _shipped(options, sources, device) if options.start.suffix == ".onnx" else _mean_of(options.start)
     if network.tower is not None and not any(name.startswith("tower.") for name in state or ()):
         network.tower.load_state_dict(imagenet_weights())
     if state is not None:
@@ -122,19 +129,18 @@ def _begun(options: Options, device: torch.device, sources: list[tuple[Shards, i
     return network.train().to(device, memory_format=torch.channels_last)
 
 
-def _shipped(options: Options, sources: list[tuple[Shards, int]]) -> dict[str, Tensor]:
+def _shipped(options: Options, sources: list[tuple[Shards, int]], device: torch.device) -> dict[str, Tensor]:
     assert options.start is not None
     rng = np.random.default_rng(options.seed)
     fineness = 2 if has_tower(options.start) else 1
-    drawn = (draw_batch(sources, replace(options.view, fineness=fineness), rng) for _ in range(_LOOKED_AT))
-    looked_at = (
-        (
-            channels_of(torch.from_numpy(b.depth), torch.from_numpy(b.camera), MULTIPLE),
-            in_other_light(torch.from_numpy(b.rgb), torch.from_numpy(b.kept), fineness * MULTIPLE),
-        )
-        for b in drawn
-    )
-    return unfolded(options.start, len(CATEGORIES), len(ROOMS), looked_at, options.start_number).state_dict()
+    view = replace(options.view, fineness=fineness)
+    looked_at = []
+    for _ in range(_LOOKED_AT // options.batch + 1):
+        b = Batch(*(torch.from_numpy(each).to(device) for each in draw_batch(sources, view, rng)))
+        shown = channels_of(b.depth, b.camera, MULTIPLE), in_other_light(b.rgb, b.kept, fineness * MULTIPLE)
+        looked_at.append(shown)
+    kinds = len(notes_of(options.start).categories)
+    return unfolded(options.start, kinds, len(ROOMS), looked_at, options.start_number).state_dict()
 
 
 def _mean_of(checkpoint: Path) -> dict[str, Tensor]:
@@ -157,10 +163,14 @@ class Run:
         self.rng = np.random.default_rng(options.seed)
         rendered = Shards(options.shards)
         real = [Shards(options.real / "training")] if options.real else []
+        photos = [Shards(options.photos / "training")] if options.photos else []
         count = round(options.batch * options.real_share) if real else 0
-        self.sources = [(rendered, options.batch - count), *((one, count) for one in real)]
-        coarse = coarse_weights(real[0]) if real else torch.ones(40)
-        self.losses = Losses(fine_weights(rendered, self.rng), coarse).to(self.device)
+        few = round(options.batch * options.photo_share) if photos else 0
+        self.sources = [(rendered, options.batch - count - few), *((one, count) for one in real)]
+        self.sources += [(one, few) for one in photos]
+        coarse = coarse_weights((real or photos)[0]) if real or photos else torch.ones(40)
+        teachers = Teachers(options.teachers, self.device) if options.teachers else None
+        self.losses = Losses(fine_weights(rendered, self.rng), coarse, teachers).to(self.device)
         self.network = _begun(options, self.device, self.sources)
         self.compiled = torch.compile(self.network) if options.compiled else self.network
         # A running mean of the weights generalises better than the last ones.
@@ -231,8 +241,8 @@ def _halved(state: dict[str, Tensor]) -> dict[str, Tensor]:
 
 def fit(options: Options) -> None:
     """Train until the time is over."""
-    run = Run(options)
     begin = shown = saved = measured = perf_counter()
+    run = Run(options)
     end = min(options.minutes - run.spent, options.sitting)
     while (here := (perf_counter() - begin) / 60.0) < end:
         done = (run.spent + here) / options.minutes

@@ -15,6 +15,7 @@ SMOOTHING = 0.03
 # Labels without a class of their own are loose ("other prop" also where nobody labelled): they count less.
 WEIGHT_OF_OTHERS = 0.25
 ROOM_SHARE, FLOOR_SHARE = 0.15, 0.2
+TAUGHT = 0.4  # the share of teachers beside labels
 
 
 def groups() -> Tensor:
@@ -57,11 +58,13 @@ class Losses(nn.Module):
     Args:
         fine: weight of each category.
         coarse: weight of each class of the real labels.
+        teachers: networks whose probabilities are learnt too (``distil.py``).
     """
 
-    def __init__(self, fine: Tensor, coarse: Tensor) -> None:
+    def __init__(self, fine: Tensor, coarse: Tensor, teachers: nn.Module | None = None) -> None:
         """Keep the weights and the groups."""
         super().__init__()
+        self.teachers = teachers
         self.register_buffer("fine", fine)
         self.register_buffer("coarse", coarse)
         self.register_buffer("groups", groups())
@@ -74,18 +77,23 @@ class Losses(nn.Module):
         margin = [pad for size in depth.shape[:0:-1] for pad in (0, -size % MULTIPLE // 2)]
         label = nn.functional.pad(label, margin, value=UNLABELLED).long()
         near = nn.functional.pad(near, margin)
+        real = ((label >= FIRST_COARSE) & (label != UNLABELLED)).flatten(1).any(dim=1)
+        _swap_windows(real, geometry, colour, label, near)
         geometry, colour = (x.to(memory_format=torch.channels_last) for x in (geometry, colour))
         with torch.autocast(device.type, torch.bfloat16, enabled=has_bfloat16(device)):
             score, rooms, offset = network(geometry, colour)
         score = score.float().permute(0, 2, 3, 1)
-        real = ((label >= FIRST_COARSE) & (label != UNLABELLED)).flatten(1).any(dim=1)
         total, parts = score.new_zeros(()), {}
-        for name, rows, part in (("rendered", ~real, self._fine), ("real", real, self._coarse)):
+        for name, rows in (("rendered", ~real), ("real", real)):
             count = int(rows.sum())
             if count:
-                loss, right = part(score[rows], label[rows], near[rows])
+                loss, right = self._of_labels(score[rows], label[rows], near[rows])
                 total = total + loss * (count / len(rows))
                 parts |= {name: loss.detach(), f"{name} right": right}
+        if self.teachers is not None:
+            taught = self._of_teachers(score, self.teachers(geometry, colour), label, near * geometry[:, 6, ::2, ::2])
+            total = (1.0 - TAUGHT) * total + TAUGHT * taught
+            parts |= {"taught": taught.detach()}
         inside = room.sum(dim=1, keepdim=True)
         share = room / inside.clamp_min(1e-3)
         views = -((share * rooms.float().log_softmax(dim=1)).sum(dim=1) * inside[:, 0].clamp_max(1.0)).mean()
@@ -95,20 +103,46 @@ class Losses(nn.Module):
         parts |= {"rooms": views.detach(), "floor": floors.detach()}
         return total + ROOM_SHARE * views + FLOOR_SHARE * floors, parts
 
-    def _fine(self, score: Tensor, label: Tensor, near: Tensor) -> tuple[Tensor, Tensor]:
-        known = label < len(CATEGORIES)
-        flat, truth = score[known], label[known]
+    def _of_labels(self, score: Tensor, label: Tensor, near: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the mean loss over pixels with fine labels and with coarse ones, and the share that is right."""
+        fine = label < len(CATEGORIES)
+        flat, truth = score[fine], label[fine]
         each = nn.functional.cross_entropy(flat, truth, reduction="none", label_smoothing=SMOOTHING)
-        weight = near[known] * self.fine[truth]
-        right = (flat.detach().argmax(dim=1) == truth).float().mean()
-        return (each * weight).sum() / weight.sum().clamp_min(1.0), right
-
-    def _coarse(self, score: Tensor, label: Tensor, near: Tensor) -> tuple[Tensor, Tensor]:
-        known = label != UNLABELLED
-        flat, truth = score[known], label[known] - FIRST_COARSE
+        weight = near[fine] * self.fine[truth]
+        loss, weights = (each * weight).sum(), weight.sum()
+        right, count = (flat.detach().argmax(dim=1) == truth).sum(), truth.numel()
+        coarse = (label >= FIRST_COARSE) & (label != UNLABELLED)
+        flat, truth = score[coarse], label[coarse] - FIRST_COARSE
         log_q = (flat.softmax(dim=1) @ self.groups.T).clamp_min(1e-7).log()
         each = -(1.0 - SMOOTHING) * log_q.gather(1, truth[:, None])[:, 0] - SMOOTHING * log_q[:, :SCORED].mean(dim=1)
-        weight = near[known] * self.coarse[truth]
+        weight = near[coarse] * self.coarse[truth]
+        loss, weights = loss + (each * weight).sum(), weights + weight.sum()
         scored = truth < SCORED
-        right = (log_q.detach()[:, :SCORED].argmax(dim=1) == truth)[scored].float().mean()
-        return (each * weight).sum() / weight.sum().clamp_min(1.0), right
+        right = right + ((log_q.detach()[:, :SCORED].argmax(dim=1) == truth) & scored).sum()
+        return loss / weights.clamp_min(1.0), right / (count + scored.sum()).clamp_min(1)
+
+    def _of_teachers(self, score: Tensor, told: Tensor, label: Tensor, near: Tensor) -> Tensor:
+        """Return the cross entropy with what teachers say of the kinds that they know, but where another is true."""
+        known = told.shape[-1]
+        near = near * ((label < known) | (label >= FIRST_COARSE))
+        each = -(told * score[..., :known].log_softmax(dim=-1)).sum(dim=-1)
+        return (each * near).sum() / near.sum().clamp_min(1.0)
+
+
+def _swap_windows(real: Tensor, geometry: Tensor, colour: Tensor, label: Tensor, near: Tensor) -> None:
+    """Let pairs of real frames swap a window, in place, in half of the batches (CutMix; Yun et al., ICCV 2019)."""
+    rows = real.nonzero()[:, 0]
+    one, two = rows[: len(rows) // 2], rows[len(rows) // 2 :][: len(rows) // 2]
+    h, w = label.shape[1:]
+    draw = torch.rand(5).tolist()
+    if draw[4] < 0.5 or not len(one):
+        return
+    tall, wide = (round(size * (0.35 + 0.4 * share)) for size, share in zip((h, w), draw, strict=False))
+    y, x = round(draw[2] * (h - tall)), round(draw[3] * (w - wide))
+    for array in (geometry, colour, label, near):
+        n = array.shape[-1] // w  # of the array's pixels to a cell of the output
+        window = (..., slice(n * y, n * (y + tall)), slice(n * x, n * (x + wide)))
+        first, second = array[one], array[two]
+        kept = first[window].clone()
+        first[window], second[window] = second[window], kept
+        array[one], array[two] = first, second

@@ -10,7 +10,7 @@ rate they would tear the network apart. So each convolution is enlarged to the s
 normalisations learn no statistics.
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +30,7 @@ _TOWER = "tower."
 
 
 def unfolded(
-    path: Path, categories: int, rooms: int, batches: Iterable[tuple[Tensor, Tensor]], number: int = 0
+    path: Path, categories: int, rooms: int, batches: Sequence[tuple[Tensor, Tensor]], number: int = 0
 ) -> RoomNetwork:
     """Return the network of an ONNX file that ``write_onnx`` wrote.
 
@@ -38,7 +38,7 @@ def unfolded(
         path: the file.
         categories: how many the network scores.
         rooms: how many kinds of room.
-        batches: geometry and colour of some frames, to take the statistics from; each is looked at once.
+        batches: geometry and colour of some frames, to take the statistics from; none if it learns no more.
         number: which, of several that answer together.
 
     Raises:
@@ -75,8 +75,10 @@ def unfolded(
         if name in arrays:
             value.copy_(torch.from_numpy(arrays[name]).reshape(value.shape))
     network.load_state_dict(state)
-    _take_statistics(network.eval(), normed, batches)
-    return network
+    network.eval()
+    if batches:
+        _take_statistics(network.to(batches[0][0].device), normed, batches)
+    return network.cpu()
 
 
 def has_tower(path: Path) -> bool:
@@ -127,10 +129,11 @@ def _norm_of(convolution: str, named: dict[str, nn.Module]) -> str | None:
 def _take_statistics(
     network: RoomNetwork,
     normed: list[tuple[nn.Conv2d, nn.BatchNorm2d]],
-    batches: Iterable[tuple[Tensor, Tensor]],
+    batches: Sequence[tuple[Tensor, Tensor]],
 ) -> None:
     """Give each normalisation the mean and spread of what it is fed, and undo them in its scale and shift."""
-    sums = {id(norm): torch.zeros(3, norm.num_features, dtype=torch.float64) for _, norm in normed}
+    device = batches[0][0].device
+    sums = {id(n): torch.zeros(3, n.num_features, dtype=torch.float64, device=device) for _, n in normed}
 
     def look(module: nn.Module, inputs: tuple[Tensor, ...]) -> None:
         x = inputs[0].double()
