@@ -18,6 +18,7 @@ import numpy as np
 import tyro
 from training.pixels.borrowed import borrowed_furniture
 from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED, room_of
+from training.pixels.things import views_of_things, with_things
 
 from avlmaps.core.camera import Pinhole
 from avlmaps_sim.furniture.catalogue import Families
@@ -51,6 +52,10 @@ class Options:
     """Families of shapes."""
     furniture: Path | None = None
     """Folder of artists' models (``borrowed.py``), which furnish half of the homes; those of ``which`` alone."""
+    things: Path | None = None
+    """Folder of models of small things (``things.py``), which then lie about; those of ``which`` alone."""
+    at_things: float = 0.35
+    """Share of views that look at one of these from near."""
     lived_in: float = 0.8
     """Share of homes with people, clothes, papers and shower curtains in them (``avlmaps_sim.homes.lived_in``)."""
     mirrors: float = 0.6
@@ -73,6 +78,8 @@ def scene_of(seed: int, options: Options, rng: np.random.Generator) -> Scene:
     scene = with_oddities(scene, rng)
     if rng.random() < options.lived_in:
         scene = lived_in(scene, rng, options.which)
+    if options.things is not None:
+        scene = with_things(scene, options.things, rng, options.which)
     return replace(scene, mirrors=bool(rng.random() < options.mirrors))
 
 
@@ -143,9 +150,13 @@ def add_home(shard: Shard, seed: int, options: Options) -> None:
     names = scene.categories
     number = np.array([_NAME.get(name, UNLABELLED) for name in names] + [UNLABELLED], np.uint8)
     dull = np.isin((*names, ""), ("wall", "floor", "ceiling", ""))
-    held = round(options.in_hands * options.frames_per_home)
-    numbers = ((ON_A_ROBOT, options.frames_per_home - held), (IN_HANDS, held))
-    views = [random_views(scene, rng, count, camera_of(rng), stance) for stance, count in numbers if count]
+    near = round(options.at_things * options.frames_per_home) if options.things is not None else 0
+    heights = [(IN_HANDS if rng.random() < options.in_hands else ON_A_ROBOT).height_m for _ in range(near)]
+    views = [views_of_things(scene, rng, camera_of(rng), heights)] if near else []
+    left = options.frames_per_home - sum(map(len, views))
+    held = round(options.in_hands * left)
+    numbers = ((ON_A_ROBOT, left - held), (IN_HANDS, held))
+    views += [random_views(scene, rng, count, camera_of(rng), stance) for stance, count in numbers if count]
     for pose in np.concatenate(views):
         camera = camera_of(rng)
         view = renderer.render(camera, pose)
