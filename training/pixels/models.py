@@ -170,30 +170,29 @@ def simplified(mesh: Mesh, triangles: int) -> Mesh:
     rows = rows[[len(set(corners)) == 3 for corners in triangle[rows].tolist()]]
     triangle = triangle[rows]
     quadric = _quadrics(vertex, triangle)
-    for _ in range(60):
+    for _ in range(100):
         if len(triangle) <= triangles:
             break
-        edge = np.unique(np.sort(np.concatenate([triangle[:, [0, 1]], triangle[:, [1, 2]], triangle[:, [2, 0]]]), axis=1),
-                         axis=0)  # fmt: skip
-        a, b = edge.T
+        ends = np.sort(triangle[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        a, b = np.divmod(np.unique(ends[:, 0] * len(vertex) + ends[:, 1]), len(vertex))
         both = quadric[a] + quadric[b]
         # The best of the two ends and the middle.
         choice = np.stack([vertex[a], vertex[b], (vertex[a] + vertex[b]) / 2], axis=1)
         point = np.concatenate([choice, np.ones((*choice.shape[:2], 1))], axis=2)
-        cost = np.einsum("eki,eij,ekj->ek", point, both, point)
+        cost = np.sum((point @ both) * point, axis=2)
         best = cost.argmin(axis=1)
-        pick = np.arange(len(edge))
+        pick = np.arange(len(a))
         at, cost = choice[pick, best], cost[pick, best] + 1e-9 * size**2 * np.sum((vertex[a] - vertex[b]) ** 2, axis=1)
-        # Edges that are cheapest at both ends shrink together; each takes two triangles.
-        rank = np.empty(len(edge), np.int64)
+        # Of the cheaper edges those that are cheapest at both ends shrink together; each takes two triangles.
+        rank = np.empty(len(a), np.int64)
         rank[np.argsort(cost, kind="stable")] = pick
-        least = np.full(len(vertex), len(edge))
+        least = np.full(len(vertex), len(a))
         np.minimum.at(least, a, rank)
         np.minimum.at(least, b, rank)
         ringed = least.copy()
         np.minimum.at(ringed, a, least[b])
         np.minimum.at(ringed, b, least[a])
-        chosen = np.flatnonzero((ringed[a] == rank) & (ringed[b] == rank))
+        chosen = np.flatnonzero((ringed[a] == rank) & (ringed[b] == rank) & (rank < max(0.12 * len(a), 8)))
         chosen = chosen[np.argsort(rank[chosen])][: max(1, (len(triangle) - triangles + 1) // 2)]
         vertex[a[chosen]], quadric[a[chosen]] = at[chosen], both[chosen]
         to = np.arange(len(vertex))
@@ -327,7 +326,7 @@ def _tablet_propped(rng: np.random.Generator) -> Mesh:
 
 def _tablet_cased(rng: np.random.Generator) -> Mesh:
     slate = _tablet_plain(rng)
-    x, y, z = (float(s) for s in slate.size)
+    x, y = (float(s) for s in slate.size[:2])
     return joined([slate.moved(z=0.004), box((-0.52 * x, -0.53 * y, 0), (0.52 * x, 0.53 * y, 0.006),
                                             _look(rng, "leather", "fabric", "plastic"))])  # fmt: skip
 
@@ -410,14 +409,15 @@ def _jug(rng: np.random.Generator) -> Mesh:
 def _tumbler(rng: np.random.Generator) -> Mesh:
     radius, high = rng.uniform(0.03, 0.042), rng.uniform(0.08, 0.15)
     inner = radius - 0.003
-    return lathe([(rng.uniform(0.75, 1.0) * radius, 0), (radius, high), (inner, high), (0.8 * inner, 0.012), (0, 0.012)],
+    foot = rng.uniform(0.75, 1.0) * radius
+    return lathe([(foot, 0), (radius, high), (inner, high), (0.8 * inner, 0.012), (0, 0.012)],
                  material("glass", rng))  # fmt: skip
 
 
 def _wine_glass(rng: np.random.Generator) -> Mesh:
     radius, high = rng.uniform(0.03, 0.045), rng.uniform(0.16, 0.24)
-    return lathe([(0.9 * radius, 0), (0.85 * radius, 0.004), (0.005, 0.012), (0.005, 0.45 * high), (radius, 0.65 * high),
-                  (0.8 * radius, high), (0.77 * radius, high), (0.95 * radius, 0.65 * high), (0, 0.48 * high)],
+    return lathe([(0.9 * radius, 0), (0.85 * radius, 0.004), (0.005, 0.012), (0.005, 0.45 * high),
+                  (radius, 0.65 * high), (0.8 * radius, high), (0.77 * radius, high), (0.95 * radius, 0.65 * high), (0, 0.48 * high)],
                  material("glass", rng))  # fmt: skip
 
 
@@ -517,8 +517,8 @@ def _rucksack(rng: np.random.Generator) -> Mesh:
     straps = [tube([(-deep / 2 + 0.01, y, 0.93 * high), (-deep / 2 - 0.05, y, 0.7 * high),
                     (-deep / 2 - 0.04, y, 0.3 * high), (-deep / 2 + 0.01, y, 0.08)], 0.014, other, 6)
               for y in (-0.25 * width, 0.25 * width)]  # fmt: skip
-    grip = tube([(0, -0.04, high - 0.02), (0, -0.03, high + 0.04), (0, 0.03, high + 0.04), (0, 0.04, high - 0.02)], 0.01,
-                other, 6)  # fmt: skip
+    grip = tube([(0, -0.04, high - 0.02), (0, -0.03, high + 0.04), (0, 0.03, high + 0.04), (0, 0.04, high - 0.02)],
+                0.01, other, 6)  # fmt: skip
     return joined([body, pocket, *straps, grip])
 
 
@@ -541,7 +541,8 @@ def _closed_umbrella(rng: np.random.Generator) -> Mesh:
     cloth = lathe(
         [(0.008, 0.06), (0.02, 0.1), (rng.uniform(0.03, 0.055), 0.6 * high), (0.012, 0.75 * high)], look, sides=8
     )
-    stick = tube([(0, 0, 0), (0, 0, high), (0.03, 0, high + 0.05), (0.07, 0, high + 0.03), (0.08, 0, high - 0.02)], 0.008,
+    crook = [(0.03, 0, high + 0.05), (0.07, 0, high + 0.03), (0.08, 0, high - 0.02)]
+    stick = tube([(0, 0, 0), (0, 0, high), *crook], 0.008,
                  _look(rng, "wood", "black", "metal"), 6)  # fmt: skip
     return joined([cloth, stick])
 
