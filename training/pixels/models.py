@@ -416,9 +416,9 @@ def _tumbler(rng: np.random.Generator) -> Mesh:
 
 def _wine_glass(rng: np.random.Generator) -> Mesh:
     radius, high = rng.uniform(0.03, 0.045), rng.uniform(0.16, 0.24)
-    return lathe([(0.9 * radius, 0), (0.85 * radius, 0.004), (0.005, 0.012), (0.005, 0.45 * high),
-                  (radius, 0.65 * high), (0.8 * radius, high), (0.77 * radius, high), (0.95 * radius, 0.65 * high), (0, 0.48 * high)],
-                 material("glass", rng))  # fmt: skip
+    foot = [(0.9 * radius, 0), (0.85 * radius, 0.004), (0.005, 0.012), (0.005, 0.45 * high)]
+    bowl = [(radius, 0.65 * high), (0.8 * radius, high), (0.77 * radius, high), (0.95 * radius, 0.65 * high)]
+    return lathe([*foot, *bowl, (0, 0.48 * high)], material("glass", rng))
 
 
 def _can(rng: np.random.Generator) -> Mesh:

@@ -72,6 +72,7 @@ _CLUMPS = {
     "sink": "plate cup bowl drinking_glass cutlery pan pot jug",
     "floor": "box bag backpack suitcase shoes toy ball basket box bag clothing tool umbrella",
 }  # fmt: skip
+_RARE = frozenset({"rocking horse", "other", "trash can", "plant"})  # homes hold many already, or one model is all
 # Families of the simulator's own shapes that are of a category which homes do not know, as training worlds call them.
 _FAMILIES = {
     ("bag", "backpack"): "backpack", ("bag", "suitcase"): "suitcase", ("telephone", "mobile"): "mobile phone",
@@ -82,6 +83,7 @@ _STACKED = frozenset({"plate", "book", "box", "bowl", "paper", "chopping board"}
 _CELL_M, _FLOOR_CELL_M = 0.015, 0.03
 _BANDS_M = (0.008, 0.05, 0.1, 0.18, 0.28, 0.4, 0.6, 0.9, 1.3)  # heights at which it may be free over a surface
 _ROUGH_M = {"soft": 0.05, "floor": 0.03}
+_PIXELS_ACROSS = 24  # how large a thing should be at least in a view of it
 _FLAT, _SMALLEST_M2, _MOST_LEVELS = 0.93, 0.015, 6
 
 
@@ -337,6 +339,8 @@ class _Placed:
     def one(self, category: str) -> None:
         """Put one thing of a category where such things are."""
         rng = self.rng
+        if category in _RARE and rng.random() < 0.7:
+            return
         thing, mesh = self.draw(category)
         if thing.on_wall or (category in ("fire extinguisher", "clock", "towel") and rng.random() < 0.25):
             self.hang(thing, mesh)
@@ -425,12 +429,12 @@ class _Placed:
             if self._fix(thing, turned, np.array([*xy, z]), np.array([*inward, 0.0])):
                 return
 
-    def _fix(self, thing: Thing, mesh: Mesh, place: np.ndarray, away: np.ndarray) -> bool:
+    def _fix(self, thing: Thing, mesh: Mesh, place: np.ndarray, away: np.ndarray, rough_m: float = 0.004) -> bool:
         """Fix a mesh to the surface behind a place, where it lies flat against it and nothing is before it."""
         middle = (mesh.low + mesh.high) / 2
         half = (mesh.high - mesh.low) / 2
         deep = float(np.abs(away) @ (2 * half))
-        start = deep + 0.1
+        start = deep + 0.15
         near = self._near(place - 0.6 - half, place + 0.6 + half)
         across = np.eye(3)[[k for k in range(3) if abs(away[k]) < 0.7]] if abs(away[2]) > 0.7 else np.stack(
             [np.array([-away[1], away[0], 0.0]), np.array([0.0, 0.0, 1.0])])  # fmt: skip
@@ -440,9 +444,9 @@ class _Placed:
         for a, b in ((0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
             beside = a * extent[0] * across[0] + b * extent[1] * across[1]
             hits.append(2 * start * _reach(near, nobody, place + away * start + beside, -2 * start * away, -1))
-        if np.ptp(hits) > 0.004 or not 0.6 * start < hits[0] < 1.4 * start:
+        if np.ptp(hits) > rough_m or not deep + 0.005 < min(hits) < start + 0.15:
             return False
-        at = place + away * (start - hits[0] + deep / 2 + 0.001) - middle
+        at = place + away * (start - min(hits) + deep / 2 + 0.001) - middle
         placed = mesh.moved(*(float(v) for v in at))
         mine_low, mine_high = placed.low - 0.02, placed.high + 0.02
         for other in self.builder.objects[len(self.scene.objects) :]:
@@ -455,7 +459,7 @@ class _Placed:
         """Lean a long thing on a wall."""
         rng, angle = self.rng, self.rng.uniform(0.06, 0.22)
         leaning = mesh.tilted("y", -angle).standing()
-        for _ in range(6):
+        for _ in range(15):
             before = self.count
             area = self.scene.areas[int(rng.integers(len(self.scene.areas)))]
             edge = np.roll(area.polygon, -1, axis=0) - area.polygon
@@ -464,7 +468,7 @@ class _Placed:
             along = edge[number] / max(long, 1e-6)
             inward = np.array([-along[1], along[0]])
             place = np.array([*(area.polygon[number] + along * rng.uniform(0, long)), area.floor_m + mesh.size[2] / 2])
-            self._fix(thing, leaning.turned(float(np.arctan2(*inward[::-1]))), place, np.array([*inward, 0.0]))
+            self._fix(thing, leaning.turned(float(np.arctan2(*inward[::-1]))), place, np.array([*inward, 0.0]), 0.04)
             if self.count > before:
                 return
 
@@ -527,7 +531,7 @@ def with_things(scene: Scene, folder: Path, rng: np.random.Generator, which: Fam
 def views_of_things(
     scene: Scene, rng: np.random.Generator, camera: Pinhole, heights_m: Sequence[tuple[float, float]]
 ) -> np.ndarray:
-    """Return poses of cameras that look at a placed thing in sight, from 0.6 to 2.0 m.
+    """Return poses of cameras that look at a placed thing in sight, from 0.45 to 2.0 m.
 
     Args:
         scene: a home with things.
@@ -544,7 +548,7 @@ def views_of_things(
     corners = scene.mesh.corners().astype(np.float64)
     names, half_field = sorted(kinds), np.arctan(0.5 * np.array([camera.width / camera.fx, camera.height / camera.fy]))
     poses: list[np.ndarray] = []
-    for _ in range(8 * len(heights_m) if names else 0):
+    for _ in range(25 * len(heights_m) if names else 0):
         if len(poses) == len(heights_m):
             break
         its = kinds[names[int(rng.integers(len(names)))]]
@@ -555,14 +559,18 @@ def views_of_things(
         middles = spaces[floor]
         apart = np.linalg.norm(np.column_stack([middles, np.full(len(middles), eye_z)]) - target, axis=1)
         pitch = np.arcsin(np.clip((target[2] - eye_z) / np.maximum(apart, 0.1), -1, 1))
-        good = np.flatnonzero((apart > 0.6) & (apart < 2.0) & (pitch > -1.0) & (pitch < 0.5))
+        # Small things from nearer, so that they fill enough pixels.
+        across = np.sqrt(np.prod(np.sort(scene.objects[number].size)[1:]))
+        far = float(np.clip(camera.fx * across / _PIXELS_ACROSS, 0.7, 2.0))
+        near = 0.45 if far < 1.0 else 0.6
+        good = np.flatnonzero((apart > near) & (apart < far) & (pitch > -1.1) & (pitch < 0.8))
         if not len(good):
             continue
         for pick in good[rng.integers(len(good), size=3)]:
             eye = np.array([*middles[pick], eye_z])
             if _reach(corners, scene.instance, eye, target - eye, number) > 1.0:
-                heading = np.arctan2(*(target - eye)[1::-1]) + rng.uniform(-0.6, 0.6) * half_field[0]
-                raised = pitch[pick] + rng.uniform(-0.6, 0.6) * half_field[1]
+                heading = np.arctan2(*(target - eye)[1::-1]) + rng.uniform(-0.4, 0.4) * half_field[0]
+                raised = pitch[pick] + rng.uniform(-0.4, 0.4) * half_field[1]
                 roll = np.deg2rad(np.clip(rng.normal(0, 3.0), -9, 9))
                 poses.append(camera_poses(eye[None], *(np.array([v]) for v in (heading, raised, roll)))[0])
                 break

@@ -157,8 +157,10 @@ def add_home(shard: Shard, seed: int, options: Options) -> None:
     held = round(options.in_hands * left)
     numbers = ((ON_A_ROBOT, left - held), (IN_HANDS, held))
     views += [random_views(scene, rng, count, camera_of(rng), stance) for stance, count in numbers if count]
-    for pose in np.concatenate(views):
-        camera = camera_of(rng)
+    aimed = len(views[0]) if near else 0
+    for number_of_view, pose in enumerate(np.concatenate(views)):
+        # Of what is small narrow views show more.
+        camera = max((camera_of(rng) for _ in range(3 if number_of_view < aimed else 1)), key=lambda one: one.fx)
         view = renderer.render(camera, pose)
         if dull[view.category].mean() > 0.97 and rng.random() < 0.9:  # a bare wall teaches little
             continue
