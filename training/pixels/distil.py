@@ -27,11 +27,10 @@ class Teachers(nn.Module):
     def __init__(self, folder: Path, device: torch.device) -> None:
         super().__init__()
         self.notes = [notes_of(folder / f"{name}.onnx") for name in (DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS)]
-        kinds = len(self.notes[0].categories)
         first, second = (folder / f"{name}.onnx" for name in (DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS))
         self.temperatures = _temperatures(first)
-        networks = [unfolded(first, kinds, len(ROOMS), [], number) for number in range(len(self.temperatures))]
-        networks.append(unfolded(second, kinds, len(ROOMS), []))
+        networks = [unfolded(first, len(ROOMS), [], number) for number in range(len(self.temperatures))]
+        networks.append(unfolded(second, len(ROOMS), []))
         self.networks = nn.ModuleList(networks)
         self.to(device, memory_format=torch.channels_last).requires_grad_(requires_grad=False).eval()
 

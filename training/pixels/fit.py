@@ -20,7 +20,7 @@ from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from training.pixels.batches import Batch, Shards, View, batches, draw_batch
 from training.pixels.distil import Teachers
-from training.pixels.export import load_network, notes_of
+from training.pixels.export import load_network
 from training.pixels.labels import CATEGORIES, ROOMS
 from training.pixels.light import in_other_light
 from training.pixels.losses import Losses, coarse_weights, fine_weights
@@ -77,7 +77,7 @@ class Options:
     start: Path | None = None
     """Begin with these weights: a file that ships (``.onnx``), or a checkpoint, its mean."""
     start_number: int = 0
-    """Which network of a file that ships several, as ``scene_encoder.onnx`` does."""
+    """Which network of a file that holds several, as that of ``pixels-9`` does."""
     widths: tuple[int, int, int, int, int] = WIDTHS
     """Channels at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's size."""
     dropout: tuple[float, float] = (0.1, 0.1)
@@ -139,8 +139,7 @@ def _shipped(options: Options, sources: list[tuple[Shards, int]], device: torch.
         b = Batch(*(torch.from_numpy(each).to(device) for each in draw_batch(sources, view, rng)))
         shown = channels_of(b.depth, b.camera, MULTIPLE), in_other_light(b.rgb, b.kept, fineness * MULTIPLE)
         looked_at.append(shown)
-    kinds = len(notes_of(options.start).categories)
-    return unfolded(options.start, kinds, len(ROOMS), looked_at, options.start_number).state_dict()
+    return unfolded(options.start, len(ROOMS), looked_at, options.start_number).state_dict()
 
 
 def _mean_of(checkpoint: Path) -> dict[str, Tensor]:

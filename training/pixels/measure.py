@@ -65,14 +65,17 @@ def rendered_figures(network: RoomNetwork | Shipped, shards: Shards, count: int 
 def probabilities(
     network: RoomNetwork | Shipped, geometry: np.ndarray, colour: np.ndarray, flip: bool = False
 ) -> torch.Tensor:
-    """Return (k, h, w) probabilities of a padded frame; ``flip``: the mean with those of its mirror image."""
+    """Return (k, h, w) probabilities of a padded frame; ``flip``: the mean with those of its mirror image.
+
+    Categories that were added after the network's have none.
+    """
     g, c = torch.from_numpy(geometry), torch.from_numpy(colour)
     p = network(g, c)[0].float().softmax(dim=1)[0]
     if flip:
         mirrored = g.flip(3)
         mirrored[:, 4] = -mirrored[:, 4]
         p = (p + network(mirrored, c.flip(3))[0].float().softmax(dim=1)[0].flip(2)) / 2
-    return p
+    return torch.nn.functional.pad(p, (0, 0, 0, 0, 0, len(CATEGORIES) - len(p)))
 
 
 @dataclass(frozen=True)

@@ -29,14 +29,11 @@ _NORM = {
 _TOWER = "tower."
 
 
-def unfolded(
-    path: Path, categories: int, rooms: int, batches: Sequence[tuple[Tensor, Tensor]], number: int = 0
-) -> RoomNetwork:
+def unfolded(path: Path, rooms: int, batches: Sequence[tuple[Tensor, Tensor]], number: int = 0) -> RoomNetwork:
     """Return the network of an ONNX file that ``write_onnx`` wrote.
 
     Args:
         path: the file.
-        categories: how many the network scores.
         rooms: how many kinds of room.
         batches: geometry and colour of some frames, to take the statistics from; none if it learns no more.
         number: which, of several that answer together.
@@ -49,7 +46,7 @@ def unfolded(
         len(arrays[convolutions[name][1]]) for name in ("stem.0.0", "down2.0.0", "down3.0.0", "down4.0.0", "down5.0.0")
     )
     towered = any(name.startswith(_TOWER) for name in convolutions)
-    network = RoomNetwork(categories, rooms, widths, has_tower=towered)
+    network = RoomNetwork(len(arrays[convolutions["score"][0]]), rooms, widths, has_tower=towered)
     state, named = network.state_dict(), dict(network.named_modules())
     left = {name for name, module in named.items() if isinstance(module, nn.Conv2d)} - convolutions.keys()
     if left:

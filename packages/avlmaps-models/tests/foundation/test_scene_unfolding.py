@@ -38,7 +38,7 @@ def shipped(tmp_path: Path) -> tuple[Path, RoomNetwork]:
 
 def test_it_scores_as_the_file_does(shipped: tuple[Path, RoomNetwork]) -> None:
     path, network = shipped
-    again = unfolded(path, CATEGORIES, ROOMS, pictures(3, 2)).eval()
+    again = unfolded(path, ROOMS, pictures(3, 2)).eval()
     for geometry, colour in pictures(2, 3):
         with torch.no_grad():
             for one, other in zip(network(geometry, colour), again(geometry, colour), strict=True):
@@ -53,12 +53,12 @@ def test_of_several_networks_in_a_file_each_can_be_taken(shipped: tuple[Path, Ro
     write_onnx(MeanOf(pair, [0.9, 1.2]), tmp_path / "both.onnx")
     geometry, colour = pictures(1, 3)[0]
     for number, network in enumerate(pair):
-        again = unfolded(tmp_path / "both.onnx", CATEGORIES, ROOMS, pictures(3, 2), number).eval()
+        again = unfolded(tmp_path / "both.onnx", ROOMS, pictures(3, 2), number).eval()
         with torch.no_grad():
             one, other = network(geometry, colour)[0], again(geometry, colour)[0]
         np.testing.assert_allclose(one.numpy(), other.numpy(), rtol=0.05, atol=0.05)  # 8 bit in the file
     with pytest.raises(ValueError, match="no network number 2"):
-        unfolded(tmp_path / "both.onnx", CATEGORIES, ROOMS, pictures(1, 2), 2)
+        unfolded(tmp_path / "both.onnx", ROOMS, pictures(1, 2), 2)
 
 
 def test_networks_that_answer_together_give_the_mean_of_their_probabilities(tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_it_computes_nearly_the_same_while_it_learns(shipped: tuple[Path, RoomNe
     """In training the statistics are those of the batch; they were taken from such batches."""
     path, _ = shipped
     seen = pictures(1, 2)
-    again = unfolded(path, CATEGORIES, ROOMS, seen)
+    again = unfolded(path, ROOMS, seen)
     with torch.no_grad():
         still = again.eval()(*seen[0])[0]
         for module in again.modules():
@@ -89,7 +89,7 @@ def test_it_computes_nearly_the_same_while_it_learns(shipped: tuple[Path, RoomNe
 
 def test_its_convolutions_are_as_large_as_trained_ones(shipped: tuple[Path, RoomNetwork]) -> None:
     """Steps of one size would otherwise tear small weights apart."""
-    again = unfolded(shipped[0], CATEGORIES, ROOMS, pictures(1, 2))
+    again = unfolded(shipped[0], ROOMS, pictures(1, 2))
     weights = [p for name, p in again.named_parameters() if p.ndim == 4 and "score" not in name]
     sizes = [weight.square().mean().sqrt().item() for weight in weights]
     np.testing.assert_allclose(sizes, TRAINED_RMS, rtol=1e-4)
@@ -105,4 +105,4 @@ def test_the_file_of_another_network_is_refused(shipped: tuple[Path, RoomNetwork
     model.graph.node.extend(kept)
     onnx.save(model, tmp_path / "other.onnx")
     with pytest.raises(ValueError, match=r"no weights for up1\.first, up1\.second"):
-        unfolded(tmp_path / "other.onnx", CATEGORIES, ROOMS, pictures(1, 0))
+        unfolded(tmp_path / "other.onnx", ROOMS, pictures(1, 0))
