@@ -21,7 +21,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from unique_identifier_msgs.msg import UUID as GoalUuid  # noqa: N811 - a class
 
-from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.errors import AvlmapsError, NavigationError
 from avlmaps_ros.goals import ActionGoal, End, SentGoal
 from avlmaps_ros.link import Line
 from avlmaps_ros.messages import interface, sanitize_line
@@ -52,13 +52,19 @@ def filled(message: Any, values: Mapping[str, Any]) -> Any:
 
 
 def joined(name: str) -> tuple[Context, Node, SingleThreadedExecutor]:
-    """Join the network by a node in a context of its own, which leaves the signals of the process alone."""
+    """Join the network by a node in a context of its own, which leaves the signals of the process alone.
+
+    ``NavigationError``: it cannot be joined.
+    """
     context = Context()
-    context.init(args=[])
-    node = Node(
-        f"{name}_{os.getpid()}_{next(_names)}", context=context, use_global_arguments=False,
-        start_parameter_services=False, enable_rosout=False,
-    )  # fmt: skip
+    try:
+        context.init(args=[])
+        node = Node(
+            f"{name}_{os.getpid()}_{next(_names)}", context=context, use_global_arguments=False,
+            start_parameter_services=False, enable_rosout=False,
+        )  # fmt: skip
+    except RuntimeError as fault:  # RCLError is one
+        raise NavigationError(f"ROS 2 cannot be joined ({sanitize_line(str(fault))}); check ROS_DOMAIN_ID.") from None
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     return context, node, executor
@@ -82,8 +88,6 @@ class Network(Line):
         self._thread.start()
 
     def subscribe(self, topic: str, kind: str, hand_on: Callable[[Any], None], every_s: float = 0.0) -> None:
-        del every_s
-
         def received(message: Any) -> None:
             try:
                 hand_on(message)
@@ -265,10 +269,8 @@ class NativeNav2(Nav2Session):
         kind, _, client = self._clients_of(goal.task)
 
         def ended(future: Any) -> None:
-            if future.result().status == 0:
-                self._over(goal, End.FAILED, "Nav2 does not know the goal any more; it was restarted")
-            else:
-                self._over(goal, *_end_of(future.result()))
+            forgot = End.FAILED, "Nav2 does not know the goal any more; it was restarted"
+            self._over(goal, *(_end_of(future.result()) if future.result().status else forgot))
 
         if client.service_is_ready():
             request = kind.Impl.GetResultService.Request(goal_id=_uuid(goal.alias))

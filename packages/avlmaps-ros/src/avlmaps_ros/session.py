@@ -149,7 +149,6 @@ class Session(ABC):
 
     def ask(self, server: str) -> bool:
         """Ask whether an action server is there; return whether an answer may come, to `Servers.answered`."""
-        del server
         return False
 
     @abstractmethod

@@ -133,9 +133,10 @@ def test_a_goal_that_only_the_robots_own_map_has_blocked_is_moved(robot):
     assert max(abs(sent["x"] - 0.75), abs(sent["y"])) > 0.25
 
 
-def test_without_a_robot_one_sentence_says_what_is_missing(monkeypatch):
-    monkeypatch.setenv("ROS_DOMAIN_ID", "101")
-    with pytest.raises(NavigationError, match=r"ROS 2, domain 101, does not report its pose: nothing arrives on /tf"):
+@pytest.mark.parametrize(("domain", "says"), [("101", "101, does not report its pose: nothing"), ("", "be joined")])
+def test_without_a_robot_one_sentence_says_what_is_missing(monkeypatch, domain, says):
+    monkeypatch.setenv("ROS_DOMAIN_ID", domain or "none")
+    with pytest.raises(NavigationError, match=says):
         opened(pose_timeout_s=1.0)
 
 
