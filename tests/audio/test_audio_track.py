@@ -139,7 +139,7 @@ def test_a_video_without_sound_is_told(tmp_path: Path) -> None:
         video.width, video.height, video.pix_fmt = 64, 48, "yuv420p"
         container.mux(video.encode(av.VideoFrame.from_ndarray(np.zeros((48, 64, 3), np.uint8), format="rgb24")))
         container.mux(video.encode())
-    assert refusal(tmp_path / "a.mp4") == "FILE has no audio stream; give a file of its own (audio)."
+    assert refusal(tmp_path / "a.mp4") == "FILE has no audio stream; give a file that has one."
 
 
 def test_a_video_that_was_cut_off_is_told(tmp_path: Path) -> None:

@@ -12,13 +12,7 @@ from avlmaps.cli.main import _models_in_force as models_in_force
 from avlmaps.cli.query import Query
 from avlmaps.core.extras import install_command
 from avlmaps.core.registry import Backend, Kind, find, forget_loaded
-from avlmaps.perception.models import (
-    ModelSettings,
-    availability,
-    from_environment,
-    model_settings,
-    using_models,
-)
+from avlmaps.perception.models import ModelSettings, availability, from_environment, model_settings, using_models
 from helpers.light_files import write_light
 
 

@@ -50,9 +50,7 @@ def injected_server(folder: Path, service: Service | None = None) -> Iterator[tu
         patch.object(AVLMap, "sounds", lambda *a, **k: [_kind(one, names) for one in sounds(*a, **k)]),
         patch.object(AVLMap, "rooms", lambda *a, **k: named(rooms(*a, **k), name=names[0] if names else "")),
         TestClient(
-            create_app(opened, driving.mounts),
-            base_url="http://127.0.0.1:8750",
-            raise_server_exceptions=False,
+            create_app(opened, driving.mounts), base_url="http://127.0.0.1:8750", raise_server_exceptions=False
         ) as client,
     ):
         view = render(Room().scene, CAMERA, Room().walk()[100])

@@ -11,14 +11,7 @@ from avlmaps.core.columns import concat
 from avlmaps.core.progress import silence
 from avlmaps.maps.fusion import free_space
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.free_space import (
-    FreeViews,
-    block_size,
-    clean,
-    count_through,
-    free_views,
-    smear_reach,
-)
+from avlmaps.maps.fusion.free_space import FreeViews, block_size, clean, count_through, free_views, smear_reach
 from avlmaps.maps.fusion.sensor import KINECT, NONE, PERFECT, SensorModel
 from avlmaps.maps.fusion.voxel_sums import VoxelViews
 from avlmaps.maps.grid import GridSpec

@@ -41,11 +41,7 @@ class InBatches(Pixels):
         return ""
 
 
-@given(
-    bad=st.sets(st.integers(0, 11)),
-    cuts=st.sets(st.integers(1, 11), max_size=3),
-    size=st.integers(1, 5),
-)
+@given(bad=st.sets(st.integers(0, 11)), cuts=st.sets(st.integers(1, 11), max_size=3), size=st.integers(1, 5))
 def test_each_frame_comes_in_its_place_with_its_own_features(bad: set[int], cuts: set[int], size: int) -> None:
     walk, encoder = Walk(12, bad=tuple(bad)), InBatches(size)
     edges = [0, *sorted(cuts), 12]

@@ -211,7 +211,7 @@ DAMAGED: dict[str, tuple[Callable[[Path], object], str]] = {
     "of tomorrow": (edited(lambda said: said.update(schema_version=3)), "has schema version 3"),
     "a field is missing": (edited(lambda said: said.pop("rig")), "map.json is damaged: Object missing"),
     "no camera": (edited(lambda said: said["rig"]["depth"].update(fx=-1.0)), "map.json is damaged: a camera needs"),
-    "no setting": (edited(lambda said: said["settings"]["frames"].update(step=0)), "map.json is damaged: frames.step"),
+    "no setting": (edited(lambda said: said["settings"]["frames"].update(step=0)), "damaged: step of FrameSettings"),
     "no voxels": (edited(lambda said: said.update(voxel_size_m=0.0)), "map.json is damaged: voxel_size_m"),
     "other counts": (edited(lambda said: said["counts"].update(voxels=7)), "its counts are not those of the files"),
     "a file of others": (edited(lambda said: said["files"].update({"../x.npy": {"bytes": 1, "sha256": ""}})), "../x"),
@@ -261,6 +261,15 @@ def test_no_map_is_one_sentence_that_says_what_is_there(tmp_path: Path, copied: 
         with pytest.raises(MapError, match="by this program at this moment"), lock_folder(tmp_path / "empty"):
             pass
     assert not is_locked(tmp_path / "empty")
+
+
+def test_a_file_without_rights_is_said_to_be_one(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:  # as safetensors says so, whoever runs the test
+        raise FileNotFoundError
+
+    monkeypatch.setattr("safetensors.safe_open", refused)
+    with pytest.raises(MapError, match=r"voxels\.safetensors may not be read; give yourself the right to, or restore"):
+        read_arrays(copied / "voxels.safetensors")
 
 
 def test_a_map_replaced_while_it_is_opened_is_opened_anew(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -234,8 +234,7 @@ def test_what_is_no_place_is_answered_without_a_warning(number):
 
 
 @given(
-    low=st.tuples(st.floats(0.6, 2.0), st.floats(-0.5, 1.5)),
-    size=st.tuples(st.floats(0.05, 1.5), st.floats(0.05, 2.5)),
+    low=st.tuples(st.floats(0.6, 2.0), st.floats(-0.5, 1.5)), size=st.tuples(st.floats(0.05, 1.5), st.floats(0.05, 2.5))
 )
 def test_no_way_leads_through_an_area_that_a_person_forbade(low, size):
     """A path round it where there is one, never nearer than the body's radius, and none where it parts the floor."""

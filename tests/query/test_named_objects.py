@@ -17,14 +17,7 @@ from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.objects import FeatureVoxels, colour_in, object_factor
 from avlmaps.query.settings import HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import (
-    ClosestWords,
-    EncodedWord,
-    Vocabulary,
-    feature_scores,
-    least_score_to_count,
-    margins_of,
-)
+from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary, feature_scores, least_score_to_count, margins_of
 
 NAMES = ("chair", "dining table", "coffee table", "floor", "other")
 MEANT = {

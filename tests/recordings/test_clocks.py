@@ -79,11 +79,7 @@ def test_messages_that_arrive_late_and_catch_up_are_no_gap(tmp_path: Path) -> No
     assert loudest_s(track.read().samples, track.start_s) == pytest.approx(2.5, abs=0.01)
 
 
-@given(
-    st.lists(st.floats(0.02, 0.3), min_size=2, max_size=40),
-    st.data(),
-    st.floats(-5.0, 5.0),
-)
+@given(st.lists(st.floats(0.02, 0.3), min_size=2, max_size=40), st.data(), st.floats(-5.0, 5.0))
 def test_silences_put_every_message_at_its_time(lengths: list[float], data: st.DataObject, start_s: float) -> None:
     """Whatever is dropped and however late the others come, a message that came in time is placed when it came."""
     lengths_s = np.array(lengths)

@@ -150,11 +150,20 @@ def test_frames_without_a_later_pose_are_left_out(tmp_path: Path) -> None:
 
 
 def test_intrinsics_of_a_picture_of_another_size(tmp_path: Path) -> None:
-    read = open_recording(
-        write_folder(tmp_path / "rec"), corrections=Reading(intrinsics=("600,610,320,240@640x480",)).corrections()
-    )
+    path, given = write_folder(tmp_path / "rec"), Reading(intrinsics=("600,610,320,240@640x480",)).corrections()
+    read = open_recording(path, corrections=given)
     assert read.rig.rgb == read.rig.depth == CAMERA
     assert read.rig.registered
+    cropped = {"fx": 60.0, "fy": 61.0, "cx": 40.0, "cy": 24.0, "width": 80, "height": 48}
+    with pytest.raises(RecordingError, match="of another shape: were they cropped"):
+        open_recording(described(path, intrinsics={"rgb": cropped}))
+    assert open_recording(path, corrections=given).rig.depth == CAMERA
+    assert validate(path) and not validate(path, corrections=given)
+    with pytest.raises(RecordingError, match=r"of 64x64, pictures of another shape \(64x48\)"):
+        open_recording(path, corrections=Reading(intrinsics=("60,61,32,24@64x64",)).corrections())
+    small = {"fx": 30.0, "fy": 30.5, "cx": 16.0, "cy": 12.0, "width": 32, "height": 24}
+    read = open_recording(described(path, intrinsics={"rgb": small}))
+    assert read.rig.rgb == CAMERA and "32x24 are scaled" in read.notices[0]
 
 
 def test_one_camera_does_not_do_for_two(tmp_path: Path) -> None:

@@ -184,13 +184,27 @@ def test_a_broken_frame_is_met_when_it_is_asked_for_and_named(tmp_path: Path):
     (path / "rgb/000003.png").unlink()
     (path / "frames.csv").write_text("".join(f"{i:06d},{i / 10}\n" for i in range(5)))
     recording = open_recording(path)
-    with pytest.raises(RecordingError, match=r"depth/000002.png cannot be decoded \(100 bytes\)"):
+    with pytest.raises(RecordingError, match=r"depth/000002.png is truncated \(100 bytes\)"):
         recording.frame(2)
     with pytest.raises(RecordingError, match=r"rgb/000003.png is missing"):
         recording.frame(3)
     assert recording.frame(4).index == 4
     with pytest.raises(IndexError, match="there is no frame 5; the recording has 5"):
         recording.frame(5)
+
+
+def test_pictures_may_be_of_any_kind(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    for index, (colour, depth) in enumerate([(".bmp", ".npy"), (".tiff", ".tiff")]):
+        rgb, deep = path / f"rgb/{index:06d}.png", path / f"depth/{index:06d}.png"
+        rgb.unlink(), deep.unlink()
+        cv2.imwrite(str(rgb.with_suffix(colour)), shot(index).rgb[..., ::-1])
+        if depth == ".npy":
+            np.save(deep.with_suffix(depth), metres(shot(index).depth_mm))
+        else:
+            cv2.imwrite(str(deep.with_suffix(depth)), shot(index).depth_mm)
+    _assert_same_frames(open_recording(path))
+    assert not validate(path)
 
 
 def test_a_video_may_hold_the_colour(tmp_path: Path):
@@ -397,12 +411,13 @@ REFUSED: list[tuple[Callable[[Path], object], str]] = [
     (with_line("stamp_s,tx,ty,tz,qx,qy,qz,qx", 0), "'qx' and 'qx' both name the column qx"),
     (with_line("stamp_s,tx,ty,tz,qx,qy,qz", 0), "the column qw is missing"),
     (with_line("stamp_s,tx [ft],ty [ft],tz [ft],qx,qy,qz,qw", 0), "'tx [ft]' is none of the columns"),
-    (
-        with_depth_of(24, 32),
-        "intrinsics of rgb only (64x48), but depth pictures are 32x24; add intrinsics.depth",
-    ),
+    (with_depth_of(24, 32), "intrinsics of rgb only (64x48), but depth pictures are 32x24; add intrinsics.depth"),
     (with_depth_of(64, 48), "but depth pictures are 48x64"),
     (with_file("frames.csv", b"name,stamp_s\nnone,0\n"), "without their extension"),
+    (
+        with_file("frames.csv", b"000001,100\n000002,100.1\n"),
+        "No frame lies within poses.csv (0.00 to 0.40 s): the frames go from 100.00 to 100.10 s; check that both",
+    ),
 ]
 
 

@@ -24,7 +24,7 @@ def test_dates_are_seconds() -> None:
 @pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
 def test_the_pace_of_a_camera_tells_the_unit(rate_hz: float, factor: float, unit: str) -> None:
     stamps_s = np.arange(60) / rate_hz * factor
-    if np.median(np.diff(stamps_s)) > 10.0:
+    if np.median(np.diff(stamps_s)) > 10.0 and stamps_s[-1] <= 1e10:  # later stamps are dates
         assert f"look like {unit};" in pace_fault(stamps_s, "frames")
         assert f"look like {unit};" in pace_fault(stamps_s, "frames", 1.0 / rate_hz)
     later = stamps_s + 1e13  # since a robot was started, no date

@@ -8,6 +8,7 @@ import pytest
 import soundfile
 from recording_scenes import save_depth, save_rgb, write_folder, write_seven_scenes
 
+from avlmaps.cli.info import counted
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.open import open_recording, validate
 
@@ -134,6 +135,24 @@ def test_every_bad_pose_of_a_sequence_is_named_by_its_file(tmp_path: Path):
         "frame-000006.pose.txt",
     ]
     assert [fault.fatal for fault in faults] == [False, True, True]
+
+
+def test_a_file_without_rights_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def refused(*_: object) -> bytes:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("avlmaps.recordings.layout.read_regular", refused)
+    path = write_folder(tmp_path / "walk")
+    with pytest.raises(RecordingError, match=r"recording\.json cannot be read \(Permission denied\); check the file"):
+        open_recording(path)
+
+
+def test_faults_of_one_kind_are_counted(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    for name in range(5):
+        _cut(path / f"depth/{name:06d}.png")
+    lines = counted([str(fault) for fault in validate(path)])
+    assert len(lines) == 4 and "000002.png is truncated" in lines[2] and lines[3] == "and 2 more like it"
 
 
 def test_without_decoding_a_cut_picture_is_found_all_the_same(tmp_path: Path):

@@ -1,5 +1,6 @@
 """`avlmaps info`: describe a map or a recording, and verify it."""
 
+import re
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,7 +18,6 @@ from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.recordings.corrections import Corrections
     from avlmaps.recordings.types import Recording
 
 MAP_MANIFEST = "map.json"
@@ -26,6 +26,8 @@ DECODED_BY_INFO = 100
 # Further names of a sound are shown from this score on.
 _LIKELY = 0.1
 _MOST_NAMED = 6  # sounds, without --verbose
+_MOST_ALIKE = 3  # faults of one kind
+_PARTICULARS = re.compile(r"'[^']*'|\S*[\d/]\S*")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +71,6 @@ def describe_path(
     verify: bool = False,
     plot: Path | None = None,
     more: Sequence[Path] = (),
-    corrections: "Corrections | None" = None,
     **given: Any,
 ) -> dict[str, Any]:
     """Describe a map or a recording; what is given further says how ``open_recording`` reads it."""
@@ -82,14 +83,24 @@ def describe_path(
     find_format(path, format)  # a place that holds no recording has no faults to list
     faults = [str(fault) for fault in validate(path, format, None if verify else DECODED_BY_INFO, more, **given)]
     try:
-        recording = open_recording([path, *more], format, corrections=corrections, **given)
-    except AvlmapsError:
-        for fault in faults:
+        recording = open_recording([path, *more], format, **given)
+    except AvlmapsError as error:
+        for fault in counted([fault for fault in faults if fault != str(error)]):
             say(f"fault: {fault}")
         raise
     parts = {"more": [str(one) for one in more]} if more else {}
     own = _describe_recording(recording)
     return {"path": str(path), **own, **parts, "consistency": _consistency(recording), "faults": faults}
+
+
+def counted(sentences: Sequence[str]) -> list[str]:
+    """Return the first sentences of each kind, which differ in names and numbers alone, and count the others."""
+    kinds: dict[str, list[str]] = {}
+    for sentence in sentences:
+        kinds.setdefault(_PARTICULARS.sub("", sentence), []).append(sentence)
+    shown = _MOST_ALIKE
+    others = {kind: [f"and {len(of) - shown:,} more like it"] if len(of) > shown else [] for kind, of in kinds.items()}
+    return [line for kind, of in kinds.items() for line in (*of[:shown], *others[kind])]
 
 
 def _consistency(recording: "Recording") -> dict[str, Any] | None:
@@ -254,6 +265,7 @@ _BRIEF_LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
     "ground": lambda ground: ground_lines(ground)[:1],
     "audio": lambda audio: [f"audio: {audio['file']}, {audio['duration_s']:.1f} s"],
     "voxels": lambda count: [f"voxels: {count:,}"],
+    "faults": lambda faults: ["faults:", *[f"  {line}" for line in counted(faults)]],
 }
 # How the entries of `info` are laid out, where a plain line would not do.
 _LAYOUTS: dict[str, Callable[[Any], list[str]]] = {

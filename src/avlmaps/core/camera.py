@@ -56,6 +56,11 @@ class Pinhole:
         sx, sy = width / self.width, height / self.height
         return Pinhole(self.fx * sx, self.fy * sy, self.cx * sx, self.cy * sy, width, height)
 
+    def shaped(self, width: int, height: int) -> bool:
+        """Return whether a picture of that size has this camera's shape."""
+        most = max(width, height, self.width, self.height)
+        return abs(width * self.height - height * self.width) <= most
+
     def project(self, points_camera: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 2"]:
         """Return image coordinates (u, v) in pixels of points in front of the camera (z > 0), in metres."""
         z = points_camera[..., 2]

@@ -9,7 +9,6 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import AudioError, NoAudioStreamError
 from avlmaps.core.files import SOUND_BYTES, checked_size
-from avlmaps.core.wording import option
 
 if TYPE_CHECKING:
     import soundfile
@@ -167,7 +166,7 @@ def _examine_video(path: Path) -> tuple[int, int]:
     try:
         with av.open(str(path)) as container:
             if not container.streams.audio:
-                raise NoAudioStreamError(f"{path} has no audio stream; give a file of its own ({option('audio')}).")
+                raise NoAudioStreamError(f"{path} has no audio stream; give a file that has one.")
             audio = container.streams.audio[0]
             rate_hz = int(audio.codec_context.sample_rate)
             zero_s = (container.start_time or 0) / av.time_base

@@ -1,8 +1,7 @@
 """What someone knows better than a recording's files: depth unit, intrinsics, poses, camera axes, pose clock, up.
 
-A convention of axes is a name or three letters for x, y and z: R or L (right, left), U or D (up, down), F or B
-(forward, back), as seen by the camera. OpenCV is RDF, OpenGL and ARKit RUB, the bodies of ROS FLU. A picture that was
-turned by 90 degrees is a camera that was: DLF or URF.
+Axes are a name or three letters for x, y and z: right or left, up or down, forward or back, as seen by the camera.
+OpenCV is RDF, OpenGL and ARKit RUB, bodies of ROS FLU, a picture turned by 90 degrees DLF or URF.
 """
 
 import hashlib
@@ -94,9 +93,14 @@ class GivenCamera:
     def camera(self, width: int, height: int) -> Pinhole:
         """Return the camera of a recording's pictures; RecordingError where no camera has these numbers."""
         try:
-            return Pinhole(self.fx, self.fy, self.cx, self.cy, *(self.size or (width, height))).resized(width, height)
+            given = Pinhole(self.fx, self.fy, self.cx, self.cy, *(self.size or (width, height)))
         except ValueError as error:
             raise RecordingError(f"The given intrinsics hold no camera: {error}.") from None
+        if given.shaped(width, height):
+            return given.resized(width, height)
+        raise RecordingError(
+            f"The given intrinsics are of {given.width}x{given.height}, pictures of another shape ({width}x{height})."
+        )
 
     @staticmethod
     def parse(words: str) -> "GivenCamera":
@@ -254,7 +258,7 @@ def corrected_rig(rig: Rig, given: Sequence[GivenCamera], path: Path) -> Rig:
     """Return the cameras with given intrinsics; RecordingError where one is given for two."""
     if not given:
         return rig
-    if len(given) == 1 and not rig.registered:
+    if len(given) == 1 and not (rig.registered and rig.rgb.shaped(rig.depth.width, rig.depth.height)):
         raise RecordingError(
             f"{path} has a depth camera of its own; give the intrinsics of both cameras, colour first: "
             f"{option('intrinsics', 'fx,fy,cx,cy fx,fy,cx,cy')}."

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.wording import option
 
 T = TypeVar("T")
 
@@ -46,6 +47,17 @@ def note(*sentences: str) -> None:
         found += sentences
 
 
+_unfit: ContextVar[list[str] | None] = ContextVar("_unfit", default=None)
+
+
+def misfit(sentence: str) -> None:
+    """Refuse pictures that the files' intrinsics do not fit; within ``unfit`` whoever opens decides."""
+    sentence += f" Give the intrinsics of these pictures ({option('intrinsics', 'FX,FY,CX,CY')})."
+    if (found := _unfit.get()) is None:
+        raise RecordingError(sentence)
+    found.append(sentence)
+
+
 @contextmanager
 def _gathered(where: ContextVar[list[T] | None]) -> Generator[list[T]]:
     found: list[T] = []
@@ -59,6 +71,11 @@ def _gathered(where: ContextVar[list[T] | None]) -> Generator[list[T]]:
 def noted() -> AbstractContextManager[list[str]]:
     """Gather what is noted within."""
     return _gathered(_noted)
+
+
+def unfit() -> AbstractContextManager[list[str]]:
+    """Gather what is said of intrinsics that pictures do not fit; the cameras are stretched to these meanwhile."""
+    return _gathered(_unfit)
 
 
 def listed() -> AbstractContextManager[list[Fault]]:

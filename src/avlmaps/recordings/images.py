@@ -115,13 +115,20 @@ def read_bytes(path: Path) -> bytes:
         return read_regular(path, PICTURE_BYTES)
 
 
-def check_whole(path: Path, content: bytes) -> None:
-    """Refuse a picture that is cut off or damaged as far as its outside shows it, and files that are no pictures."""
-    again = f"({len(content)} bytes); copy it again or leave that frame out."
+def _check_end(path: Path, content: bytes) -> None:
     # Within a JPEG's scan 0xFF is always followed by 0x00, so the end marker is found only where the picture ends.
     cut = content.startswith(_JPEG) and content.rfind(b"\xff\xd9") <= content.rfind(b"\xff\xda")
     if cut or (content.startswith(_PNG) and b"IEND\xaeB`\x82" not in content):
-        raise RecordingError(f"{path} is truncated {again}")
+        raise RecordingError(f"{path} is truncated {_again(content)}")
+
+
+def _again(content: bytes) -> str:
+    return f"({len(content)} bytes); copy it again or leave that frame out."
+
+
+def check_whole(path: Path, content: bytes) -> None:
+    """Refuse a picture that is cut off or damaged as far as its outside shows it, and files that are no pictures."""
+    _check_end(path, content)
     if content.startswith(_JPEG):
         return
     if encoded_size(content) is None:
@@ -130,7 +137,7 @@ def check_whole(path: Path, content: bytes) -> None:
         with _opened(content) as picture:
             picture.verify()  # of a PNG the checksums of all its parts
     except _UNREADABLE as error:
-        raise RecordingError(f"{path} is truncated or damaged: {str(error).rstrip('.')} {again}") from None
+        raise RecordingError(f"{path} is truncated or damaged: {str(error).rstrip('.')} {_again(content)}") from None
 
 
 def _unknown_kind(path: Path, content: bytes) -> str:
@@ -222,7 +229,7 @@ def _decoded(path: Path, content: bytes, camera: Pinhole, flags: int) -> np.ndar
     _check_outside(path, content, camera)
     picture = decode_picture(content, flags)
     if picture is None:
-        raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
+        raise RecordingError(f"{path} cannot be decoded {_again(content)}")
     return picture
 
 
@@ -243,8 +250,7 @@ def decode_picture(content: bytes, flags: int) -> np.ndarray | None:
 
 def _check_outside(path: Path, content: bytes, camera: Pinhole) -> None:
     width, height = picture_size(path, content)
-    if content.startswith(_JPEG):
-        check_whole(path, content)
+    _check_end(path, content)
     if (width, height) != (camera.width, camera.height) == (height, width):
         width, height = exif_turn(content).size(width, height)
     check_size(path, (height, width), camera)
@@ -272,8 +278,7 @@ def note_turn(folder: Path, names: Sequence[str]) -> None:
 def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.ndarray, "h w"]:
     """Read z-depth in metres; 0 where there is none.
 
-    A PNG or TIFF holds 16-bit whole numbers, of which 0 and 65535 say that nothing was measured; an NPY, or a TIFF of
-    floats, holds metres, of which NaN, infinity and what is not positive say so.
+    Whole numbers are 16-bit, and 0 and 65535 no depth; an NPY or a TIFF of floats holds metres, NaN or what is not > 0.
     """
     if path.suffix == ".npy":
         stored = _read_npy(path)

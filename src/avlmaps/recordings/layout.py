@@ -1,12 +1,11 @@
 """The content of `recording.json` of our own folder format, and the names of the files beside it.
 
 recording.json    this file's Description; written last, so that a folder without it is unfinished
-rgb/              colour pictures, PNG or JPEG; or one video instead, rgb.mp4 (.mkv, .mov, .webm, .avi)
-depth/            16-bit PNG of the same names; 0 and 65535 say that nothing was measured
+rgb/              colour pictures (PNG, JPEG, WEBP, BMP ...); or one video instead, rgb.mp4 (.mkv, .mov, .webm, .avi)
+depth/            of the same names: 16-bit PNG or TIFF, 0 and 65535 no depth, or metres as NPY or float TIFF
 poses.csv         stamp_s,tx,ty,tz,qx,qy,qz,qw: poses of the depth camera, at their own rate
-frames.csv        name,stamp_s: when each picture was taken. It may be left out where poses.csv has one row for
-                  each picture (in the order of the names), where rgb_rate_hz is given and names are numbers, or
-                  where a video has stamps of its own; its frames are the depth pictures in the order of names
+frames.csv        name,stamp_s: when each picture was taken. Left out where poses.csv has one row for each, where
+                  rgb_rate_hz is given and names are numbers, or a video has stamps, whose frames depth follows in order
 audio.flac        or .wav, .ogg: the sound track, of one channel or of those that `microphones` places; else the video's
 directions.csv    stamp_s,azimuth_rad[,elevation_rad][,confidence]: what a device said of where sounds came from
 events.csv, semantic/, objects.json   truth, which mapping never reads
@@ -38,7 +37,6 @@ FRAMES_HEADER = "name,stamp_s"
 VIDEO_SUFFIXES = (".mp4", ".mkv", ".mov", ".webm", ".avi")
 # 16-bit depth in finer units than this would end within 7 cm of the camera.
 _MOST_DEPTH_UNITS = 1e6
-COLOUR_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
 class CameraNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True):

@@ -26,7 +26,7 @@ from avlmaps.recordings import images, layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import level_faults, with_microphones
 from avlmaps.recordings.corrections import Corrections, corrected, uncorrected
-from avlmaps.recordings.faults import Fault, listed, report
+from avlmaps.recordings.faults import Fault, listed, report, unfit
 from avlmaps.recordings.formats.file_recording import FileRecording
 from avlmaps.recordings.microphones import microphones_named
 from avlmaps.recordings.types import Recording
@@ -62,39 +62,33 @@ class Format:
         module, _, function = self.opener.partition(":")
         found = importlib.import_module(module, _HERE)
         opener = getattr(found, function, None) or found.OPENERS[function]
-        if self.has_topics:
-            recording = opener(path, topics or {}, more)
-        elif more:
+        if more and not self.has_topics:
             raise RecordingError(
                 f"{path} is of the format {self.name}, which is one folder or file; leave {more[0]} "
                 "out, or build a map of each and `avlmaps merge` them."
             )
-        elif topics:
+        if topics and not self.has_topics:
             raise RecordingError(f"{path} is of the format {self.name}, which has no topics; leave them out.")
-        else:
-            recording = opener(path)
+        recording = opener(path, topics or {}, more) if self.has_topics else opener(path)
         settle_sound(recording)
         return recording
 
 
 def settle_sound(recording: Recording) -> None:
     """Hold a recording's sound track against its frames, and note what is worth knowing of it."""
-    track = recording.audio
-    if track is None:
+    if (track := recording.audio) is None or not len(recording):
         return
-    name = track.label or track.path.name
-    if len(recording):
-        first_s, last_s = float(recording.stamps_s[0]), float(recording.stamps_s[-1])
-        span = f"from {track.start_s:.2f} to {track.end_s:.2f} s, and the frames from {first_s:.2f} to {last_s:.2f} s"
-        shared_s = min(track.end_s, last_s) - max(track.start_s, first_s)
-        if shared_s < 0.0:
-            begins = "its beginning (audio_start_s of recording.json), " if recording.format == FORMATS[0].name else ""
-            raise RecordingError(
-                f"The sound track {name} of {recording.path} goes {span}, so that no sound has a place; give "
-                f"{begins}another track ({option('audio')}), or none."
-            )
-        if shared_s < _LEAST_SHARED * (last_s - first_s):
-            recording.notices = (*recording.notices, f"The sound track {name} goes {span}; the rest has no sound.")
+    name, first_s, last_s = track.label or track.path.name, *recording.stamps_s[[0, -1]].tolist()
+    span = f"from {track.start_s:.2f} to {track.end_s:.2f} s, and the frames from {first_s:.2f} to {last_s:.2f} s"
+    shared_s = min(track.end_s, last_s) - max(track.start_s, first_s)
+    if shared_s < 0.0:
+        begins = "its beginning (audio_start_s of recording.json), " if recording.format == FORMATS[0].name else ""
+        raise RecordingError(
+            f"The sound track {name} of {recording.path} goes {span}, so that no sound has a place; give "
+            f"{begins}another track ({option('audio')}), or none."
+        )
+    if shared_s < _LEAST_SHARED * (last_s - first_s):
+        recording.notices = (*recording.notices, f"The sound track {name} goes {span}; the rest has no sound.")
 
 
 def holds(*names: str) -> Callable[[Path], bool]:
@@ -195,46 +189,30 @@ def _euroc(path: Path) -> bool:
 
 # What is recognised and not read: a test, and what it is, what is missing and what to do, without its subject.
 _UNREADABLE: tuple[tuple[Callable[[Path], bool], str], ...] = (
-    (
-        _euroc,
-        "is of EuRoC's layout, or measurements of an IMU alone: there is no depth, from which a map is built; record "
-        f"depth too, or compute it from the stereo pair, and {_EXPORT}.",
-    ),
-    (
-        _suffix(".sens"),
-        "is ScanNet's packed recording; unpack it with ScanNet's SensReader (color/, depth/, pose/, intrinsic/), and "
-        "open that folder.",
-    ),
-    (
-        lambda path: some_name(path, "frame-*.depth.pgm"),
-        "is of 3RScan, or unpacked by ScanNet's C++ reader: its .depth.pgm is not read; convert it to 16-bit .png, "
-        "or unpack the .sens with the Python reader (color/, depth/, pose/, intrinsic/).",
-    ),
-    (
-        _suffix(".svo", ".svo2", ".oni", ".klg", ".rrf", ".rrd", ".xef"),
-        f"is a packed recording that its own software alone reads; {_EXPORT} with it, or record a ROS bag.",
-    ),
+    (_euroc,
+     "is of EuRoC's layout, or measurements of an IMU alone: there is no depth, from which a map is built; record "
+     f"depth too, or compute it from the stereo pair, and {_EXPORT}."),
+    (_suffix(".sens"),
+     "is ScanNet's packed recording; unpack it with ScanNet's SensReader (color/, depth/, pose/, intrinsic/), and "
+     "open that folder."),
+    (lambda path: some_name(path, "frame-*.depth.pgm"),
+     "is of 3RScan, or unpacked by ScanNet's C++ reader: its .depth.pgm is not read; convert it to 16-bit .png, "
+     "or unpack the .sens with the Python reader (color/, depth/, pose/, intrinsic/)."),
+    (_suffix(".svo", ".svo2", ".oni", ".klg", ".rrf", ".rrd", ".xef"),
+     f"is a packed recording that its own software alone reads; {_EXPORT} with it, or record a ROS bag."),
     (_suffix(".db"), "is no database of RTAB-Map (it is no SQLite file); copy it again."),
-    (
-        _suffix(".ply", ".pcd", ".las", ".laz", ".obj", ".glb", ".usdz", ".splat"),
-        "is a finished model, without the pictures that a map is built from; give the recording it was made of.",
-    ),
-    (
-        _suffix(".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz", ".7z", ".rar"),
-        "is an archive; unpack it, and give the folder or the file inside.",
-    ),
-    (
-        lambda path: some_name(path, "image_[0-9]*") or (path / "sequences").is_dir(),
-        f"is of KITTI's layout: cameras without depth, and poses of twelve numbers a line; {_EXPORT} (poses as stamp, "
-        "position and quaternion).",
-    ),
+    (_suffix(".ply", ".pcd", ".las", ".laz", ".obj", ".glb", ".usdz", ".splat"),
+     "is a finished model, without the pictures that a map is built from; give the recording it was made of."),
+    (_suffix(".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz", ".7z", ".rar"),
+     "is an archive; unpack it, and give the folder or the file inside."),
+    (lambda path: some_name(path, "image_[0-9]*") or (path / "sequences").is_dir(),
+     f"is of KITTI's layout: cameras without depth, and poses of twelve numbers a line; {_EXPORT} (poses as stamp, "
+     "position and quaternion)."),
     (holds("lowres_wide", "lowres_depth"), f"is of ARKitScenes' layout, which is not read; {_EXPORT}."),
-    (
-        holds("images", "sparse"),
-        "is a reconstruction of COLMAP, whose scale is not metres and which has no depth; record with a depth "
-        f"camera, or {_EXPORT}.",
-    ),
-)
+    (holds("images", "sparse"),
+     "is a reconstruction of COLMAP, whose scale is not metres and which has no depth; record with a depth "
+     f"camera, or {_EXPORT}."),
+)  # fmt: skip
 
 
 def why_unreadable(path: Path) -> str:
@@ -256,10 +234,9 @@ def open_recording(
 ) -> Recording:
     """Open a recording in place: nothing is copied, and no picture is read before it is needed.
 
-    Of a bag that was split ``path`` is all of its files. ``audio`` is another sound track that begins with the
-    recording, ``topics`` are of a ROS bag, by what they are for (``rgb``, ``depth``, ``pose``, ``audio``; the others
-    are found), and ``microphones`` a JSON file or a name (``microphones.PRESETS``). RecordingError says that there is
-    nothing, of no known format, or of no use; AudioError is of the sound.
+    Of a bag that was split ``path`` is all of its files. ``audio`` is a track that begins with the recording,
+    ``topics`` are a ROS bag's (``rgb``, ``depth``, ``pose``, ``audio``; the others are found), ``microphones`` a JSON
+    file or a name (``microphones.PRESETS``). RecordingError says that there is none; AudioError is of the sound.
     """
     given = [path] if isinstance(path, str | Path) else path
     paths = list(given) if isinstance(given, Iterable) else []  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -269,7 +246,10 @@ def open_recording(
     found = find_format(path, format)
     if audio is not None and found.has_topics and not (topics or {}).get("audio"):
         topics = {**(topics or {}), "audio": "none"}  # its own sound need not be readable
-    recording = found.open(lasting_path(path), topics, [lasting_path(one) for one in more])
+    with unfit() as misfits:
+        recording = found.open(lasting_path(path), topics, [lasting_path(one) for one in more])
+    for sentence in () if corrections and corrections.intrinsics else misfits:
+        report(sentence)
     if audio is not None:
         directions = None if recording.audio is None else recording.audio.directions
         recording.audio = replace(AudioTrack.open(lasting_path(audio)), directions=directions)
@@ -346,8 +326,7 @@ def validate(
 ) -> list[Fault]:
     """Return every fault of a recording; an empty list says that there is none.
 
-    Texts, poses, stamps and the sound track are checked wholly, and so are the outsides of all pictures.
-    ``max_decoded`` pictures, spread evenly (all if None), are decoded as well, to find depth that is zero everywhere.
+    All is checked, of pictures the outside; ``max_decoded`` of them, spread evenly (all if None), are decoded, too.
     ``more`` are further files of a bag, ``given`` further arguments of ``open_recording``.
     """
     with listed() as faults:

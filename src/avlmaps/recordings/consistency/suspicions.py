@@ -203,10 +203,7 @@ def _beside(evidence: Evidence) -> Iterator[Said]:
     steep = np.minimum(steep / (np.quantile(steep, 0.9, axis=(1, 2), keepdims=True) + 4.0), 1.0)
     steep -= steep.mean(axis=(1, 2), keepdims=True)
     steep /= np.maximum(steep.std(axis=(1, 2), keepdims=True), 1e-6)
-    double = (
-        2 * max(height, _FARTHEST),
-        2 * max(width, _FARTHEST),
-    )  # nothing comes in again beyond an edge
+    double = (2 * max(height, _FARTHEST), 2 * max(width, _FARTHEST))  # nothing comes in again beyond an edge
     spectrum = (np.fft.rfft2(steep, double) * np.conj(np.fft.rfft2(marks, double))).sum(axis=0)
     shifts = np.arange(-_FARTHEST, _FARTHEST + 1)
     found = np.fft.irfft2(spectrum, double)[np.ix_(shifts, shifts)] / max(marks.sum(), 1.0)

@@ -86,8 +86,7 @@ class Shots:
 def settle(path: Path, shots: Shots, pose_file: Callable[[int], Path] | None) -> Shots:
     """Leave out what cannot be used, put the rest in the order of time and make the rotations orthonormal.
 
-    ``pose_file`` names the file that holds the pose of shot i, None where the reader checked the poses itself: lost
-    tracking (NaN, infinity) is a notice, not a fault to stop at.
+    ``pose_file`` names the file of the pose of shot i, None where the reader checked poses; lost tracking is a notice.
     """
     tracked = np.isfinite(shots.world_from_camera).all(axis=(1, 2))
     if not tracked.all():
@@ -237,14 +236,11 @@ class FileRecording(ShotsRecording):
         return depth_m
 
     def colour_file(self, index: int) -> Path | None:
-        if self.video is not None:
-            return None
-        return self.path / self.shots.colour[index]
+        return self.path / self.shots.colour[index] if self.video is None else None
 
     def depth_file(self, index: int) -> Path | None:
-        if len(self.shots.depth) == 0 or len(self.shots.confidence) or not self.shots.depth[index].endswith(".png"):
-            return None
-        return self.path / self.shots.depth[index]
+        plain = len(self.shots.depth) and not len(self.shots.confidence) and self.shots.depth[index].endswith(".png")
+        return self.path / self.shots.depth[index] if plain else None
 
     def file_groups(self) -> list[tuple[Path, Sequence[str]]]:
         video = [self.video.path.name] if self.video is not None else []

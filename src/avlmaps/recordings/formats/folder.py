@@ -10,15 +10,16 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from avlmaps.core import timeline
+from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import NoAudioStreamError, RecordingError
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import with_microphones
 from avlmaps.recordings.corrections import corrected
-from avlmaps.recordings.faults import note, report
+from avlmaps.recordings.faults import misfit, note, report
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, opener, settle
-from avlmaps.recordings.formats.tables import NAMED_FILE, PoseTable, read_list, read_poses
-from avlmaps.recordings.images import DisplayTurn, VideoFrames, file_turn, first_picture_size
+from avlmaps.recordings.formats.tables import NAMED_FILE, PoseTable, fitted, read_list, read_poses
+from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES, VideoFrames, file_turn, first_picture_size
 from avlmaps.recordings.layout import Description
 from avlmaps.recordings.microphones import DIRECTIONS, MicrophoneNumbers, read_directions
 from avlmaps.recordings.plausible import pace_fault
@@ -39,7 +40,7 @@ def open_folder(path: Path) -> Recording:
     known = _read_poses(path)
     video = _find_video(path, description)
     found = _find_pictures(path, description, known, video)
-    _check_sizes(path, description, found)
+    rig = _fitted_rig(path, description, found, video)
     _check_clocks(path, description, found, known)
     shots, start_s, trajectory = _pose_pictures(found, known)
     shots = settle(path, shots, pose_file=None)
@@ -52,7 +53,7 @@ def open_folder(path: Path) -> Recording:
     recording = FileRecording(
         path=path,
         format="folder",
-        rig=description.rig(),
+        rig=rig,
         shots=shots,
         depth_units=description.depth_units_per_m,
         up_in_world=None if up is None else np.array(up) / np.linalg.norm(up),
@@ -80,26 +81,25 @@ def _with_directions(path: Path, audio: AudioTrack | None, start_s: float) -> Au
     return replace(audio, directions=directions)
 
 
-def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> None:
-    rgb, own = description.intrinsics.rgb, description.intrinsics.depth
-    for files, camera, name in ((found.colour, rgb, "rgb"), (found.depth, own or rgb, "depth")):
-        size = (camera.width, camera.height)
+def _fitted_rig(folder: Path, description: Description, found: "_Pictures", video: VideoFrames | None) -> Rig:
+    """Return the cameras at the sizes that the pictures have."""
+    rig, file = description.rig(), folder / layout.DESCRIPTION
+    cameras: list[Pinhole] = []
+    for files, camera, what in ((found.colour, rig.rgb, "colour"), (found.depth, rig.depth, "depth")):
+        own = size = (camera.width, camera.height)
+        if video is not None and not cameras:
+            size = (video.width, video.height)
         if files:
             with suppress(RecordingError):  # of files that are missing or damaged, each has a sentence of its own
                 size = first_picture_size(folder, files)
-        turn = file_turn(folder / files[0]) if files else DisplayTurn()
-        if (camera.width, camera.height) in (size, turn.size(*size)):
-            continue
-        if name == "depth" and own is None:
-            raise RecordingError(
-                f"{folder / layout.DESCRIPTION} has the intrinsics of rgb only ({rgb.width}x{rgb.height}), but depth "
-                f"pictures are {size[0]}x{size[1]}; add intrinsics.depth with fx, fy, cx, cy, width and height of depth"
-                " (those of rgb scaled to its size, if depth is registered to colour)."
+            size = own if file_turn(folder / files[0]).size(*size) == own else size
+        if cameras and description.intrinsics.depth is None and size != (cameras[0].width, cameras[0].height):
+            misfit(
+                f"{file} has the intrinsics of rgb only ({own[0]}x{own[1]}), but depth pictures are {size[0]}x{size[1]}"
+                "; add intrinsics.depth (those of rgb scaled to its size, if depth is registered to colour)."
             )
-        raise RecordingError(
-            f"The {name} pictures of {folder} are {size[0]}x{size[1]}, but intrinsics.{name} of {layout.DESCRIPTION} "
-            f"are of {camera.width}x{camera.height}; give the intrinsics of these pictures (turned or resized)."
-        )
+        cameras.append(fitted(camera, size, file, what))
+    return replace(rig, rgb=cameras[0], depth=cameras[1])
 
 
 def _check_clocks(folder: Path, description: Description, found: "_Pictures", known: PoseTable) -> None:
@@ -163,21 +163,16 @@ def _find_video(folder: Path, description: Description) -> VideoFrames | None:
     size = (camera.width, camera.height)
     if not (video.turn.transpose and size == (video.width, video.height)):
         video.show()
-    if (video.width, video.height) != size:
-        raise RecordingError(
-            f"{file} is {video.width}x{video.height}, but {layout.DESCRIPTION} says {camera.width}x{camera.height}; "
-            "give the intrinsics of the video's own size."
-        )
     return video
 
 
 def _find_pictures(folder: Path, description: Description, known: PoseTable, video: VideoFrames | None) -> _Pictures:
     """Find the pictures and their stamps: by frames.csv, else row by row with poses.csv, else by the rate."""
-    if not (folder / "depth").is_dir():
-        raise RecordingError(f"{folder / 'depth'} is missing; the recording needs it.")
-    where, suffixes = ("rgb", layout.COLOUR_SUFFIXES) if video is None else ("depth", (".png",))
-    found = {name.rsplit(".", 1)[0]: name for name in list_names(folder / where, suffixes)}
-    if video is not None and len(found) != len(video):
+    depth_of = {name.rsplit(".", 1)[0]: name for name in list_names(folder / "depth", DEPTH_SUFFIXES)}
+    where, found = "depth", depth_of
+    if video is None:
+        where, found = "rgb", {name.rsplit(".", 1)[0]: name for name in list_names(folder / "rgb", COLOUR_SUFFIXES)}
+    elif len(found) != len(video):
         raise RecordingError(
             f"{video.path} has {len(video)} frames, but {folder / 'depth'} {len(found)} pictures; each frame needs one."
         )
@@ -203,7 +198,7 @@ def _find_pictures(folder: Path, description: Description, known: PoseTable, vid
         where = path.name if os.path.lexists(path) else "rgb/"
         sentence = f"{folder / layout.DESCRIPTION} lists {description.frames} frames, but {where} has {len(names)}."
         report(sentence, folder / layout.DESCRIPTION, fatal=False)
-    depth = [f"depth/{name}.png" for name in names]
+    depth = [f"depth/{depth_of.get(name, name + '.png')}" for name in names]
     if video is not None:
         return _Pictures(names, [], depth, stamps_s, range(len(names)))
     return _Pictures(names, colour, depth, stamps_s)
@@ -247,14 +242,17 @@ def _pose_pictures(found: _Pictures, known: PoseTable) -> tuple[Shots, float, ti
 
 def _interpolated(
     stamps_s: Float[np.ndarray, " n"], known: PoseTable
-) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], timeline.Trajectory | None]:
+) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], timeline.Trajectory]:
     trajectory = known.trajectory(layout.POSES)
-    covered, world_from_camera = np.zeros(len(stamps_s), bool), np.full((len(stamps_s), 4, 4), np.nan)
-    if trajectory is not None:
-        covered = trajectory.covers(stamps_s)
-        world_from_camera[covered] = trajectory.at(stamps_s[covered])
-    if not covered.all():
-        lost = int((~covered).sum())
-        span = "none" if trajectory is None else "{:.2f} to {:.2f} s".format(*trajectory.stamps_s[[0, -1]])
+    assert trajectory is not None  # read_poses refuses a table without a usable pose
+    covered, world_from_camera = trajectory.covers(stamps_s), np.full((len(stamps_s), 4, 4), np.nan)
+    world_from_camera[covered] = trajectory.at(stamps_s[covered])
+    span = "{:.2f} to {:.2f} s".format(*trajectory.stamps_s[[0, -1]])
+    if not covered.any():
+        raise RecordingError(
+            f"No frame lies within {layout.POSES} ({span}): the frames go from {np.nanmin(stamps_s):.2f} to "
+            f"{np.nanmax(stamps_s):.2f} s; check that both use one clock."
+        )
+    if lost := int((~covered).sum()):
         note(f"{lost} of {len(stamps_s)} frame(s) lie outside {layout.POSES} ({span}) or in a gap of it; left out.")
     return covered, world_from_camera, trajectory

@@ -56,7 +56,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.corrections import from_opengl
-from avlmaps.recordings.faults import note, report
+from avlmaps.recordings.faults import misfit, note, report
 from avlmaps.recordings.formats import tables
 from avlmaps.recordings.formats.file_recording import (
     FileRecording,
@@ -411,10 +411,11 @@ def _centred(file: Path, size: tuple[int, int], own_size: tuple[int, int]) -> Pi
         if max(abs(camera.cx / width - 0.5), abs(camera.cy / height - 0.5)) <= 0.15:
             tables.note_resized(camera, size)
             return camera.resized(*size)
-    raise RecordingError(
+    misfit(
         f"{file} has its centre at {k[0][2]:.1f}, {k[1][2]:.1f}, but the pictures are {size[0]}x{size[1]}; were they "
-        "resized or cropped? Give the intrinsics of these pictures."
+        "resized or cropped?"
     )
+    return Pinhole(k[0][0], k[1][1], size[0] / 2, size[1] / 2, *size)
 
 
 def _robot_camera(path: Path, shots: Shots) -> Cameras:
@@ -457,7 +458,6 @@ def _open3d(path: Path, shots: Shots) -> Cameras:
     if k[6] == k[7] == 0.0:  # written by hand, row by row
         k = [k[i] for i in (0, 3, 6, 1, 4, 7, 2, 5, 8)]
     camera = tables.pinhole(file, k[0], k[4], k[6] + 0.5, k[7] + 0.5, given.width, given.height)
-    tables.note_resized(camera, first_picture_size(path, shots.colour))
     return fitted_cameras(path, shots, camera, file, given.depth_scale)
 
 

@@ -82,7 +82,8 @@ def open_tum(path: Path) -> FileRecording:
     if len(of_colour) == 0:
         raise RecordingError(
             f"{path}: no picture of rgb.txt ({len(colour.files)}) is within {_PAIR_TOLERANCE_S} s of one of depth.txt "
-            f"({len(depth.files)}); check that both use one clock."
+            f"({len(depth.files)}): they go from {colour.stamps_s[0]:.3f} to {colour.stamps_s[-1]:.3f} s, and from "
+            f"{depth.stamps_s[0]:.3f} to {depth.stamps_s[-1]:.3f} s; check that both use one clock."
         )
     if unpaired := len(colour.files) - len(of_colour):
         note(f"{unpaired} colour picture(s) have no depth picture within {_PAIR_TOLERANCE_S} s; left out.")
@@ -193,7 +194,7 @@ def _orb_camera(file: Path, size: tuple[int, int]) -> tuple[Pinhole, float] | No
         raise RecordingError(f"{file} has the DepthMapFactor {units}; it must be positive: 1000 for millimetres.")
     width, height = number("width") or size[0], number("height") or size[1]
     camera = tables.pinhole(file, fx, fy, cx + 0.5, cy + 0.5, round(width), round(height))
-    tables.note_resized(camera, size)
+    camera = tables.fitted(camera, size, file, "colour")
     if any(abs(number(name) or 0.0) > 1e-9 for name in ("k1", "k2", "p1", "p2", "k3")):
         note(tables.DISTORTED)
     return camera, units

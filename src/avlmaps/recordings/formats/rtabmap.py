@@ -27,7 +27,7 @@ from avlmaps.core.files import SAMPLED_BYTES, checked_size
 from avlmaps.recordings import images
 from avlmaps.recordings.faults import note, readable
 from avlmaps.recordings.formats.file_recording import Shots, StoredRecording, left_out, opener, settle
-from avlmaps.recordings.formats.tables import DISTORTED, fitted_rig, note_resized, pinhole
+from avlmaps.recordings.formats.tables import DISTORTED, fitted_rig, pinhole
 
 _SQLITE = b"SQLite format 3\0"
 _RVL = b"DEPTHRVL"
@@ -234,5 +234,4 @@ def _rig(path: Path, database: _Database, shots: Shots, camera: Pinhole) -> tupl
     height, width = _unpacked_depth(path / f"node {first}, depth", blob).shape
     rig = fitted_rig(camera, rgb_size, (width, height), path)
     floats = not blob.startswith(_RVL) and blob[25:26] == b"\x06"  # a PNG's colour type: four channels
-    note_resized(camera, rgb_size)
     return rig, 1.0 if floats else 1e-3

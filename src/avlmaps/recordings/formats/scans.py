@@ -200,7 +200,6 @@ def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> 
     size = said.pop()
     numbers = np.array([_numbers(file, frame, given, size) for frame in frames])
     camera = tables.median_camera(file, numbers, *size)
-    tables.note_resized(camera, rgb_size)
     if any(abs(getattr(camera_, name)) > 1e-9 for camera_ in (given, *frames) for name in _DISTORTION):
         note(tables.DISTORTED)
     return tables.fitted_rig(camera, *sizes(file.parent, shots), file)
@@ -279,7 +278,6 @@ def open_polycam(path: Path) -> FileRecording:
     rgb_size, depth_size = sizes(path, shots)
     # corrected cameras have no size: it is that of the corrected pictures
     camera = tables.median_camera(files[0], numbers, found[0].width or rgb_size[0], found[0].height or rgb_size[1])
-    tables.note_resized(camera, rgb_size)
     rig = tables.fitted_rig(camera, rgb_size, depth_size, files[0])
     return FileRecording.settled(path, "polycam", rig, shots, files.__getitem__, up_in_world=UP_IN_WORLD.copy())
 
@@ -576,5 +574,4 @@ def _record3d_rig(inside: Place, file: Path, given: _Metadata, shots: Shots) -> 
         count = len(_decompressed(deep, _read(deep), 4 * camera.width * camera.height)) // 4
         width = max(1, round((count * camera.width / camera.height) ** 0.5))
         depth_size = (width, count // width)
-    tables.note_resized(camera, rgb_size)
     return tables.fitted_rig(camera, rgb_size, depth_size, file)

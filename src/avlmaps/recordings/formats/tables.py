@@ -20,7 +20,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, MANIFEST_BYTES, TABLE_BYTES, decode_json, open_regular, read_regular
 from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion
-from avlmaps.recordings.faults import note, readable, report
+from avlmaps.recordings.faults import misfit, note, readable, report
 from avlmaps.recordings.types import Recording
 
 POSE = ("stamp_s", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
@@ -303,13 +303,14 @@ def median_camera(file: Path, fx_fy_cx_cy: Float[np.ndarray, "n 4"], width: int,
 
 def fitted(camera: Pinhole, size: tuple[int, int], file: Path, what: str) -> Pinhole:
     """Return the camera at the size (width, height) that the pictures have."""
-    width, height = size
-    if abs(width * camera.height - height * camera.width) > max(width, height, camera.width, camera.height):
-        raise RecordingError(
-            f"{file} is of pictures of {camera.width}x{camera.height}, but the {what} pictures are {width}x{height}, "
-            "of another shape: were they cropped or turned? Give the intrinsics of these pictures."
+    if not camera.shaped(*size):
+        misfit(
+            f"{file} is of pictures of {camera.width}x{camera.height}, but the {what} pictures are {size[0]}x{size[1]},"
+            " of another shape: were they cropped or turned?"
         )
-    return camera.resized(width, height)
+    elif what == "colour":
+        note_resized(camera, size)
+    return camera.resized(*size)
 
 
 def fitted_rig(camera: Pinhole, rgb_size: tuple[int, int], depth_size: tuple[int, int], file: Path) -> Rig:
