@@ -59,20 +59,17 @@ def test_pictures_and_clips_are_files() -> None:
 
 @pytest.mark.parametrize("sentence", ["", "  ?! "])
 def test_an_empty_sentence_is_refused(sentence: str) -> None:
-    expected = (
-        "The sentence is empty; say what is sought, such as: the chair near the sound of glass breaking, or: the table "
-        "in the kitchen."
-    )
+    expected = "The sentence is empty; say what is sought, such as: the chair near the sound of glass breaking."
     with pytest.raises(QueryError, match=f"^{re.escape(expected)}$"):
         parse_sentence(sentence)
 
 
 @pytest.mark.parametrize("sentence", ["% of", "the chair not in the kitchen"])
 def test_what_a_map_cannot_answer_is_refused(sentence: str) -> None:
-    with pytest.raises(
-        QueryError, match=r"A map cannot answer this\. It answers .*; ask it like: the chair near the sound of glass"
-    ):
+    said = r"A map cannot answer this\. It answers .*; ask it like: the chair near the sound of glass"
+    with pytest.raises(QueryError, match=said) as refused:
         parse_sentence(sentence)
+    assert len(str(refused.value).split()) <= 30
 
 
 @pytest.mark.parametrize(

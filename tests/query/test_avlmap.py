@@ -114,6 +114,9 @@ def test_clips_that_cannot_be_asked_with_are_refused(
     missing = tmp_path / "none.wav"
     with pytest.raises(QueryError, match=f"^The clip {missing} is not there; check the name\\.$"):
         heard.sound_clip(missing)
+    (tmp_path / "photo.png").write_bytes(b"")
+    with pytest.raises(QueryError, match=r"photo\.png is a picture, no clip; give it as image"):
+        heard.sound_clip(tmp_path / "photo.png")
     for length, value, said in (
         (1600, 0.0, r"is silent \(its loudest sample is 0\)"), (0, 0.0, "no samples"), (10, np.nan, "NaN or infinity")
     ):  # fmt: skip

@@ -11,6 +11,7 @@ from tyro.conf import Positional, arg
 from avlmaps.cli.output import UsageError, query_lines
 from avlmaps.cli.verb import COUNT, Asking, InFrame, MapVerb, OptionalPath, OptionalText, idle, shown_in
 from avlmaps.core.progress import say
+from avlmaps.core.wording import option
 
 if TYPE_CHECKING:
     from avlmaps.query.asking import Asked
@@ -88,19 +89,22 @@ class Query(Asking, InFrame, MapVerb):
         from avlmaps.core.progress import announce_compiling
         from avlmaps.core.question import Modality
         from avlmaps.query.asking import ask
+        from avlmaps.query.goals import MOST_GOALS
 
         asked = self._asked()
         if avlmap.settings != (settings := self.settings()):
             avlmap = type(avlmap)(avlmap.data, avlmap.encoders, path=avlmap.path, settings=settings)
         with announce_compiling(now=False):
-            found = ask(avlmap, asked)
+            found = ask(avlmap, replace(asked, top=MOST_GOALS))
             drawn = {}
             if self.plot is not None and found.heat is not None:
                 drawn = {"plot": str(found.heat.plot(self.plot, top=self.top))}
         told: dict[str, Any] = {**found.to_dict(), **drawn}
+        more = sum(goal["probability"] >= self.found_at for goal in told["goals"][self.top :])
+        told["goals"] = told["goals"][: self.top]
         if self.frame != "recording":
             told = shown_in(told, self.frame, avlmap)
-        notes: list[str] = []
+        notes = [f"{more} more found; {option('top', str(self.top + more))} lists them too."] if more else []
         if not any(part["modality"] == Modality.SOUND for part in told["parts"]):
             notes += idle(self, ["at"], "no sound is named")
         if "plot" not in told:

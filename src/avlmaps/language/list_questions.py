@@ -23,12 +23,6 @@ NUMBERS = {
     "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10,
     "a pair of": 2, "a couple of": 2, "a dozen": 12,
 }  # fmt: skip
-SUPPORTED = (
-    "where things, sounds, rooms and photos are, how many there are, what is in a room or next to a thing, which room "
-    "a thing or a photo is in, the largest or smallest room, when and how often a sound was heard, and of several days "
-    "what is new, gone or moved, where a thing was last seen and what is usual"
-)
-"""What a map answers, for the sentence that refuses another question."""
 
 
 class Listed(StrEnum):

@@ -12,13 +12,12 @@ from avlmaps.language.claims import unanswered, unmet_by
 from avlmaps.language.intents import Ask, Inquiry, Pick, Target, TargetKind
 from avlmaps.language.learned.decision import NameResolver, is_doubtful, kind_of
 from avlmaps.language.learned.reader import Read, ReadingLimits, learned_reader
-from avlmaps.language.list_questions import SUPPORTED
 from avlmaps.language.names import is_entry, is_known, sounding_forms, sounds_like, third_forms
 from avlmaps.language.sentence import ASK, Attachments, Sentence, language_of, stand_ins
 from avlmaps.language.verbalise import lacks_file, phrase
 from avlmaps.language.word_classes import listed, load_word_classes, pattern, word_list
 
-_EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
+_EXAMPLE = "the chair near the sound of glass breaking"
 _NO_USE = f"What serves that purpose is not known; name the thing, like: {_EXAMPLE}."
 _MODALITIES = {kind: Modality(kind.replace("clip", "sound")) for kind in TargetKind if kind is not TargetKind.HERE}
 _OWN: Mapping[str, str] = dict.fromkeys(("his", "her", "their", "our", "your", "its"), "my")
@@ -116,7 +115,8 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> A
         file = lacks_file(sentence.tokens)
         if file is not None:
             raise QueryError(file.question)
-        cannot = f"A map cannot answer this. It answers {SUPPORTED}; ask it like: {_EXAMPLE}."
+        cannot = "A map cannot answer this. It answers where things, sounds or rooms are, and how many; ask it like: "
+        cannot += f"{_EXAMPLE}."
         raise QueryError(unanswered(sentence.tokens) or cannot)
     if use is not None and (reads[0].is_purpose or _names_nothing(reads[0])):
         return _resolved(_for_use(sentence, use, limits), sentence)

@@ -28,7 +28,7 @@ _MADE = {
 
 _ALONE: dict[tuple[Intent, ...], str] = {
     (act.Wait(),): "I will stop and stay here.",
-    (act.Return(),): "I will stay here, where this command begins.",
+    (act.Return(),): "I will stay here, where this command begins; `avlmaps edit MAP --pin home` pins a home.",
 }
 
 

@@ -118,7 +118,10 @@ def _map_frames(plan: BuildPlan, start: Start, workers: Workers | None) -> None:
         note = lambda: cache_note(plan.encoders, Kind.PIXELS)  # noqa: E731
         seen = _watched(progress(ahead, "fusing", total=total, done=done, note=note), meet)
         for file, span in jobs.items():
-            map_span(plan, start, islice(seen, len(range(*span))), file)
+            try:
+                map_span(plan, start, islice(seen, len(range(*span))), file)
+            except KeyboardInterrupt:
+                raise KeyboardInterrupt(f"stopped; the same build continues from frame {span[0]}") from None
         for _ in seen:  # nothing is left; this completes the bar
             pass
 

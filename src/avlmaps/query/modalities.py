@@ -12,11 +12,13 @@ from avlmaps.core.arrays import Float, Float32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, QueryError
 from avlmaps.core.question import Part, Role
+from avlmaps.core.wording import option
 from avlmaps.maps.types import HeardSounds
 from avlmaps.query.factors import NearAnchors, stretch_scores
 from avlmaps.query.settings import FOUND_AT, HeatSettings, SoundSettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import AudioTrack, Sound
+from avlmaps.recordings.images import COLOUR_SUFFIXES
 
 if TYPE_CHECKING:
     from avlmaps.maps.sources.candidates import Spread
@@ -60,6 +62,8 @@ def read_clip(path: Path) -> Sound:
     """Read a clip to ask with. ``QueryError``: it is missing, unreadable or silent."""
     if not path.is_file():
         raise QueryError(f"The clip {path} is not there; check the name.")
+    if path.suffix.lower() in COLOUR_SUFFIXES:
+        raise QueryError(f"{path} is a picture, no clip; give it as {option('image')}.")
     try:
         sound = AudioTrack.open(path).read()
     except AudioError as fault:
