@@ -48,6 +48,11 @@ def test_a_query_by_words_finds_the_cabinet(built: Path, answer) -> None:
     assert told["parts"][0]["role"] == "primary" and "understood only 'red'" in told["parts"][0]["note"]
 
 
+def test_goals_that_are_not_shown_are_counted(built: Path, run) -> None:
+    assert "note: 5 more found; --top 6 lists them too." in run("query", built, "--object", "red", "--top", 1)[1]
+    assert "more found" not in run("query", built, "--object", "red", "--top", 6)[1]
+
+
 def test_a_query_by_clip_finds_where_it_was_heard(built: Path, answer, tmp_path: Path) -> None:
     clip = tmp_path / "beep.wav"
     soundfile.write(clip, beeps(1.5, 2050.0), RATE_HZ)

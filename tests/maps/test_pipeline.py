@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 from pathlib import Path
 from threading import Condition, current_thread, main_thread
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -161,6 +162,12 @@ def test_what_an_encoder_raises_ends_the_build_with_its_sentence(tmp_path: Path)
 
     with pytest.raises(BackendError, match="smaller --batch"):
         list(encode_frames(Walk(6), [range(6)], Broken()))
+
+
+def test_a_stopped_build_names_where_it_continues(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("avlmaps.maps.build.map_span", Mock(side_effect=[None, KeyboardInterrupt]))
+    with pytest.raises(KeyboardInterrupt, match=f"continues from frame {SETTINGS.frames.per_part}"):
+        build_map(Walk(), tmp_path / "m", PROFILE, SETTINGS)
 
 
 def test_a_profile_of_ones_own_is_itself_and_nobody_elses() -> None:

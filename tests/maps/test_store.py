@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import msgspec
 import numpy as np
@@ -264,10 +265,7 @@ def test_no_map_is_one_sentence_that_says_what_is_there(tmp_path: Path, copied: 
 
 
 def test_a_file_without_rights_is_said_to_be_one(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(*_: object) -> None:  # as safetensors says so, whoever runs the test
-        raise FileNotFoundError
-
-    monkeypatch.setattr("safetensors.safe_open", refused)
+    monkeypatch.setattr("safetensors.safe_open", Mock(side_effect=FileNotFoundError))  # whoever runs the test
     with pytest.raises(MapError, match=r"voxels\.safetensors may not be read; give yourself the right to, or restore"):
         read_arrays(copied / "voxels.safetensors")
 

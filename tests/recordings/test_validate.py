@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -41,50 +42,20 @@ def _short_sound(path: Path) -> None:
 FAULTS: list[tuple[Callable[[Path], object], str, str, int | None, bool]] = [
     (_lose_a_frame, "rgb/000002.png is missing; restore it", "rgb/000002.png", None, False),
     (lambda p: _cut(p / "depth/000003.png"), "000003.png is truncated (120 bytes)", "depth/000003.png", None, False),
-    (
-        lambda p: save_rgb(p / "rgb/000001.png", np.zeros((24, 32, 3), np.uint8)),
-        "000001.png is 32x24, but the recording's camera is 64x48",
-        "rgb/000001.png",
-        None,
-        False,
-    ),
-    (
-        lambda p: save_depth(p / "depth/000004.png", np.zeros((48, 64))),
-        "000004.png: the depth is zero everywhere, so this frame adds nothing to a map.",
-        "depth/000004.png",
-        None,
-        False,
-    ),
-    (
-        lambda p: _replace_line(p / "poses.csv", 3, "0.1,nan,0,0,0,0,0,1"),
-        "poses.csv, line 3: this is no pose, and not used; it is NaN or infinite.",
-        "poses.csv",
-        3,
-        False,
-    ),
-    (
-        lambda p: _replace_line(p / "poses.csv", 4, "0.2,0,0,0,0,0,0,1.5"),
-        "poses.csv, line 4: this is no pose, and not used; the quaternion has length 1.5, where 1 belongs.",
-        "poses.csv",
-        4,
-        False,
-    ),
-    (
-        lambda p: _replace_line(p / "poses.csv", 5, "0.15,0,0,0,0,0,0,1"),
-        "poses.csv, line 5: stamp 0.150000 s is not after that of the line before (0.200000 s);",
-        "poses.csv",
-        5,
-        False,
-    ),
+    (lambda p: save_rgb(p / "rgb/000001.png", np.zeros((24, 32, 3), np.uint8)),
+     "000001.png is 32x24, but the recording's camera is 64x48", "rgb/000001.png", None, False),
+    (lambda p: save_depth(p / "depth/000004.png", np.zeros((48, 64))),
+     "000004.png: the depth is zero everywhere, so this frame adds nothing to a map.", "depth/000004.png", None, False),
+    (lambda p: _replace_line(p / "poses.csv", 3, "0.1,nan,0,0,0,0,0,1"),
+     "poses.csv, line 3: this is no pose, and not used; it is NaN or infinite.", "poses.csv", 3, False),
+    (lambda p: _replace_line(p / "poses.csv", 4, "0.2,0,0,0,0,0,0,1.5"),
+     "poses.csv, line 4: this is no pose, and not used; the quaternion has length 1.5,", "poses.csv", 4, False),
+    (lambda p: _replace_line(p / "poses.csv", 5, "0.15,0,0,0,0,0,0,1"),
+     "poses.csv, line 5: stamp 0.150000 s is not after that of the line before (0.200000 s);", "poses.csv", 5, False),
     (_short_sound, "audio.flac ends at 1.00 s, but the frames continue to 2.00 s;", "audio.flac", None, False),
-    (
-        lambda p: _replace_line(p / "recording.json", 1, '{"schema_version": 9}'),
-        "recording.json has schema version 9; this avlmaps reads version 1: update avlmaps.",
-        "recording.json",
-        None,
-        True,
-    ),
-]
+    (lambda p: _replace_line(p / "recording.json", 1, '{"schema_version": 9}'),
+     "recording.json has schema version 9; this avlmaps reads version 1: update", "recording.json", None, True),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("damage", "sentence", "file", "line", "fatal"), FAULTS)
@@ -138,11 +109,8 @@ def test_every_bad_pose_of_a_sequence_is_named_by_its_file(tmp_path: Path):
 
 
 def test_a_file_without_rights_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    def refused(*_: object) -> bytes:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr("avlmaps.recordings.layout.read_regular", refused)
-    path = write_folder(tmp_path / "walk")
+    path, denied = write_folder(tmp_path / "walk"), PermissionError(13, "Permission denied")
+    monkeypatch.setattr("avlmaps.recordings.layout.read_regular", Mock(side_effect=denied))
     with pytest.raises(RecordingError, match=r"recording\.json cannot be read \(Permission denied\); check the file"):
         open_recording(path)
 

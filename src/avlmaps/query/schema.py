@@ -87,7 +87,7 @@ class PartOutcome(TypedDict):
     modality: Annotated[str, Meta(description="object, sound, area or image")]
     query: str
     role: Annotated[str, Meta(description="primary (sought) or context (says where it is)")]
-    peak: Annotated[float, Meta(description="its highest heat anywhere")]
+    peak: Annotated[float, Meta(description="its highest heat anywhere, no probability")]
     found: bool
     understood: Annotated[str, Meta(description="the words that the encoder acts on")]
     note: Annotated[str, Meta(description="why it is not found, or empty")]

@@ -41,9 +41,4 @@ class Shoebox(Recording):
         return Frame(index, self.name(index), float(self.stamps_s[index]), rgb, depth_m, pose, self.rig)
 
 
-FORMAT = Format(
-    "shoebox",
-    "shot_*.npz",
-    lambda path: some_name(path, "shot_*.npz"),
-    "shoebox_recordings:Shoebox",
-)
+FORMAT = Format("shoebox", "shot_*.npz", lambda path: some_name(path, "shot_*.npz"), "shoebox_recordings:Shoebox")
