@@ -239,7 +239,7 @@ def _facts_of_targets(targets: Sequence[act.Target]) -> Iterator[str]:
         if target.pick:
             yield str(target.pick)
         if target.number > 1:
-            yield from ("number", f"number {target.number}")
+            yield "number"
         if target.pick in _ENDS:
             yield "end"
         if target.near:

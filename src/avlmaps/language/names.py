@@ -18,7 +18,6 @@ from avlmaps.perception.embedded.words import is_word
 
 _ALIKE, _APART = 0.78, 0.08  # least likeness of a misspelt word to its neighbour, and its lead over the next
 _SHORTEST_NOUN, _SHORTEST_PART = 3, 4  # letters of an English word, and of each half of "footstool"
-_TWICE = frozenset({"the", "a", "an", "to", "go", "and", "in", "at", "of", "on", "is", "my"})
 _SHORTEST = 5  # shorter words have too many neighbours
 _ONLY_ROOMS = frozenset({"room", "area", "zone", "hall", "corner"})
 _UNNAMEABLE = frozenset({"the", "a", "an", "my", "your", "to", "is", "are", "it", "i", "you", "me"})
@@ -170,7 +169,7 @@ def sounds_like(word: str) -> bool:
     return word in listed("noises") or (word in sounding_forms() and word.endswith("ing"))
 
 
-def sounding_thing(word: str = "", noun: str = "") -> bool:
+def sounding_thing(word: str, noun: str) -> bool:
     """Return whether words name a thing by its sound alone: "beeping device"; not "sewing machine", "ringing phone"."""
     sounds = word.endswith("ing") and word in sounding_forms() and word not in listed("silent")
     return sounds and noun in listed("nameless") and not _is_name(f"{word} {noun}")
@@ -222,44 +221,25 @@ def _colours() -> frozenset[str]:
 
 def respelt(tokens: list[Token]) -> tuple[list[Token], dict[str, str]]:
     """Return the tokens with misspelt words put right, and which words those were."""
-    tokens = _misheard(tokens)
-    changed: dict[str, str] = {}
-    found: list[Token] = []
-    for token in tokens:
-        if found and token.text == found[-1].text and token.text in _TWICE:
-            continue
-        better = _better(token.text) if token.kind == "word" else None
-        if better is not None:
-            changed[token.text] = better
-        found.append(token if better is None else replace(token, text=better))
-    return found, changed
+    changed = {token.text: better for token in tokens if token.kind == "word" and (better := _better(token.text))}
+    return [replace(token, text=changed.get(token.text, token.text)) for token in tokens], changed
 
 
-def _misheard(tokens: list[Token]) -> list[Token]:
-    """Return tokens with words put right that sound like others: "go two the couch", "stop their"."""
-    meant = _meant()
-    found = list(tokens)
-    for at in range(len(found) - 1):
-        right = meant.get((found[at].text, found[at + 1].text))
-        if right is not None:
-            found[at] = replace(found[at], text=right[0], kind="word")
-            found[at + 1] = replace(found[at + 1], text=right[1], kind="word")
-        elif found[at].text == "n" and at and found[at + 1].kind == "word" and found[at - 1].kind == "word":
-            found[at] = replace(found[at], text="and")
-    return found
+def as_meant(text: str) -> str:
+    """Return a text with words put right that sound like others, or are short for them: "go two the couch", "b4"."""
+    found, right = _meant()
+    return found.sub(lambda said: right[said[0].lower()], text)
 
 
 @cache
-def _meant() -> dict[tuple[str, ...], list[str]]:
-    pairs = [pair.strip().split("=") for pair in load_word_classes().lists["misheard"].split(",")]
-    return {tuple(wrong.split()): right.split() for wrong, right in pairs}
+def _meant() -> tuple[re.Pattern[str], dict[str, str]]:
+    lists = load_word_classes().lists
+    right = dict(pair.strip().split("=") for pair in (*lists["misheard"].split(","), *lists["heard_as"].split()))
+    return re.compile(rf"(?<![\w'-])(?:{'|'.join(sorted(right, key=len, reverse=True))})(?![\w'-])", re.IGNORECASE), right
 
 
 @cache
 def _better(word: str) -> str | None:
-    heard = _heard()
-    if word in heard:
-        return heard[word]
     if not word.isascii() or word in _known() or word.removesuffix("s") in _known():
         return None
     for drawn in (re.sub(r"(.)\1{2,}", r"\1", word), re.sub(r"(.)\1{2,}", r"\1\1", word)):
@@ -276,11 +256,6 @@ def _better(word: str) -> str | None:
     better = plain.pop() if len(plain) == 1 else None
     begins_alike = better is not None and (better[0] == word[0] or better[1:] == word or sorted(better) == sorted(word))
     return better if begins_alike else None
-
-
-@cache
-def _heard() -> dict[str, str]:
-    return dict(pair.split("=") for pair in load_word_classes().lists["heard_as"].split())
 
 
 def _neighbours(word: str) -> set[str]:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import dropwhile
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
@@ -21,7 +22,6 @@ _EXAMPLE = "the chair near the sound of glass breaking"
 _NO_USE = f"What serves that purpose is not known; name the thing, like: {_EXAMPLE}."
 _MODALITIES = {kind: Modality(kind.replace("clip", "sound")) for kind in TargetKind if kind is not TargetKind.HERE}
 _OWN: Mapping[str, str] = dict.fromkeys(("his", "her", "their", "our", "your", "its"), "my")
-_LONGEST_ACTOR = 3  # words of who does it: "an old lady"
 _TABLE = "list_questions"
 _listed = partial(word_list, _TABLE)
 
@@ -118,7 +118,9 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> A
         cannot = "A map cannot answer this. It answers where things, sounds or rooms are, and how many; ask it like: "
         cannot += f"{_EXAMPLE}."
         raise QueryError(unanswered(sentence.tokens) or cannot)
-    if use is not None and (reads[0].is_purpose or _names_nothing(reads[0])):
+    named = reads[0].meaning.of if isinstance(reads[0].meaning, Inquiry) else ()
+    as_thing = any(one.name.endswith(use or "?") and not is_known(one.name) for one in named)  # "somewhere to sleep"
+    if use is not None and (reads[0].is_purpose or as_thing):
         return _resolved(_for_use(sentence, use, limits), sentence)
     plain = [read for read in reads if isinstance(read.meaning, Inquiry)]
     if reads[0].is_purpose:  # no purpose is said, so that this was none of the readings
@@ -144,61 +146,24 @@ def _likely(reads: Sequence[Read], sentence: Sentence, limits: ReadingLimits) ->
 
 def use_in(text: str) -> str | None:
     """Return the longest purpose that a sentence speaks of and that things are known to serve: "wash my hands"."""
-    words = [_OWN.get(word, word) for word in re.findall(r"[a-z]+", text.lower())]
-    doing = [" ".join(words[at:]) + " " for at in range(1, len(words)) if _is_purpose(words, at)]
-    if (
-        words[:1] == ["where"]
-        and words[1:2]
-        and words[1] in _listed("modals") - {"did"}
-        and words[2:3]
-        and words[2] not in _listed("pronouns")
-    ):
-        # "where might a lady sit down?"
-        doing += [" ".join(words[at:]) + " " for at in range(3, min(len(words), 3 + _LONGEST_ACTOR))]
-    uses = load_word_classes().lists["uses"]
-    return max((use for use in uses if any(one.startswith(f"{use} ") for one in doing)), key=len, default=None)
+    said = _words(text)
+    return max((use for use in load_word_classes().lists["uses"] if f" {use} " in said), key=len, default=None)
 
 
-def _is_purpose(words: Sequence[str], at: int) -> bool:
-    """Return whether a verb at a place says what for: "somewhere to sit", "where can I sit"; no "did I leave it"."""
-    before = words[max(0, at - 3) : at]
-    if before[-1] == "to":  # what to drink is no place
-        return at < 2 or not (
-            words[at - 2] in _listed("what")
-            and words[at] in _listed("taken")
-            and not _listed("of_places") & set(words[at + 1 : at + 2])
-        )
-    if before[-1] in _listed("modals"):
-        return before[-1] not in _listed("habits")
-    return before[-1] in _listed("actors") and not {"did", "have", "had"} & set(before[:-1])
-
-
-def _names_nothing(read: Read) -> bool:
-    sought = read.meaning.of if isinstance(read.meaning, Inquiry) else ()
-    named = [one for one in sought if one.kind in (TargetKind.OBJECT, TargetKind.AREA)]
-    return bool(named) and not any(is_known(one.name) for one in named)
+def _words(text: str) -> str:
+    words = re.findall(r"\w(?:[\w./-]*\w)?", text.lower())
+    return f" {' '.join(_OWN.get(word, word) for word in words)} "
 
 
 def _for_use(sentence: Sentence, use: str, limits: ReadingLimits) -> Inquiry:
     names = [name.strip() for name in load_word_classes().lists["uses"][use].split(",")]
     rooms = [token.text for token in sentence.tokens if lexicon().find(token.text, EntryKind.ROOM) is not None]
     near = tuple(Target(TargetKind.AREA, room) for room in rooms if room not in use)
-    place = _place_of_use(sentence, use)
-    if place:
-        near = _near(names[0], place, sentence, limits)
+    behind = _words(sentence.text).partition(f" {use} ")[2].split()
+    place = list(dropwhile(lambda word: word not in _listed("placing"), behind))
+    if len(place) > 1 and _listed("here").isdisjoint(place):
+        near = _near(names[0], " ".join(place), sentence, limits)
     return Inquiry(Ask.WHERE, tuple(Target(TargetKind.OBJECT, name, near) for name in names))
-
-
-def _place_of_use(sentence: Sentence, use: str) -> str:
-    texts = [token.text for token in sentence.tokens if token.kind != "punct"]
-    own = [_OWN.get(text, text) for text in texts]
-    size = len(use.split())
-    end = next((at + size for at in range(len(own)) if " ".join(own[at : at + size]) == use), len(own))
-    begin = next(
-        (at for at in range(end, len(texts)) if texts[at] in _listed("placing") and texts[at + 1 : at + 2]), len(texts)
-    )
-    place = texts[begin:]
-    return "" if not place or _listed("here").intersection(place) else " ".join(place)
 
 
 def _near(name: str, place: str, sentence: Sentence, limits: ReadingLimits) -> tuple[Target, ...]:

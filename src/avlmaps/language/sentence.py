@@ -20,6 +20,7 @@ from avlmaps.language.claims import claimed_words
 from avlmaps.language.intents import Target, TargetKind
 from avlmaps.language.lexer import WORDS, Token, in_figures, tokenise
 from avlmaps.language.names import (
+    as_meant,
     class_words,
     is_known,
     respelt,
@@ -76,7 +77,7 @@ class Sentence:
     def __init__(self, text: str, given: "Attachments | None" = None) -> None:
         given = given or Attachments()
         self.text = text
-        plain, self.order_notes = rewritten(text)
+        plain, self.order_notes = rewritten(as_meant(text))
         tokens, self.respelt = respelt(tokenise(plain))
         self.tokens = in_figures(tokens)
         self.tokens += given.tokens((token.text for token in self.tokens), len(text))

@@ -22,19 +22,9 @@ from avlmaps.language.lexer import Token
 from avlmaps.language.names import is_known, is_place, may_name, mended, past_forms, sounding_forms
 from avlmaps.language.sentence import Sentence
 from avlmaps.language.verbalise import missing_file, strange_word, unclear, unknown, verbalise
+from avlmaps.language.word_classes import table
 
 EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
-REFUSALS = {
-    RefusalReason.MANIPULATION: "The robot has no hands and no voice; it can only drive, turn and look.",
-    RefusalReason.ENDLESS: "The robot does not drive without an end; say how often.",
-    RefusalReason.HARM: "The robot does not do what could hurt someone or break something.",
-    RefusalReason.FLYING: "The robot stays on its floor; it cannot fly, jump or climb stairs.",
-    RefusalReason.CONDITION: "The robot waits for no event and chooses by the map alone: if there is a sofa, go to it.",
-    RefusalReason.NEGATION: "Say only what to do: nothing to avoid, no choice between two.",
-    RefusalReason.CHAT: "The robot does not talk; say where it should go.",
-    RefusalReason.QUESTION: 'This is a question; ask the map: avlmaps query MAP "QUESTION".',
-    RefusalReason.UNKNOWN: f"This is no order that the robot understands; say it like: {EXAMPLE}.",
-}
 _FAR_M, _LONG_TIMES = 100.0, 50
 _ROOM_WORDS = frozenset({"room", "area", "zone", "hall", "corner", "wing", "bay", "ward", "lab", "office", "aisle"})
 DANGERS = tuple(map(RefusalReason, ("harm", "flying", "endless", "condition", "negation")))
@@ -178,7 +168,7 @@ def refusal_of(stop: Refuse | Clarify, tokens: Sequence[Token]) -> Refuse | Clar
         return stop
     marks = reasons().get(stop.reason)
     is_said = marks is None or not marks.isdisjoint(token.text for token in tokens)
-    return Refuse(stop.reason, REFUSALS[stop.reason if is_said else RefusalReason.UNKNOWN])
+    return Refuse(stop.reason, table("claims")["refusals"][stop.reason if is_said else RefusalReason.UNKNOWN])
 
 
 def _too_much(intents: Sequence[Intent]) -> Clarify | None:
