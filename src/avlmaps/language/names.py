@@ -1,24 +1,18 @@
-"""Names of things and rooms: whether one is known, whether a word may be one, and what misspelt words mean.
-
-A word of a sentence that neither the word classes nor the lexicon have becomes the one known word that is a single
-letter away; where several are, it stays as it is, and its name leads to a question back later.
-"""
+"""Names of things and rooms: whether one is known, whether a word may be one, and what misspelt words mean."""
 
 import re
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
-from string import ascii_lowercase
 
 from avlmaps.core.lexicon import EntryKind, lexicon
-from avlmaps.core.words import forms_of, singulars_of
+from avlmaps.core.words import Speller, forms_of, singulars_of
 from avlmaps.language.lexer import WORDS, Token
 from avlmaps.language.word_classes import listed, load_word_classes
 from avlmaps.perception.embedded.words import is_word
 
 _ALIKE, _APART = 0.78, 0.08  # least likeness of a misspelt word to its neighbour, and its lead over the next
 _SHORTEST_NOUN, _SHORTEST_PART = 3, 4  # letters of an English word, and of each half of "footstool"
-_SHORTEST = 5  # shorter words have too many neighbours
 _ONLY_ROOMS = frozenset({"room", "area", "zone", "hall", "corner"})
 _UNNAMEABLE = frozenset({"the", "a", "an", "my", "your", "to", "is", "are", "it", "i", "you", "me"})
 
@@ -235,35 +229,27 @@ def as_meant(text: str) -> str:
 def _meant() -> tuple[re.Pattern[str], dict[str, str]]:
     lists = load_word_classes().lists
     right = dict(pair.strip().split("=") for pair in (*lists["misheard"].split(","), *lists["heard_as"].split()))
-    return re.compile(rf"(?<![\w'-])(?:{'|'.join(sorted(right, key=len, reverse=True))})(?![\w'-])", re.IGNORECASE), right
+    longest = "|".join(sorted(right, key=len, reverse=True))
+    return re.compile(rf"(?<![\w'-])(?:{longest})(?![\w'-])", re.IGNORECASE), right
 
 
 @cache
 def _better(word: str) -> str | None:
-    if not word.isascii() or word in _known() or word.removesuffix("s") in _known():
+    drawn = (re.sub(r"(.)\1{2,}", letters, word) for letters in (r"\1", r"\1\1"))  # "sofaaaa"
+    if word in _known() or word.removesuffix("s") in _known():
         return None
-    for drawn in (re.sub(r"(.)\1{2,}", r"\1", word), re.sub(r"(.)\1{2,}", r"\1\1", word)):
-        if drawn != word and drawn in _known():
-            return drawn
-    near = {other for other in _neighbours(word) if other in _known() and not is_other_form(word, other)}
-    if len(word) < _SHORTEST:  # only what cannot well be another word: two letters changed over, or one left out
-        swapped = {other for other in near if len(other) == len(word) and sorted(other) == sorted(word)}
-        longer = {other for other in near if len(other) > len(word)} if len(word) == _SHORTEST - 1 else set()
-        near = swapped or longer
-    if not near or is_word(word) or word in _words_of("nouns"):  # "forge" is no misspelt "forget"
+    if meant := next((one for one in drawn if one in _known()), None):
+        return meant
+    if is_word(word) or word in _words_of("nouns"):  # "forge" is no misspelt "forget"
         return None
-    plain = {other for other in near if other.rstrip("s") not in near or other == other.rstrip("s")}
-    better = plain.pop() if len(plain) == 1 else None
-    begins_alike = better is not None and (better[0] == word[0] or better[1:] == word or sorted(better) == sorted(word))
-    return better if begins_alike else None
+    near = [(other, alike) for other, alike in _speller().suggest(word, 2) if not is_other_form(word, other)]
+    is_sure = near and (len(near) == 1 or near[0][1] > near[1][1]) and near[0][0][0] == word[0]
+    return near[0][0] if is_sure and (1.0 - near[0][1]) * max(len(word), len(near[0][0])) < 1.5 else None  # one letter
 
 
-def _neighbours(word: str) -> set[str]:
-    cuts = [(word[:at], word[at:]) for at in range(len(word) + 1)]
-    swapped = {before + after[1] + after[0] + after[2:] for before, after in cuts if len(after) > 1}
-    lost = {before + after[1:] for before, after in cuts if after}
-    put = {before + letter + after[cut:] for before, after in cuts for letter in ascii_lowercase for cut in (0, 1)}
-    return swapped | lost | put
+@cache
+def _speller() -> Speller:
+    return Speller(sorted(_known()))
 
 
 @cache

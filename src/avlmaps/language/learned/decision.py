@@ -235,23 +235,11 @@ def _places(intents: Sequence[Intent]) -> list[Intent]:
     looks = (act.Wait,) if any(isinstance(one, act.Move) for one in flat) else (act.Wait, act.Face, act.Turn)
     kept = [one for one in flat if not isinstance(one, looks)]
     found: list[Intent] = []
-    for one in (_rounded(on_targets(each, _plain)) for each in (kept or flat)):
+    for one in (on_targets(each, _plain) for each in (kept or flat)):
         if found and isinstance(one, act.StopAt) and found[-1] == act.Go(one.of):
             found.pop()  # "go to it, stop 1 m from it" ends as "stop 1 m from it"
         found.append(one)
     return found
-
-
-def _rounded(intent: Intent) -> Intent:
-    match intent:
-        case act.Move(metres=metres):
-            return act.Move(round(metres, 2))
-        case act.VisitEach(of=of):
-            return act.VisitEach(of)
-        case act.Turn(degrees=degrees) if degrees is not None:
-            return act.Turn(180.0 if degrees == -180.0 else round(degrees, 1))
-        case _:
-            return intent
 
 
 def _plain(target: Target) -> Target:
