@@ -18,6 +18,7 @@ from importlib import import_module
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
+from string import Template
 from typing import Any
 from urllib.request import Request, urlopen
 
@@ -59,29 +60,15 @@ _UNSAID: Mapping[str, tuple[str, Sequence[float]]] = {
 
 def grammar(tokens: Sequence[Token]) -> str:
     """Return the grammar of the programs that a model may write for a sentence; an empty line ends them."""
-    calls = " | ".join(_call(skill) for skill in skills().values() if skill.moves)
+    calls = [_call(skill) for skill in skills().values() if skill.moves]
     said = (token.text for token in tokens if token.kind in ("word", "number") and '"' not in token.text)
-    words = dict.fromkeys(word for word in said if word not in _ARTICLES)
-    sought = " | ".join(_literal(f"{name}=") for name in skills()["get_major_map"].alternatives if name != "img")
-    rules = {
-        "root": r'("start = robot.current_pos()\n")? step{1,10} "\n"',  # small models repeat themselves
-        "step": r'call "\n" | each | round | again',
-        "each": r'"for place in robot.get_all_pos(" target "):\n    robot.move_to(place)\n"',
-        "round": r'"outline = robot.get_contour(" name ")\nfor i in range(8):\n'
-                 r'    robot.move_to(outline[i * len(outline) // 8])\n"',
-        "again": r'"for i in range(" count "):\n" ("    " inner)+',
-        "inner": r'call "\n" | "for place in robot.get_all_pos(" target "):\n        robot.move_to(place)\n"',
-        "call": f"{calls} | {_literal('robot.move_to(start)')}",
-        "target": f"name | best | {_literal('robot.get_all_pos(')} name {_literal(')[-1]')}",
-        "best": r'"robot.get_max_pos_3d(robot.get_major_map(" part ")" (" * robot.get_map(" part ")")* ")"',
-        "part": f"({sought}) name",
-        "name": r'"\"" word (" " word){0,4} "\""',
-        "word": " | ".join(map(_literal, words)) or '"it"',
-        "count": " | ".join(_literal(f"{value:g}") for value in _said(tokens, "count", (2.0, 3.0))),
-        **{unit: " | ".join(_literal(f"{value:g}") for value in _said(tokens, of, unsaid))
-           for unit, (of, unsaid) in _UNSAID.items()},
-    }  # fmt: skip
-    return "\n".join(f"{name} ::= {rule}" for name, rule in rules.items())
+    words = [_literal(word) for word in dict.fromkeys(said) if word not in _ARTICLES]
+    sought = [_literal(f"{name}=") for name in skills()["get_major_map"].alternatives if name != "img"]
+    numbers = {"count": ("count", (2.0, 3.0)), **_UNSAID}
+    said_of = {unit: [_literal(f"{value:g}") for value in _said(tokens, *of)] for unit, of in numbers.items()}
+    rules = {"calls": calls, "words": words or ['"it"'], "sought": sought, **said_of}
+    text = files("avlmaps.language").joinpath("local_grammar.gbnf").read_text(encoding="utf-8")
+    return Template(text.strip()).substitute({name: " | ".join(rule) for name, rule in rules.items()})
 
 
 def _call(skill: Skill) -> str:

@@ -22,6 +22,7 @@ from msgspec import Meta
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.core.machine import is_loopback
+from avlmaps.language.word_classes import table
 
 HOSTED_URL = "https://api.openai.com/v1"
 MOST_BYTES = 1 << 20
@@ -31,18 +32,6 @@ _SHORTEST_KEY = 8
 _BOUNDED = frozenset({"timeout_s", "retries", "rounds", "temperature", "max_tokens"})
 _BUSY = frozenset({408, 425, 429, 500, 502, 503, 504, 529})
 _STATUSES = {401: "key", 403: "key", 404: "model", 429: "busy"}
-_SENTENCES = {
-    "unreachable": "The chat server {url} cannot be reached ({told}): {start}, or correct its address.",
-    "timeout": "{model!r} at {url} gave no answer within {timeout_s:g} s: raise AVLMAPS_CHAT_TIMEOUT_S, or take a "
-               "smaller model.",
-    "broken": "{url} broke off in the middle ({told}): look into the server's log.",
-    "garbled": "{url} does not speak the chat protocol: it answered with {told}; its address must be that of the API, "
-               "which mostly ends in /v1.",
-    "key": "{url} takes no request without a key of its own ({told}): set {key} to one that may use {model!r}.",
-    "model": "{url} has no model {model!r} ({told}): set AVLMAPS_CHAT_MODEL to {offered}.",
-    "busy": "{url} has had too many requests ({told}): try again {wait}.",
-    "other": "{url} does not answer the request ({told}): look into the server's log, or change model or settings.",
-}  # fmt: skip
 Shape = TypeVar("Shape")
 Messages = Sequence[Mapping[str, str]]
 
@@ -331,7 +320,7 @@ class Endpoint:
     def _sentence(self, fault: _Fault, model: str) -> str:
         settings = self._settings
         status = f"HTTP {fault.status}: {quoted(fault.told)}" if fault.told else f"HTTP {fault.status}"
-        sentence = _SENTENCES[fault.kind].format(
+        sentence = table("chat/faults")[fault.kind].format(
             url=settings.shown_url,
             model=model,
             timeout_s=settings.timeout_s,

@@ -260,10 +260,7 @@ def _plain(target: Target) -> Target:
 def is_doubtful(tokens: Sequence[Token], used: frozenset[int], meant: frozenset[str] = frozenset()) -> bool:
     """Return whether a reading leaves a number or a name unread, or a word that can turn a command round is said.
 
-    Args:
-        tokens: the sentence.
-        used: the tokens that the reading points at.
-        meant: words that belong to the reading though nothing points at them: of a wait "wait", no "no, wait".
+    It points at ``used``; ``meant`` belongs to it though nothing points there: of a wait "wait", no "no, wait".
     """
     covered = {at for start in used for at in range(start, max(start + 1, amount_end(tokens, start)))}
     said = {tokens[at].text for at in covered}

@@ -33,21 +33,13 @@ class Slot(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Amount:
-    """An amount: a pointer to where it is said, or a symbol for one that is said without a number.
+    """An amount: a pointer to where it is said, or a symbol for one that is said without a number."""
 
-    Attributes:
-        of: ``metres``, ``degrees``, ``clock``, ``seconds`` or ``count``.
-        said: the symbols and what they stand for: "a bit", "around".
-        optional: whether it may be missing.
-        sign: −1 where the value is the negative amount; half a turn is 180 degrees either way.
-        wraps: whether it is a heading, from 0 to 360 degrees.
-    """
-
-    of: str
-    said: Mapping[str, float] = field(default_factory=dict)
+    of: str  # ``metres``, ``degrees``, ``clock``, ``seconds`` or ``count``
+    said: Mapping[str, float] = field(default_factory=dict)  # the symbols and what they stand for: "a bit", "around"
     optional: bool = False
-    sign: int = 1
-    wraps: bool = False
+    sign: int = 1  # −1 where the value is the negative amount; half a turn is 180 degrees either way
+    wraps: bool = False  # whether it is a heading, from 0 to 360 degrees
 
     def value(self, amount: float) -> float:
         """Return the value of a field for an amount."""
@@ -68,17 +60,11 @@ class Amount:
 
 @dataclass(frozen=True)
 class Row:
-    """One way to write an intent.
+    """One way to write an intent."""
 
-    Attributes:
-        symbols: what begins it.
-        intent: its class.
-        fields: its fields, in the order in which they are written: an `Amount`, a `Slot`, a pair of those, or the
-            constant that the symbols stand for.
-    """
-
-    symbols: tuple[str, ...]
+    symbols: tuple[str, ...]  # what begins it
     intent: type[intents.Intent]
+    # In the order in which they are written: an `Amount`, a `Slot`, a pair of those, or what the symbols stand for.
     fields: Mapping[str, Any]
 
     @property
@@ -159,13 +145,7 @@ class MalformedError(ValueError):
 
 
 def amount(tokens: Sequence[Token], at: int, of: str) -> float | None:
-    """Return the amount that begins at a token, in metres, degrees, seconds, or a count; None where there is none.
-
-    Args:
-        tokens: the sentence.
-        at: the token.
-        of: ``metres``, ``degrees``, ``clock``, ``seconds`` or ``count``.
-    """
+    """Return the amount of a kind that begins at a token, in metres, degrees, seconds, or a count; None without one."""
     read = {
         "metres": (lexer.length_at, lexer.number_at), "degrees": (lexer.angle_at, lexer.number_at),
         "clock": (lexer.clock_at,), "seconds": (lexer.duration_at, lexer.number_at), "count": (lexer.number_at,),
@@ -188,13 +168,7 @@ def amount_end(tokens: Sequence[Token], at: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Open:
-    """What may follow a line of symbols.
-
-    Attributes:
-        symbols: which of `SYMBOLS`.
-        tokens: which tokens may be pointed at.
-        names: whether these are words of a name.
-    """
+    """What may follow a line: symbols, and tokens to point at; with ``names`` these are words of a name."""
 
     symbols: frozenset[str] = frozenset()
     tokens: frozenset[int] = frozenset()
@@ -240,10 +214,7 @@ _END = Open(frozenset({"end"}))
 class Grammar:
     """The grammar of lines for one sentence: it says what may follow a line, and what a line means.
 
-    Args:
-        can: what may be pointed at.
-        is_question: which of the two forms the line has.
-        at_source: whether the words of a sound mean the place where it came from.
+    ``at_source`` says whether the words of a sound mean the place where it came from.
     """
 
     def __init__(

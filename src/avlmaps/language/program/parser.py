@@ -15,6 +15,7 @@ from avlmaps.core.printable import UNSAFE, printable
 from avlmaps.core.words import nearest
 from avlmaps.language.program.values import bounded, kind_of, refused
 from avlmaps.language.program.vocabulary import ROBOT, Skill, ValueType, skills
+from avlmaps.language.word_classes import table
 
 MOST_CHARACTERS = 20_000
 DEEPEST_BLOCK = 10
@@ -41,30 +42,8 @@ _STRANGE = (
     (re.compile(r"\w{65,}"), "`{0:.20}...` has more than 64 characters; shorten it"),
     (re.compile(r"\\(?!\n)"), "a backslash stands outside of a string; remove it"),
 )  # fmt: skip
-# What is no part of a program, or not in this form, and what is to be written instead.
-_INSTEAD = {
-    "While": "count with a bounded loop, such as `for i in range(10):`",
-    "For": "leave out its `else`",
-    "Import ImportFrom": "the skills and `len, min, max, abs, range, round` are all there is",
-    "With AsyncWith AsyncFor Await": "call skills one after the other",
-    "Try TryStar Raise": "a skill that fails ends the program by itself",
-    "Assert Match": "use `if`",
-    "Delete": "let the name be, or give it another value",
-    "Global Nonlocal": "every name is seen everywhere",
-    "FunctionDef AsyncFunctionDef ClassDef Return Yield YieldFrom Lambda": "write the steps one after the other",
-    "ListComp SetComp DictComp GeneratorExp": "write the loop on lines of its own",
-    "Set Dict": "write a list, [...]",
-    "Slice": "pick one element, or go through all with `for`",
-    "Starred": "write each value",
-    "JoinedStr": "join strings with +",
-    "Assign NamedExpr AnnAssign TypeAlias": "a name is given a value on a line of its own, with one `=`",
-    "Pow MatMult LShift RShift BitAnd BitOr BitXor Invert": "use `+ - * / // %`, `and`, `or` and `not`",
-    "Expr": "the line works out a value and does nothing with it; name it or call a skill",
-    "Break Continue": "put it into the block of a `for`",
-    "Attribute": "the only dot is that of `robot.SKILL(...)`; a list grows by `name = name + [element]`",
-}  # fmt: skip
 _KINDS = {ast.List: ValueType.LIST, ast.Tuple: ValueType.TUPLE, ast.Compare: ValueType.TRUTH}
-_REMEDIES = {name: remedy for names, remedy in _INSTEAD.items() for name in names.split()}
+_REMEDIES = {name: said for names, said in table("program/refusals")["instead"].items() for name in names.split()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

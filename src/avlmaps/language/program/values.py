@@ -10,6 +10,7 @@ from typing import Any
 
 from avlmaps.core.errors import ProgramError
 from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Skill, ValueType
+from avlmaps.language.word_classes import table
 
 LARGEST = 10**15
 """No number in a program is further from zero: below it, whole numbers and floats are both exact."""
@@ -79,25 +80,20 @@ _ARITHMETIC: dict[str, tuple[dict[tuple[ValueType, ValueType], ValueType], str, 
     "//": (_NUMBERS, "two numbers", lambda left, right: left // right),
     "%": (_NUMBERS, "two numbers", lambda left, right: left % right),
 }
-# What a part of a program needs of a kind, and the refusal of another one.
-_NEEDS: dict[str, tuple[frozenset[ValueType], str]] = {
-    "truth": (
-        frozenset(ValueType) - _WITHOUT_TRUTH, "{0} is neither true nor false; compare it or a number with something"
-    ),
-    "sign": (frozenset({_NUMBER}), "a sign goes before a number, not {0}; write -1 * a Place"),
-    "walk": (_COLLECTIONS, "`for` goes through a list, a tuple or a range, not {0}; count with `range(10)`"),
-    "unpack": (_COLLECTIONS, "{0} cannot be taken apart into names; give it one name and use it whole"),
-    "index of": (
-        frozenset({ValueType.LIST, ValueType.TUPLE}),
-        "{0} has no elements to pick with [...]; only a list or a tuple has",
-    ),
-    "index": (frozenset({_NUMBER}), "an element is picked by a whole number in [...], not by {0}"),
-    "len": (_COLLECTIONS | {ValueType.STRING}, "`len` counts a list, a tuple, a range or a string, not {0}"),
-    "all of": (_COLLECTIONS, "`min` and `max` take several numbers or a list of them, not {0} alone"),
-    "number": (frozenset({_NUMBER}), "`min`, `max`, `abs`, `range` and `round` take numbers, not {0}"),
-    "in": (_COLLECTIONS, "`in` looks through a list, a tuple or a range, not {0}"),
-    "compared": (frozenset(ValueType) - {_HEAT}, "a Heat cannot be compared; multiply Heats and hand them to a skill"),
-}  # fmt: skip
+# The kinds that each part of a program takes; `refusals.toml` has the refusals of others.
+_NEEDS: dict[str, frozenset[ValueType]] = {
+    "truth": frozenset(ValueType) - _WITHOUT_TRUTH,
+    "sign": frozenset({_NUMBER}),
+    "walk": _COLLECTIONS,
+    "unpack": _COLLECTIONS,
+    "index of": frozenset({ValueType.LIST, ValueType.TUPLE}),
+    "index": frozenset({_NUMBER}),
+    "len": _COLLECTIONS | {ValueType.STRING},
+    "all of": _COLLECTIONS,
+    "number": frozenset({_NUMBER}),
+    "in": _COLLECTIONS,
+    "compared": frozenset(ValueType) - {_HEAT},
+}
 
 
 def kind_of(value: Value) -> ValueType:
@@ -107,9 +103,8 @@ def kind_of(value: Value) -> ValueType:
 
 def needed(line: int, use: str, value: Value) -> Any:
     """Return a value; refuse one of a kind that does not serve a use, see the table of uses."""
-    takes, refusal = _NEEDS[use]
-    if kind_of(value) not in takes:
-        raise refused(line, refusal.format(kind_of(value)))
+    if kind_of(value) not in _NEEDS[use]:
+        raise refused(line, table("program/refusals")["needs"][use].format(kind_of(value)))
     return value
 
 
