@@ -16,7 +16,7 @@ from avlmaps.language.sentence import rewritten
 from avlmaps.language.word_classes import filled, table, words_of
 
 _ORDER = "order"
-_QUOTE = re.compile(r"""(?<=\w) ["'“‘](?=\w)""")
+_QUOTE = re.compile(r"""(?<=[\w,]) ["'“‘](?=\w)""")
 _UNSURE = "unsure"
 _UNSURE_ANSWER = "Is this an order, to me, now?"
 
