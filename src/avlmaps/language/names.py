@@ -75,11 +75,6 @@ def _is_spelt(word: str) -> bool:
     return any(is_word(one) or one in _words_of("nouns") or _is_compound(one) for one in (word, *singulars_of(word)))
 
 
-def is_place(name: str) -> bool:
-    """Return whether people who use a name mean a room or another area: "potting shed" and "third-floor landing"."""
-    return name.lower().split()[-1:] != [] and name.lower().split()[-1] in _words_of("places")
-
-
 @cache
 def _words_of(name: str) -> frozenset[str]:
     return frozenset(files("avlmaps.language").joinpath(f"{name}.txt").read_text(encoding="utf-8").split())
@@ -242,8 +237,8 @@ def _better(word: str) -> str | None:
         return meant
     if is_word(word) or word in _words_of("nouns"):  # "forge" is no misspelt "forget"
         return None
-    near = [(other, alike) for other, alike in _speller().suggest(word, 2) if not is_other_form(word, other)]
-    is_sure = near and (len(near) == 1 or near[0][1] > near[1][1]) and near[0][0][0] == word[0]
+    near = [one for one in _speller().suggest(word, 9) if one[0][0] == word[0] and not is_other_form(word, one[0])]
+    is_sure = near and (len(near) == 1 or near[0][1] > near[1][1])
     return near[0][0] if is_sure and (1.0 - near[0][1]) * max(len(word), len(near[0][0])) < 1.5 else None  # one letter
 
 
