@@ -16,14 +16,7 @@ from avlmaps.language.commands import read_command
 from avlmaps.language.program.writing import write_program
 
 LISTS = Path(__file__).parent / "commands"
-NAMES = (
-    "commands.tsv",
-    "free.tsv",
-    "paraphrases.jsonl",
-    "paraphrases_2.jsonl",
-    "paraphrases_3.jsonl",
-    "paraphrases_4.jsonl",
-)
+NAMES = ("commands.tsv", "free.tsv", *(f"paraphrases{n}.jsonl" for n in ("", "_2", "_3", "_4")))
 
 
 def rows(name: str) -> Iterator[tuple[str, list[str]]]:

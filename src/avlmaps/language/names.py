@@ -237,8 +237,8 @@ def _better(word: str) -> str | None:
         return meant
     if is_word(word) or word in _words_of("nouns"):  # "forge" is no misspelt "forget"
         return None
-    near = [one for one in _speller().suggest(word, 9) if one[0][0] == word[0] and not is_other_form(word, one[0])]
-    is_sure = near and (len(near) == 1 or near[0][1] > near[1][1])
+    near = [(other, alike) for other, alike in _speller().suggest(word, 2) if not is_other_form(word, other)]
+    is_sure = near and (len(near) == 1 or near[0][1] > near[1][1]) and near[0][0][0] == word[0]
     return near[0][0] if is_sure and (1.0 - near[0][1]) * max(len(word), len(near[0][0])) < 1.5 else None  # one letter
 
 

@@ -185,17 +185,14 @@ class AVLMap:
         ``QueryError``: neither the encoder nor a person knows the word.
         """
         heat = self._object_heat(word, primary, vocabulary)
-        if not heat.factors[0].understood:
-            contents.require_known(lambda _: False, [word])
+        contents.require_known(lambda _: bool(heat.factors[0].understood), [word])
         return heat
 
     def _object_heat(self, word: str, primary: bool, vocabulary: Sequence[str] | None = None) -> Heatmap:
         part, heat = Part(Modality.OBJECT, word, _role(primary)), self.settings.heat
-        factor = self.edited.pinned(part, heat)
-        if factor is None and self.edited.is_room(word):
+        if (factor := self.edited.pinned(part, heat)) is None and self.edited.is_room(word):
             return self.area(word, primary)
-        if factor is None:
-            factor = self.edited.object_factor(part, heat, lambda: self._names.heat(part, vocabulary))
+        factor = factor or self.edited.object_factor(part, heat, lambda: self._names.heat(part, vocabulary))
         return Heatmap.of(factor, self.settings.found_at)
 
     @checked(QueryError)
@@ -481,10 +478,8 @@ class AVLMap:
     @property
     def doubts_of_things(self) -> tuple[str, ...]:
         """Why a list of its things may be wrong, one sentence each."""
-        doubts = self.data.info.doubts
-        if self.has(Kind.PIXELS):
-            return doubts
-        return (*doubts, "The map was made without a model for things, so that it names none.")
+        why = "The map was made without a model for things, so that it names none."
+        return self.data.info.doubts if self.has(Kind.PIXELS) else (*self.data.info.doubts, why)
 
     # What is computed once.
 

@@ -24,24 +24,10 @@ from avlmaps_sim.bench.harness.figures import wilson
 OUTCOMES = ("right", "harmless", "asked back", "misread")
 _STOPS = frozenset({"refuse", "clarify"})
 _LOOKS = frozenset({"wait", "face", "turn"})
-_WHO = frozenset(
-    {
-        "anyone",
-        "anybody",
-        "someone",
-        "somebody",
-        "person",
-        "a",
-        "an",
-        "the",
-        "sound",
-        "noise",
-        "of",
-        "on",
-        "people",
-        "sounds",
-    }
-)
+_WHO = frozenset({
+    "anyone", "anybody", "someone", "somebody", "person", "people", "a", "an", "the", "sound", "sounds", "noise", "of",
+    "on",
+})  # fmt: skip
 LISTED = {
     Ask.LARGEST_ROOM: ("rooms", "biggest"), Ask.SMALLEST_ROOM: ("rooms", "smallest"),
     Ask.FIRST_SOUND: ("sounds", "first"), Ask.LAST_SOUND: ("sounds", "last"),
