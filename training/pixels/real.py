@@ -79,15 +79,18 @@ def read_folder(folder: LabelledFolder) -> Iterator[Real]:
         yield fitted(folder.read(number), folder.camera)
 
 
-def fitted(one: LabelledFrame, camera: Pinhole) -> Real:
+def fitted(one: LabelledFrame, camera: Pinhole, fine: np.ndarray | None = None) -> Real:
     """Return a frame as large as fits into a shard's, with nothing to its right and below where it is of another shape.
 
-    Depth and labels are sampled, since a mean over an edge would be a place where nothing is.
+    Depth and labels are sampled, since a mean over an edge would be a place where nothing is. ``fine`` labels, where
+    there are any, stand for the frame's own.
     """
     scale = min(WIDTH / camera.width, HEIGHT / camera.height)
     w, h = max(1, round(camera.width * scale)), max(1, round(camera.height * scale))
     row, column = (np.arange(h) * camera.height // h)[:, None], np.arange(w) * camera.width // w
     label = np.where(one.label == 0, UNLABELLED, FIRST_COARSE + one.label.astype(int) - 1).astype(np.uint8)
+    if fine is not None:
+        label = np.where(fine == UNLABELLED, label, fine)
     ground = one.frame.ground
     assert ground is not None
     small = camera.resized(w, h)

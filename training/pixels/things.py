@@ -6,7 +6,6 @@ A place is found in the finished scene: flat surfaces of what stands there, and 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -59,18 +58,20 @@ _WHERE: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 # What lies together where it is untidy.
 _CLUMPS = {
-    "counter": ("plate cup bowl drinking_glass can food fruit cutlery pan jug chopping_board knife_block bottle kettle "
-                "toaster blender coffee_machine pot box soap tableware microwave"),
-    "table": ("plate cup bowl drinking_glass can food fruit cutlery jug bottle key eyeglasses mobile_phone "
-              "remote_control book tablet paper medicine candle toy bag camera scissors"),
-    "desk": ("computer_mouse mobile_phone tablet pen stapler scissors headphones camera cup can book eyeglasses paper "
-             "drinking_glass games_console remote_control key laptop telephone bottle tool"),
-    "shelf": ("book vase box clock camera hat headphones flashlight toy plant basket games_console medicine candle "
-              "loudspeaker bag"),
-    "bath": "soap medicine toilet_paper brush bottle towel cup",
-    "soft": "clothing bag book remote_control toy hat tablet headphones towel mobile_phone games_console backpack",
-    "sink": "plate cup bowl drinking_glass cutlery pan pot jug",
-    "floor": "box bag backpack suitcase shoes toy ball basket box bag clothing tool umbrella",
+    "counter": ("plate, cup, bowl, drinking glass, can, food, fruit, cutlery, pan, jug, chopping board, knife block, "
+                "bottle, kettle, toaster, blender, coffee machine, pot, box, soap, tableware, microwave"),
+    "table": ("plate, cup, bowl, drinking glass, can, food, fruit, cutlery, jug, bottle, key, eyeglasses, mobile "
+              "phone, remote control, book, tablet, paper, medicine, candle, toy, bag, camera, scissors"),
+    "desk": ("computer mouse, mobile phone, tablet, pen, stapler, scissors, headphones, camera, cup, can, book, "
+             "eyeglasses, paper, drinking glass, games console, remote control, key, laptop, telephone, bottle, "
+             "tool"),
+    "shelf": ("book, vase, box, clock, camera, hat, headphones, flashlight, toy, plant, basket, games console, "
+              "medicine, candle, loudspeaker, bag"),
+    "bath": "soap, medicine, toilet paper, brush, bottle, towel, cup",
+    "soft": ("clothing, bag, book, remote control, toy, hat, tablet, headphones, towel, mobile phone, games "
+             "console, backpack"),
+    "sink": "plate, cup, bowl, drinking glass, cutlery, pan, pot, jug",
+    "floor": "box, bag, backpack, suitcase, shoes, toy, ball, basket, box, bag, clothing, tool, umbrella",
 }  # fmt: skip
 _RARE = frozenset({"rocking horse", "other", "trash can", "plant"})  # homes hold many already, or one model is all
 # Families of the simulator's own shapes that are of a category which homes do not know, as training worlds call them.
@@ -83,6 +84,10 @@ _STACKED = frozenset({"plate", "book", "box", "bowl", "paper", "chopping board"}
 _CELL_M, _FLOOR_CELL_M = 0.015, 0.03
 _BANDS_M = (0.008, 0.05, 0.1, 0.18, 0.28, 0.4, 0.6, 0.9, 1.3)  # heights at which it may be free over a surface
 _ROUGH_M = {"soft": 0.05, "floor": 0.03}
+# Heights of the middle of what hangs on walls.
+_HUNG_M = {"power socket": (0.3, 0.3, 0.3, 1.15), "light switch": (1.1,), "toilet paper": (0.7,),
+           "fire extinguisher": (1.0,)}  # fmt: skip
+_UP = np.array([0.0, 0.0, 1.0])
 _PIXELS_ACROSS = 24  # how large a thing should be at least in a view of it
 _FLAT, _SMALLEST_M2, _MOST_LEVELS = 0.93, 0.015, 6
 
@@ -108,24 +113,6 @@ def _tops(corners, origin, cell_m, grid):  # pragma: no cover - compiled
                 u, v = (x * cy - y * cx) / area, (bx * y - by * x) / area
                 if u >= -1e-6 and v >= -1e-6 and u + v <= 1.000001:
                     grid[i, j] = max(grid[i, j], az + u * bz + v * cz)
-
-
-@njit(cache=True)
-def _inside(corners, low, high):  # pragma: no cover - compiled
-    """Return which triangles may have a point in a box."""
-    kept = np.empty(corners.shape[0], np.int64)
-    count = 0
-    for t in range(corners.shape[0]):
-        there = True
-        for k in range(3):
-            p, q, r = corners[t, 0, k], corners[t, 1, k], corners[t, 2, k]
-            if max(p, q, r) < low[k] or min(p, q, r) > high[k]:
-                there = False
-                break
-        if there:
-            kept[count] = t
-            count += 1
-    return kept[:count]
 
 
 @njit(cache=True)
@@ -187,31 +174,28 @@ class _Level:
         return _SHARE.get(self.sort, 1.0) * min(area, 1.5) ** 0.7 if area > 0.006 else 0.0
 
     def set_down(
-        self, mesh: Mesh, rng: np.random.Generator, near: np.ndarray | None = None, yaw: float | None = None
-    ) -> tuple[Mesh, np.ndarray] | None:
-        """Return the thing where it meets nothing, and the middle of it; None where it finds no place."""
-        wide, deep, high = (float(s) for s in mesh.size)
-        good = self.carries & (self.free_m > high + 0.005)
+        self, size: np.ndarray, rng: np.random.Generator, near: np.ndarray | None = None
+    ) -> tuple[float, np.ndarray] | None:
+        """Return a turn and a place where a thing of this size meets nothing; None where there is none."""
+        good = self.carries & (self.free_m > size[2] + 0.005)
         i, j = np.nonzero(good)
         if not len(i):
             return None
         weight = self.liked[i, j]
         if near is not None:
-            away = self.origin + (np.column_stack([i, j]) + 0.5) * self.cell_m - near
+            away = self.origin + (np.column_stack([i, j]) + 0.5) * self.cell_m - near[:2]
             weight = weight * (np.exp(-np.hypot(*away.T) / 0.2) + 1e-6)
         total = np.cumsum(weight)
         for pick in np.minimum(np.searchsorted(total, rng.uniform(0, total[-1], 14)), len(i) - 1):
-            turn = rng.uniform(-np.pi, np.pi) if yaw is None else yaw + rng.normal(0, 0.15)
+            turn = rng.uniform(-np.pi, np.pi)
             xy = self.origin + (np.array([i[pick], j[pick]]) + rng.uniform(0, 1, 2)) * self.cell_m
-            cells = self._under(xy, wide, deep, turn)
-            if cells is None or not good[cells].all():
-                continue
-            under = self.height_m[cells]
-            if np.ptp(under) > self.rough_m:
+            cells = self._under(xy, float(size[0]), float(size[1]), turn)
+            if cells is None or not good[cells].all() or np.ptp(self.height_m[cells]) > self.rough_m:
                 continue
             self.free_m[cells] = 0.0
+            under = self.height_m[cells]
             z = float(under.max() if self.rough_m < 0.04 else np.quantile(under, 0.7))
-            return mesh.turned(turn).moved(float(xy[0]), float(xy[1]), z + 0.001), xy
+            return turn, np.array([*xy, z + 0.001])
         return None
 
     def _under(self, xy: np.ndarray, wide: float, deep: float, turn: float) -> tuple[np.ndarray, np.ndarray] | None:
@@ -235,9 +219,9 @@ class _Placed:
             replace(t, category=_FAMILIES.get((t.category, t.family), t.category)) for t in scene.objects
         ]
         self.corners = scene.mesh.corners().astype(np.float64)
+        self.lows, self.highs = self.corners.min(axis=1), self.corners.max(axis=1)
         flat = np.abs(scene.mesh.normals()[:, 2]) > _FLAT
         self.levels: dict[str, list[_Level]] = {}
-        self.count = 0
         order = np.argsort(scene.instance, kind="stable")
         ends = np.searchsorted(scene.instance[order], np.arange(len(scene.objects) + 1))
         for number, thing in enumerate(scene.objects):
@@ -249,18 +233,16 @@ class _Placed:
             self._floor_of(area, grounds)
 
     def _near(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        return self.corners[_inside(self.corners, low, high)]
+        """Return the triangles that may have a point in a box."""
+        return self.corners[((self.lows <= high) & (self.highs >= low)).all(axis=1)]
 
     def _tops_of(self, thing: SceneObject, triangles: np.ndarray, sort: str) -> None:
         corners = self.corners[triangles]
-        if not len(corners):
-            return
         z = corners[..., 2].mean(axis=1)
         edge = corners[:, 1:, :2] - corners[:, :1, :2]
         area = np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0]) / 2
         rough = _ROUGH_M.get(sort, 0.012)
-        over_floor = z - thing.low[2]
-        left = (over_floor < 1.7) & ((sort != "sink") | (z < thing.high[2] - 0.05))
+        left = (z - thing.low[2] < 1.7) & ((sort != "sink") | (z < thing.high[2] - 0.05))
         for _ in range(_MOST_LEVELS):
             if area[left].sum() < _SMALLEST_M2:
                 return
@@ -322,7 +304,6 @@ class _Placed:
 
     def add(self, thing: Thing, mesh: Mesh) -> None:
         self.builder.add(thing.category, mesh, family=f"{FAMILY} {thing.name}")
-        self.count += 1
 
     def level(self, sort: str) -> _Level | None:
         levels = self.levels.get(sort, [])
@@ -331,9 +312,7 @@ class _Placed:
 
     def any_level(self) -> _Level | None:
         sorts = [sort for sort in self.levels if sort not in ("sink", "stove")]
-        weight = np.array([sum(level.weight for level in self.levels[sort]) for sort in sorts])
-        if sorts:
-            weight[[sort == "floor" for sort in sorts]] *= 0.1
+        weight = np.array([sum(each.weight for each in self.levels[s]) * (0.1 if s == "floor" else 1.0) for s in sorts])
         return self.level(sorts[int(self.rng.choice(len(sorts), p=weight / weight.sum()))]) if weight.sum() else None
 
     def one(self, category: str) -> None:
@@ -343,10 +322,10 @@ class _Placed:
             return
         thing, mesh = self.draw(category)
         if thing.on_wall or (category in ("fire extinguisher", "clock", "towel") and rng.random() < 0.25):
-            self.hang(thing, mesh)
+            self.fix(thing, mesh)
             return
-        if category == "broom" and mesh.size[2] > 1.0 and rng.random() < 0.8:
-            self.lean(thing, mesh)
+        if category == "broom" and mesh.size[2] > 1.0:
+            self.fix(thing, mesh, leaning=True)
             return
         where = _WHERE.get(category, ())
         for _ in range(3):
@@ -359,39 +338,33 @@ class _Placed:
 
     def put(self, thing: Thing, mesh: Mesh, level: _Level, near: np.ndarray | None = None) -> np.ndarray | None:
         """Set one thing or a pile of such down, and return where."""
-        rng = self.rng
-        pile, top = [mesh], float(mesh.size[2])
+        rng, pile, nests = self.rng, [mesh], thing.category in ("plate", "bowl")
         while thing.category in _STACKED and rng.random() < 0.35 and len(pile) < 6:
-            _, other = self.draw(thing.category) if thing.category in ("book", "box") else (thing, mesh)
-            if np.any(np.sort(other.size[:2]) > np.sort(pile[-1].size[:2]) * 1.05) or np.ptp(pile[-1].size) < 0.02:
+            below = pile[-1]
+            other = self.draw(thing.category)[1] if thing.category in ("book", "box") else mesh
+            if np.any(np.sort(other.size[:2]) > np.sort(below.size[:2]) * 1.05) or np.ptp(below.size) < 0.02:
                 break
-            nested = 0.35 if thing.category in ("plate", "bowl") else 1.0
-            step = float(other.size[2]) * nested if thing.category in ("plate", "bowl") else 0.0
-            z = float(pile[-1].low[2]) + step if step else top
-            pile.append(other.turned(rng.choice([0.0, np.pi / 2, np.pi]) if other.size[0] < pile[0].size[1] * 1.1
-                                     else rng.normal(0, 0.06)).moved(z=z + 0.001))  # fmt: skip
-            top = z + float(other.size[2])
-        heap = _boxed(pile)
-        done = level.set_down(heap, rng, near)
-        if done is None and len(pile) > 1:
+            z = float(below.low[2] + 0.35 * other.size[2] if nests else below.high[2])
+            square = rng.choice([0.0, np.pi / 2, np.pi]) if other.size[0] < mesh.size[1] * 1.1 else rng.normal(0, 0.06)
+            pile.append(other.turned(square).moved(z=z + 0.001))
+        while True:
+            half = np.max([np.maximum(-each.low, each.high) for each in pile], axis=0)
+            if done := level.set_down(half * (2, 2, 1), rng, near):
+                break
+            if len(pile) == 1:
+                return None
             pile = pile[:1]
-            heap = _boxed(pile)
-            done = level.set_down(heap, rng, near)
-        if done is None:
-            return None
-        moved, xy = done
-        turn, z = _turn_of(heap, moved), float(moved.low[2])
+        turn, at = done
         for each in pile:
-            self.add(thing, each.turned(turn).moved(float(xy[0]), float(xy[1]), z))
-        return xy
+            self.add(thing, each.turned(turn).moved(*map(float, at)))
+        return at
 
     def clump(self, sort: str) -> None:
         """Put several things close together, as where it is untidy."""
         level = self.level(sort)
         if level is None:
             return
-        names = [name.replace("_", " ") for name in _CLUMPS[sort].split()]
-        names = [name for name in names if name in self.things]
+        names = [name for name in _CLUMPS[sort].split(", ") if name in self.things]
         near = None
         for _ in range(int(self.rng.integers(3, 8)) if sort in ("sink", "bath") else int(self.rng.integers(5, 14))):
             thing, mesh = self.draw(names[int(self.rng.integers(len(names)))])
@@ -399,112 +372,67 @@ class _Placed:
                 at = self.put(thing, mesh, level, near)
                 near = at if near is None else near
 
-    def hang(self, thing: Thing, mesh: Mesh) -> None:
-        """Fix a thing to a wall or a ceiling."""
-        rng, areas = self.rng, self.scene.areas
-        doors = [t for t in self.scene.objects if t.category in ("door", "folding door")]
+    def fix(self, thing: Thing, mesh: Mesh, leaning: bool = False) -> None:
+        """Fix a thing to a wall or a ceiling, or lean it on a wall."""
+        rng, areas, on_ceiling = self.rng, self.scene.areas, thing.category == "smoke detector"
+        doors = [each for each in self.scene.objects if each.category in ("door", "folding door")]
+        if leaning:
+            mesh = mesh.tilted("y", -rng.uniform(0.06, 0.22)).standing()
+        elif on_ceiling:
+            mesh = mesh.tilted("y", np.pi / 2)
         for attempt in range(12):
             area = areas[int(rng.integers(len(areas)))]
             edge = np.roll(area.polygon, -1, axis=0) - area.polygon
             length = np.linalg.norm(edge, axis=1)
             number = int(rng.choice(len(length), p=length / length.sum()))
             along = edge[number] / max(length[number], 1e-6)
-            inward = np.array([-along[1], along[0]])
-            if thing.category == "smoke detector":
-                low, high = area.polygon.min(axis=0), area.polygon.max(axis=0)
-                xy = rng.uniform(low, high)
-                flat = mesh.tilted("y", np.pi / 2)
-                if area.contains(xy) and self._fix(
-                    thing, flat, np.array([*xy, area.ceiling_m]), np.array([0, 0, -1.0])
-                ):
-                    return
-                continue
-            xy = area.polygon[number] + along * rng.uniform(0.0, length[number])
-            if thing.category == "light switch" and doors:
-                beside = [(np.maximum(np.maximum(d.low[:2] - xy, xy - np.array(d.high[:2])), 0)) for d in doors]
-                if not 0.08 < min(float(np.hypot(*b)) for b in beside) < 0.4 and attempt < 9:
+            away, turned = np.array([-along[1], along[0], 0.0]), mesh
+            if on_ceiling:
+                xy, z, away = rng.uniform(area.polygon.min(axis=0), area.polygon.max(axis=0)), area.ceiling_m, -_UP
+                if not area.contains(xy):
                     continue
-            z = area.floor_m + _hung_at(thing.category, float(mesh.size[2]), rng)
-            turned = mesh.turned(float(np.arctan2(inward[1], inward[0])))
-            if self._fix(thing, turned, np.array([*xy, z]), np.array([*inward, 0.0])):
+            else:
+                xy = area.polygon[number] + along * rng.uniform(0.0, length[number])
+                turned = mesh.turned(float(np.arctan2(away[1], away[0])))
+                z = area.floor_m + (mesh.size[2] / 2 if leaning else _hung_at(thing.category, mesh.size[2], rng))
+            if thing.category == "light switch" and doors and attempt < 9:
+                beside = [np.maximum(np.maximum(d.low[:2] - xy, xy - np.array(d.high[:2])), 0) for d in doors]
+                if not 0.08 < min(float(np.hypot(*each)) for each in beside) < 0.4:
+                    continue
+            if self._fixed(thing, turned, np.array([*xy, z]), away, 0.04 if leaning else 0.004):
                 return
 
-    def _fix(self, thing: Thing, mesh: Mesh, place: np.ndarray, away: np.ndarray, rough_m: float = 0.004) -> bool:
+    def _fixed(self, thing: Thing, mesh: Mesh, place: np.ndarray, away: np.ndarray, rough_m: float) -> bool:
         """Fix a mesh to the surface behind a place, where it lies flat against it and nothing is before it."""
-        middle = (mesh.low + mesh.high) / 2
         half = (mesh.high - mesh.low) / 2
         deep = float(np.abs(away) @ (2 * half))
         start = deep + 0.15
         near = self._near(place - 0.6 - half, place + 0.6 + half)
-        across = np.eye(3)[[k for k in range(3) if abs(away[k]) < 0.7]] if abs(away[2]) > 0.7 else np.stack(
-            [np.array([-away[1], away[0], 0.0]), np.array([0.0, 0.0, 1.0])])  # fmt: skip
+        across = np.eye(3)[:2] if abs(away[2]) > 0.7 else np.stack([np.array([-away[1], away[0], 0.0]), _UP])
         extent = np.abs(across) @ half
         nobody = np.zeros(len(near), np.int32)
-        hits = []
-        for a, b in ((0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
-            beside = a * extent[0] * across[0] + b * extent[1] * across[1]
-            hits.append(2 * start * _reach(near, nobody, place + away * start + beside, -2 * start * away, -1))
+        hits = [
+            2
+            * start
+            * _reach(near, nobody, place + away * start + np.array(side) * extent @ across, -2 * start * away, -1)
+            for side in ((0, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
+        ]
         if np.ptp(hits) > rough_m or not deep + 0.005 < min(hits) < start + 0.15:
             return False
-        at = place + away * (start - min(hits) + deep / 2 + 0.001) - middle
-        placed = mesh.moved(*(float(v) for v in at))
-        mine_low, mine_high = placed.low - 0.02, placed.high + 0.02
-        for other in self.builder.objects[len(self.scene.objects) :]:
-            if np.all(mine_low <= other.high) and np.all(mine_high >= other.low):
-                return False
+        at = place + away * (start - min(hits) + deep / 2 + 0.001) - (mesh.low + mesh.high) / 2
+        placed = mesh.moved(*map(float, at))
+        low, high = placed.low - 0.02, placed.high + 0.02
+        if any(np.all((low <= it.high) & (high >= it.low)) for it in self.builder.objects[len(self.scene.objects) :]):
+            return False
         self.add(thing, placed)
         return True
-
-    def lean(self, thing: Thing, mesh: Mesh) -> None:
-        """Lean a long thing on a wall."""
-        rng, angle = self.rng, self.rng.uniform(0.06, 0.22)
-        leaning = mesh.tilted("y", -angle).standing()
-        for _ in range(15):
-            before = self.count
-            area = self.scene.areas[int(rng.integers(len(self.scene.areas)))]
-            edge = np.roll(area.polygon, -1, axis=0) - area.polygon
-            number = int(rng.integers(len(edge)))
-            long = float(np.linalg.norm(edge[number]))
-            along = edge[number] / max(long, 1e-6)
-            inward = np.array([-along[1], along[0]])
-            place = np.array([*(area.polygon[number] + along * rng.uniform(0, long)), area.floor_m + mesh.size[2] / 2])
-            self._fix(thing, leaning.turned(float(np.arctan2(*inward[::-1]))), place, np.array([*inward, 0.0]), 0.04)
-            if self.count > before:
-                return
 
 
 def _hung_at(category: str, high: float, rng: np.random.Generator) -> float:
     """Return the height of the middle over the floor."""
-    if category == "power socket":
-        return float(rng.choice([0.3, 0.3, 0.3, 1.15])) + rng.normal(0, 0.04)
-    if category == "light switch":
-        return 1.1 + rng.normal(0, 0.05)
-    if category == "toilet paper":
-        return 0.7 + rng.normal(0, 0.08)
-    if category == "fire extinguisher":
-        return 1.0 + rng.normal(0, 0.1)
+    if category in _HUNG_M:
+        return float(rng.choice(_HUNG_M[category])) + rng.normal(0, 0.05)
     return max(rng.uniform(1.3, 1.8) - high / 4, 0.1 + high / 2)
-
-
-def _boxed(pile: list[Mesh]) -> Mesh:
-    """Return the corners of the box round a pile, as a mesh of a single triangle, to find a place for it."""
-    low, high = np.min([m.low for m in pile], axis=0), np.max([m.high for m in pile], axis=0)
-    middle = (low + high) / 2
-    half = np.maximum(high - middle, middle - low)
-    half[:2] = np.maximum(np.abs(low[:2]), np.abs(high[:2]))
-    vertex = np.array([[-half[0], -half[1], 0], [half[0], -half[1], 0], [half[0], half[1], high[2]]], np.float32)
-    return Mesh(vertex, np.array([[0, 1, 2]], np.int32), np.zeros((1, 3, 2), np.float32), np.zeros(1, np.int32),
-                pile[0].materials[:1])  # fmt: skip
-
-
-def _turn_of(before: Mesh, after: Mesh) -> float:
-    a, b = (m.vertex[1, :2] - m.vertex[0, :2] for m in (before, after))
-    return float(np.arctan2(b[1], b[0]) - np.arctan2(a[1], a[0]))
-
-
-@cache
-def _things_of(folder: Path, which: Families) -> dict[str, list[Thing]]:
-    return small_things(folder, which)
 
 
 def with_things(scene: Scene, folder: Path, rng: np.random.Generator, which: Families) -> Scene:
@@ -516,7 +444,7 @@ def with_things(scene: Scene, folder: Path, rng: np.random.Generator, which: Fam
         rng: what is where.
         which: the models that the network learns from, those that it never sees, or all.
     """
-    things = _things_of(folder, which)
+    things = small_things(folder, which)
     placed = _Placed(scene, rng, things)
     for sort, mean in (("counter", 1.6), ("table", 1.0), ("desk", 0.8), ("floor", 0.6), ("sink", 0.7), ("shelf", 0.5),
                        ("soft", 0.3), ("bath", 0.4)):  # fmt: skip
