@@ -103,7 +103,7 @@ class Options:
 # Of a kind of COCO, or of a name of ``looked_at.csv``: what may cover a pixel of NYU's, beside what says "other".
 _LOOSE = (0, *(CLASSES.index(name) + 1 for name in ("other structure", "other furniture", "other prop")))
 _BAG = CLASSES.index("bag") + 1
-_ALSO = dict.fromkeys(("backpack", "suitcase", "handbag", "bag"), (_BAG,))
+_ALSO: dict[str, tuple[int, ...]] = dict.fromkeys(("backpack", "suitcase", "handbag", "bag"), (_BAG,))
 # A thing that NYU cut out for itself lies in its box with this share.
 WITHIN = 0.9
 
@@ -124,7 +124,7 @@ def open_part(label: np.ndarray, name: str, corners: tuple[float, ...]) -> np.nd
     x0, y0, x1, y1 = (round(value) for value in corners)
     box = np.zeros(label.shape, bool)
     box[max(y0, 0) : y1 + 1, max(x0, 0) : x1 + 1] = True
-    _, piece = cv2.connectedComponents((loose & (label > 0)).astype(np.uint8), connectivity=4)
+    piece = np.asarray(cv2.connectedComponents((loose & (label > 0)).astype(np.uint8), connectivity=4)[1], np.intp)
     inside, everywhere = (np.bincount(piece[where], minlength=piece.max() + 1) for where in (box, np.ones_like(box)))
     whole = inside >= WITHIN * np.maximum(everywhere, 1)
     whole[0] = False

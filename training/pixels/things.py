@@ -293,7 +293,7 @@ class _Placed:
         z = self.corners[at, :, 2].mean(axis=1)
         at = at[np.abs(z - area.floor_m) < 0.05]
         level = self._grid(self.corners[at], "floor", low, shape, _FLOOR_CELL_M, area.floor_m + 0.02, 0.03)
-        middles = low + (np.stack(np.indices(shape), axis=-1) + 0.5) * _FLOOR_CELL_M
+        middles = low + (np.moveaxis(np.indices(shape), 0, -1) + 0.5) * _FLOOR_CELL_M
         level.carries &= area.contains(middles)
         self.levels.setdefault("floor", []).append(level)
 
