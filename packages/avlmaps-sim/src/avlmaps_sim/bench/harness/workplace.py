@@ -252,7 +252,7 @@ class Workplace:
             stored = build_map(self.recording, path, used, settings, progress=False)
         except MapError:  # by another release, or with other settings
             stored = build_map(self.recording, path, used, settings, overwrite=True, progress=False)
-        return AVLMap(stored, settings=query_settings(rules))
+        return AVLMap(stored, path=path, settings=query_settings(rules))
 
     @cached_property
     def _true_voxels(self) -> TrueVoxels:
