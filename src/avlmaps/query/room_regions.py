@@ -151,7 +151,7 @@ def _gaps(wall: Cells, post: Cells, free: Cells, cell_m: float, widest_m: float 
     row, start, end, long = row[held], start[held], end[held], long[held]
     q = np.flatnonzero(row[1:] == row[:-1])
     row, a, b, before, after = row[q], end[q], start[q + 1], long[q], long[q + 1]
-    above, below = _nearest(free.T)
+    above, below = floor_plan.beside(free.T, 1)
     thickness_m = (below - above - 1).T * cell_m
     before &= thickness_m[row, np.maximum(a - 3, 0)] <= _MOST_WALL_M
     after &= thickness_m[row, np.minimum(b + 2, wall.shape[1] - 1)] <= _MOST_WALL_M
@@ -165,7 +165,7 @@ def _leads_somewhere(gaps: _Gaps, solid: Cells, free: Cells, cell_m: float) -> C
     # The floor is wider on both sides; between two ends of walls one is enough. A passage whose own walls are the ends
     # of others is as wide on both sides as here, and no doorway.
     seen, width, middle = _sums(free), gaps.b - gaps.a, (gaps.a + gaps.b) // 2
-    before, after = _nearest(solid)
+    before, after = floor_plan.beside(solid, 1)
     sides: list[tuple[Chosen, Chosen]] = []
     for side in (-1, 1):
         free_there, wider = np.zeros(len(width), bool), np.zeros(len(width), bool)
@@ -192,13 +192,6 @@ def _runs(cells: Cells) -> tuple[Numbers, Numbers, Numbers]:
 
 def _sums(cells: Cells) -> Int[np.ndarray, "r c1"]:
     return np.pad(np.cumsum(cells, axis=1, dtype=np.int64), ((0, 0), (1, 0)))
-
-
-def _nearest(cells: Cells) -> tuple[Labels, Labels]:
-    column = np.arange(int(cells.shape[1]))
-    before = np.maximum.accumulate(np.where(cells, column, -1), axis=1)
-    after = np.minimum.accumulate(np.where(cells, column, len(column))[:, ::-1], axis=1)[:, ::-1]
-    return before, after
 
 
 @dataclass(frozen=True, slots=True, eq=False)

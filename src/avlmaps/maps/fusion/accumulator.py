@@ -38,14 +38,10 @@ class PixelLookup:
     y: Float64[np.ndarray, " hd"]  # and of each row
     # colour column of each depth column, first colour pixel of each depth row, and likewise for the cells of the
     # feature map; -1 where that is outside
-    tables: tuple[
-        Int32[np.ndarray, " wd"], Int32[np.ndarray, " hd"], Int32[np.ndarray, " wd"], Int32[np.ndarray, " hd"]
-    ]
+    tables: tuple[Int32[np.ndarray, " n"], ...]
     # whether to project instead, rgb_from_depth, colour camera's fx fy cx cy, its rows and columns, rows and columns of
     # the feature map
-    projection: tuple[
-        bool, Float64[np.ndarray, "4 4"], tuple[float, float, float, float], tuple[int, int], tuple[int, int]
-    ]
+    projection: kernels.Projection
 
 
 def look_up(rig: Rig, feature_rows: int, feature_columns: int) -> PixelLookup:
@@ -84,18 +80,13 @@ class _Scratch:
 
     def __init__(self, height: int, width: int, *, with_spread: bool) -> None:
         pixels, spreads = height * width, kernels.SPREAD_COLUMNS - 1 if with_spread else 0
-        self.row: kernels.Row = (
-            np.empty(width, np.int64), np.empty(width), np.empty(width, np.int64), np.empty(width, np.int32),
-            np.empty(width, np.int32),
-        )  # fmt: skip
+        self.row: kernels.Row = tuple(np.empty(width, kind) for kind in ("i8", "f8", "i8", "i4", "i4"))
         self.voxels: kernels.FrameVoxels = (
             np.empty(_FIRST_SLOTS, np.int64), np.empty(_FIRST_SLOTS, np.int32), np.empty(pixels, np.int64),
             np.empty((pixels, kernels.SUM_COLUMNS)), np.empty((pixels, spreads)),
         )  # fmt: skip
-        self.pairs: kernels.Pairs = (
-            np.empty(pixels, np.int32), np.empty(pixels), np.empty(pixels, np.int32), np.empty(pixels, np.int32),
-            np.empty(kernels.RECENT_PAIRS, np.int32), np.empty(pixels, np.int32),
-        )  # fmt: skip
+        of_pairs = (np.empty(pixels, kind) for kind in ("i4", "f8", "i4", "i4", "i4"))
+        self.pairs: kernels.Pairs = (*of_pairs, np.empty(kernels.RECENT_PAIRS, np.int32))
 
     def enlarge(self) -> None:
         slots = 2 * len(self.voxels[0])

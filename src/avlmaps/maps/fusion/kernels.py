@@ -36,17 +36,15 @@ Pose = tuple[np.ndarray, np.ndarray, np.ndarray]
 Limits = tuple[float, float, float, float, float, float]
 Projection = tuple[bool, np.ndarray, tuple[float, float, float, float], tuple[int, int], tuple[int, int]]
 # Of the pixels of a row: key (of its voxel), weight, sharp (how exact), picture (its colour pixel), cell.
-Row = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+Row = tuple[np.ndarray, ...]
 # Of the frame's voxels: a hash table (key of each slot, its voxel), the key of each, its sums, and where its points lie
 # in it: sums of x, y, z from its middle, in voxels, and of their products xx, xy, xz, yy, yz, zz (or no columns).
-FrameVoxels = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+FrameVoxels = tuple[np.ndarray, ...]
 # Of the map: slots, index, and the sums of `VoxelSums` but those of features.
-Table = tuple[
-    np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray
-]
-# Of each pair as it was met: its cell, its weight, the pair of the same voxel before; the last of each voxel; those
-# that were used last, and the voxel of each pair.
-Pairs = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+Table = tuple[np.ndarray, ...]
+# Of each pair as it was met: its cell, its weight, the pair of the same voxel before; the last of each voxel; the voxel
+# of each pair, and the pairs that were used last.
+Pairs = tuple[np.ndarray, ...]
 
 
 @njit(**OPTIONS)
@@ -95,7 +93,7 @@ def trace(
     pose: Pose,
     limits: Limits,
     rgb: UInt8[np.ndarray, "pixels 3"],
-    tables: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    tables: tuple[np.ndarray, ...],
     projection: Projection,
     row: Row,
     voxels: FrameVoxels,
@@ -111,7 +109,7 @@ def trace(
     """
     keys, weights, sharp, picture, cells = row
     slot_key, slot_voxel, voxel_key, voxel_sum, voxel_spread = voxels
-    pair_cell, pair_weight, pair_before, last_pair, recent, pair_voxel = pairs
+    pair_cell, pair_weight, pair_before, last_pair, pair_voxel, recent = pairs
     (x, y), (rotation, translation, origin) = rays, pose
     voxel_size, nearest, farthest, falloff, noise, noise_growth = limits
     projected, to_rgb, (fx, fy, cx, cy), (height, width), (cell_rows, cell_columns) = projection

@@ -100,10 +100,7 @@ class VoxelTable:
     @property
     def arrays(self) -> Table:
         """What `kernels.commit` adds to."""
-        return (
-            self.slots, self.index, self.rgb_sum, self.rgb_weight, self.hits, self.views, self.sharp, self.last_seen_s,
-            self.spread,
-        )  # fmt: skip
+        return (self.slots, self.index, *(getattr(self, name) for name in _FIELDS[_FIELDS.index("rgb_sum") :]))
 
     def reserve(self, extra: int) -> None:
         """Make room for more voxels."""
