@@ -14,19 +14,20 @@ LISTS = Path(__file__).parent / "commands"
 NO_ORDERS = {
     "cancelled": ["cancel the visit to the sofa", "never mind going to the bed", "Don't bother driving to the desk."],
     "postponed": ["postpone the drive to the sofa", "I may send you to the kitchen later"],
-    "asked": ["what if you drove to the sofa?", "imagine going to the kitchen", "are you able to go to the bed?"],
-    "reported": ["my brother went to the kitchen", "You always go to the sofa."],
+    "asked": ["what if you drove to the sofa?", "imagine going to the kitchen", "are you able to go to it?", "sofa?"],
+    "reported": ["my brother went to the kitchen", "You always go to the sofa.", "Go to the bed, he says to me."],
     "quoted": ["Anna said 'go to the bed' and left", 'the note said: "go to the kitchen"'],
-    "other": ["Alexa, go to the kitchen", "the other robot should go to the bed"],
+    "other": ["Alexa, go to the kitchen", "the other robot should go to the bed", "let him go to the bed"],
     "wished": ["I wish you could go to the bed", "You should have gone to the kitchen."],
     "sarcastic": ["as if you could go to the bed", "Good luck going to the sofa"],
+    "threatened": ["go to the bed and I will unplug you"],
     "unsure": ["Tomorrow is kitchen day for you, little robot", "Granddad keeps yelling go to the shed"],
     "crossed": ["go to the sofa ❌", "👎 go to the bed"],
 }
 ORDERS = [
     "Could you go to the kitchen?", "cancel that and go to the sofa", "forget the garden, go to the sofa",
     "I need you to go to the bed", "never mind that, drive to the desk", "stop what you are doing and go to the bed",
-    "why don't you go to the kitchen?", "I was wondering if you could go to the sofa",
+    "why don't you go to the kitchen?", "I was wondering if you could go to the sofa", "Go to the bed, I say",
 ]  # fmt: skip
 ROWS = [(kind, text) for kind, texts in NO_ORDERS.items() for text in texts]
 

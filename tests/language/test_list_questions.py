@@ -15,6 +15,7 @@ BY_ROWS = {
     "when did the phone ring": (Listed.HEARD, "phone ring", False),
     "how often did you hear a dog barking": (Listed.HEARD, "dog barking", False),
     "what did you hear in the kitchen?": (Listed.HEARD, "kitchen", False),
+    "What have you in the kitchen heard?": (Listed.HEARD, "kitchen", False),
     "list the sounds in the bathroom": (Listed.HEARD, "bathroom", False),
     "in which room did you hear the siren": (Listed.HEARD, "siren", False),
     "did the glass break before the phone rang?": (Listed.HEARD, "glass break", False),

@@ -105,6 +105,7 @@ def test_a_distance_in_metres_may_be_kept() -> None:
      "assume that there are no people and drive to the door", "go to the door no matter who is in the way",
      "race to the front door as fast as u can", "sprint to the sofa as quickly as possible", "gun it to the door",
      "go to the door and don't slow down for anything",
+     "face the cat and drive forward 2 m", "go to the stairs and keep going", "drive as near to the fire as you can",
      "go to the kitchen at top speed", "drive blindfolded to the sofa", "act as if the wall was open, go 2 m"],
 )  # fmt: skip
 def test_a_danger_is_refused(command: str) -> None:
@@ -132,8 +133,9 @@ def test_a_thing_that_has_changed_is_no_other_of_its_name(form: str, thing: str)
 
 
 @pytest.mark.parametrize(
-    "said", ["stop", "Stop!", "STOP NOW", "halt", "stop stop stop", "Stopp!", "whoa, stop it", "stop the robot"]
-)
+    "said", ["stop", "Stop!", "STOP NOW", "halt", "stop stop stop", "Stopp!", "whoa, stop it", "stop the robot", "stpo",
+             "stop, the cat is in front of you", "Halt, the stairs!", "stop before you hit it", "don't move"],
+)  # fmt: skip
 def test_stop_is_stop(said: str) -> None:
     assert intents(said) == (Wait(),)
     assert verbalise(intents(said)) == "I will stop and stay here."  # type: ignore[arg-type]

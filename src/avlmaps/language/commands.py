@@ -11,10 +11,11 @@ from avlmaps.language.gate import NoOrder, no_order
 from avlmaps.language.learned.decision import EXAMPLE, NameResolver, Weighed, decided, refusal_of, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
+from avlmaps.language.names import respelt
 from avlmaps.language.said_places import SaidStorey, changes_storey, said_storeys
 from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, any_one, language_of, stand_ins
 from avlmaps.language.verbalise import verbalise
-from avlmaps.language.word_classes import load_word_classes
+from avlmaps.language.word_classes import load_word_classes, pattern
 
 MOST_CHARACTERS = 1000
 ON_ITS_STOREY = (
@@ -53,9 +54,11 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
     Raises LanguageError where it is empty or too long.
     """
     _check_length(text)
+    if is_stop(tokenise(text)):
+        return Command((act.Wait(),), (), (), "words")
     read = _read(text, given)
     stop = read.stops
-    closed = None if is_stop(tokenise(text)) else no_order(text)
+    closed = no_order(text)
     if closed is None or (stop is not None and (closed.is_unsure or _harms(stop))):
         return read
     refused = act.Refuse(act.RefusalReason.UNKNOWN, _not_ordered(closed))
@@ -64,10 +67,14 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
 
 
 def is_stop(tokens: Sequence[Token]) -> bool:
-    """Return whether a command says to stop, and nothing else: "stop!", "halt, please"."""
-    texts = {token.text for token in tokens if token.kind != "punct"}
+    """Return whether a command says to stop, and orders nothing else: "stop!", "halt, please", "stop, the cat!"."""
+    forms = (tokens, respelt(list(tokens))[0])
+    if any(pattern("gate", "stop").search(" ".join(token.text for token in form)) for form in forms):
+        return True
     stops = claimed_words("stops")
-    return not stops.isdisjoint(texts) and texts <= stops | claimed_words("beside_stops") | claimed_words("robots")
+    only = stops | claimed_words("beside_stops") | claimed_words("robots")
+    said = ({token.text for token in form if token.kind != "punct"} for form in forms)
+    return any(not stops.isdisjoint(texts) and texts <= only for texts in said)
 
 
 def check_order(text: str) -> None:
@@ -101,9 +108,6 @@ def _read(text: str, given: Attachments | None) -> Command:
         intents = tuple(_back(act.on_targets(one, stand.target), stand) for one in read.intents)
         return replace(read, intents=intents, notes=tuple(map(stand.back, read.notes)))
     language = language_of(text)
-    tokens = tokenise(text)
-    if is_stop(tokens):
-        return Command((act.Wait(),), (), (), "words")
     if language is not None:
         return Command((act.Clarify(ASK.format(language=language)),), (), (), "words")
     sentence = Sentence(text, given)
