@@ -10,6 +10,7 @@ grid of 2.5 cm) that has a voxel's middle within 5 cm.
 
 import sys
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -23,7 +24,7 @@ from scipy.spatial import KDTree  # noqa: E402
 from avlmaps.core.columns import concat  # noqa: E402
 from avlmaps.maps.estimate import estimate_sensor  # noqa: E402
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator  # noqa: E402
-from avlmaps.maps.fusion.free_space import FreeViews, clean, free_views  # noqa: E402
+from avlmaps.maps.fusion.free_space import FreeViews, clean, count_through, free_views  # noqa: E402
 from avlmaps.maps.fusion.sensor import NONE, SensorModel  # noqa: E402
 from avlmaps.maps.grid import GridSpec  # noqa: E402
 from avlmaps.maps.settings import BuildSettings  # noqa: E402
@@ -88,7 +89,8 @@ def made(recording: Recording, sensor: SensorModel) -> Made:
         spent += seconds(total.add, frame)[0] + took
         free.append(views)
     evidence = total.evidence()
-    took, (kept, _) = seconds(clean, evidence, [concat(free)], recording.rig.depth, GRID, sensor)
+    count = partial(count_through, grid=GRID, camera=recording.rig.depth, parts=[concat(free)])
+    took, (kept, _) = seconds(clean, evidence, sensor, count)
     return Made(evidence.index[kept], spent + took)
 
 
