@@ -156,10 +156,11 @@ def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> No
     code = (
         "import numpy as np\n"
         "from avlmaps.core.progress import announce_compiling\n"
-        "from avlmaps.query.kernels import sorted_by_number\n"
+        "from avlmaps.maps.fusion.kernels import find_rows\n"
+        "none = np.zeros((0, 3), np.int32)\n"
         "with announce_compiling():\n"
-        "    for kind in (np.int64, np.int32):\n"
-        "        sorted_by_number(np.zeros(2, kind), 2)\n"
+        "    for enter in (False, 1):\n"
+        "        find_rows(none, none[:, 0], none, 0, enter, none[:, 0])\n"
     )
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     told = [

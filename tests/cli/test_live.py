@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from avlmaps.days.find import visits_of
-from avlmaps.maps.store.folder import read
+from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.layout import DESCRIPTION, UNFINISHED
 
 
@@ -39,7 +39,7 @@ def test_a_drive_updates_the_map_of_the_days_before(answer, dated: Path, built: 
     assert made["into"]["checks"]["agreeing"] >= 5
     assert made["into"]["days"][-1]["day"] == "2023-11-14", "by its clock"
     assert made["into"]["path"] == str(home)
-    (today,) = visits_of(read(tmp_path / "today.avlmap"))
+    (today,) = visits_of(AVLMap.open(tmp_path / "today.avlmap"))
     assert today.day == "2023-11-14", "a live map keeps its clock"
     whole = answer("info", home, "--verify")
     assert whole["frames"] == 2 * answer("info", built)["frames"] - 1

@@ -113,4 +113,4 @@ def test_another_map_is_replaced_only_where_one_says_so(out: Path, monkeypatch: 
     shutil.copytree(out.parent / "all-recordings" / "0003.avlmap", out)
     with pytest.raises(MapError, match="is a finished map already"):
         build(out)
-    assert len(build(out, overwrite=True).info.build_key) == 64
+    assert len(build(out, overwrite=True).data.info.build_key) == 64

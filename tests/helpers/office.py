@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from avlmaps.maps.build import build_map
-from avlmaps.maps.settings import BuildSettings, FrameSettings
+from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.map_data import MapData, encoders_of_map
 from avlmaps.maps.types import Keyframes, Voxels
@@ -46,8 +46,8 @@ def office_of(factory: pytest.TempPathFactory) -> Path:
 def _write_office(folder: Path, walk: Path) -> None:
     """Build the map of a small room, and put the office's voxels and views in the place of its own."""
     path = folder / "office.avlmap"
-    few = BuildSettings(VOXEL_M, FrameSettings(step=3))
-    stored = build_map(open_recording(walk), path, "embedded", few, progress=False)
+    # Every frame, so that each room has the views without which it is none.
+    stored = build_map(open_recording(walk), path, "embedded", BuildSettings(VOXEL_M), progress=False)
     encoders = encoders_of_map(stored.info)
     pixels: Any = encoders.pixels
     index, which = _voxels()

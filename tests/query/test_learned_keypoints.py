@@ -75,7 +75,7 @@ def test_a_matcher_is_given_the_scores_and_the_sizes_of_both_pictures(watching: 
     assert locate(stored, large, None, np.random.default_rng(0)).world_from_camera is not None
     for asked, kept in watching.given:
         assert (asked.size, kept.size) == ((480, 360), (320, 240))
-        np.testing.assert_array_equal(asked.score, score_of(asked.xy))
+        np.testing.assert_allclose(1.5 * asked.score, score_of(asked.xy), rtol=1e-5)  # found at the size of the map's
         np.testing.assert_allclose(kept.score, score_of(kept.xy), atol=5e-4)
         assert kept.score.dtype == np.float32 and len(kept.score) == len(kept.xy) > 100
 

@@ -99,21 +99,21 @@ def test_the_next_map_begins_with_the_offset_that_the_first_one_stored(tmp_path:
         size=(64, 48), fps=4.0, sources=2, workers=1, max_frames=30, directions=True, directions_offset_deg=60.0
     )
     record_scene(flat(), tmp_path / "rec", settings, seed=1)
-    first = build_map(open_recording(tmp_path / "rec"), tmp_path / "first.avlmap", "colours", progress=False)
-    found = first.sources()
+    first = tmp_path / "first.avlmap"
+    found = build_map(open_recording(tmp_path / "rec"), first, "colours", progress=False).sources
     assert found is not None and found.device.shape == (1, 4)
-    again = read(first.path).sources()
+    again = read(first).sources
     assert again is not None and np.array_equal(again.device, found.device)
     record_scene(flat(), tmp_path / "next", settings, seed=2)
     recording = open_recording(tmp_path / "next")
     take_device(recording, first)
     assert recording.audio is not None and recording.audio.directions is not None
     assert recording.audio.directions.known_rad == tuple(found.device[0, :2].tolist())
-    after = build_map(recording, tmp_path / "next.avlmap", "colours", progress=False).sources()
+    after = build_map(recording, tmp_path / "next.avlmap", "colours", progress=False).sources
     assert after is not None and len(after.device) == 1
     live = LiveMap(
         tmp_path / "live.avlmap", "colours", up_in_world=recording.up_in_world, live=LiveSettings(gates=False),
-        same_device=first.path,
+        same_device=first,
     )  # fmt: skip
     replay(open_recording(tmp_path / "next"), live, rate=None)
     ended = live.close().data.sources
