@@ -408,7 +408,7 @@ def weigh(
     at = np.abs(view.level.height_m - height_m) < 2.5 * _BIN_M
     off = (view.level.height_m[at] - height_m) / _BLUR_M
     support = float(np.exp(-0.5 * off**2).sum())
-    below = _below(view, height_m)
+    below, beneath = _below(view, height_m)
     known = view.under_m[np.isfinite(view.under_m)]
     stood = float(np.mean(np.abs(known - height_m) < SAME_M)) if len(known) else 0.0
     level_m2 = len(np.unique(view.level[at].columns())) * CELL_M**2
@@ -416,7 +416,7 @@ def weigh(
     trusted = stood >= _MOST_STOOD and (level_m2 >= _LARGE_M2 or usual)
     given = expected is not None and expected.exact
     prior = 0.0 if trusted and usual and not given else prior_nats(height_m, view.camera_m, expected)
-    against = 0.0 if trusted else min(below, _MOST_BELOW)
+    against = min(_undercut(view.level[at], beneath) if trusted else below, _MOST_BELOW)
     nats = np.log(support / (support + _FEW)) + 0.7 * np.log1p(support / _MANY) - _BELOW_NATS * against
     return float(nats + _STOOD_NATS * trusted + prior), _guess(view, height_m, level_m2, below, seen=True)
 
@@ -435,7 +435,7 @@ def out_of_view(view: SurfacesAtHeight, expected: Expected | None = None) -> Wei
         camera_height_m = given_m if HIGHEST_M < given_m < DEEPEST_M else expected.camera_height_m
     height_m = view.camera_m - camera_height_m
     nats = _UNSEEN_NATS + prior_nats(height_m, view.camera_m, expected)
-    return nats, _guess(view, height_m, 0.0, _below(view, height_m), seen=False)
+    return nats, _guess(view, height_m, 0.0, _below(view, height_m)[0], seen=False)
 
 
 def _guess(view: SurfacesAtHeight, height_m: float, level_m2: float, below: float, *, seen: bool) -> FloorGuess:
@@ -461,10 +461,18 @@ def prior_nats(height_m: float, camera_m: float, expected: Expected | None = Non
     return float(np.log(likely + (0.07 if ratio < 0.0 else 0.002))) - _NOT_SAID_NATS * too_high
 
 
-def _below(view: SurfacesAtHeight, height_m: float) -> float:
+def _below(view: SurfacesAtHeight, height_m: float) -> tuple[float, Voxelised]:
     window = view.surface[view.surface.height_m > view.camera_m - DEEPEST_M]
     deep_m = height_m - window.height_m - _BELOW_M - _BELOW_PER_M * window.range_m
-    return float(np.clip(deep_m / _DEEP_M, 0.0, 1.0).mean()) if len(window) else 0.0
+    return float(np.clip(deep_m / _DEEP_M, 0.0, 1.0).mean()) if len(window) else 0.0, window[deep_m > 0.0]
+
+
+def _undercut(level: Voxelised, beneath: Voxelised) -> float:
+    """Return the share of a level's own footprint, without its rim, under which surface was seen: that of a table."""
+    column = level.columns()
+    beside = [np.isin(column + step, column) for step in (1 << _BITS, -(1 << _BITS), 1, -1)]
+    inner = np.unique(column[np.all(beside, axis=0)])
+    return float(np.isin(inner, beneath.columns()).mean()) if len(inner) else 0.0
 
 
 def stood_over(camera_m: Float[np.ndarray, "k 3"], level: Voxelised) -> Float[np.ndarray, " k"]:
