@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from avlmaps.cli.things import thing_lines
-from avlmaps.core.errors import GoalNotFoundError, MapError, QueryError
+from avlmaps.core.errors import GoalNotFoundError, QueryError
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.core.timeline import Trajectory
 from avlmaps.language.translator import LearnedTranslator
 from avlmaps.maps.build import build_map
 from avlmaps.maps.sources.find import find_sources
-from avlmaps.maps.store.folder import read
 from avlmaps.navigate.grounding import things_in
 from avlmaps.navigate.instruct import given_by
 from avlmaps.navigate.skills import Robot
@@ -241,14 +240,3 @@ def test_a_map_of_one_microphone_says_what_it_lacks(tmp_path: Path) -> None:
         answer = avlmap.ask("where did the noise come from?")
         assert answer.goals[0].position == avlmap.ask("the last sound").goals[0].position
         assert "where the robot was" in answer.notes[0] and "where the microphones are" in answer.notes[0]
-
-
-def test_damaged_evidence_is_refused(mapped: tuple[Path, Path], tmp_path: Path) -> None:
-    import shutil
-
-    copy = tmp_path / "copy.avlmap"
-    shutil.copytree(mapped[1], copy)
-    file = next((copy / "sources").glob("heard*"))
-    file.write_bytes(file.read_bytes()[:-64])
-    with pytest.raises(MapError):
-        read(copy)

@@ -251,7 +251,8 @@ def _name(kind: str, name: Any) -> Any:
     if kind == "sound":
         joined = str(name).lower().replace("door bell", "doorbell")
         return frozenset(stem_of(word) for word in joined.split() if word not in _WHO)
-    words = [word for word in str(name).lower().replace("-", " ").split() if word not in ("the", "a", "an", "my")]
+    plain = str(name).lower().replace("-", " ").replace("s' ", "s ")  # an apostrophe that nobody hears
+    words = [word for word in plain.split() if word not in ("the", "a", "an", "my")]
     wanted = EntryKind.ROOM if kind == "area" else EntryKind.THING
     for start in range(len(words)):
         entry = lexicon().find(" ".join(words[start:]), wanted)
