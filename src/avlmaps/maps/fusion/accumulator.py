@@ -85,8 +85,8 @@ class _Scratch:
             np.empty(_FIRST_SLOTS, np.int64), np.empty(_FIRST_SLOTS, np.int32), np.empty(pixels, np.int64),
             np.empty((pixels, kernels.SUM_COLUMNS)), np.empty((pixels, spreads)),
         )  # fmt: skip
-        of_pairs = (np.empty(pixels, kind) for kind in ("i4", "f8", "i4", "i4", "i4"))
-        self.pairs: kernels.Pairs = (*of_pairs, np.empty(kernels.RECENT_PAIRS, np.int32))
+        sizes = (pixels,) * 4 + (kernels.RECENT_PAIRS,) * 2
+        self.pairs: kernels.Pairs = tuple(map(np.empty, sizes, ("i4", "f8", "i4", "i4", "i4", "i8")))
 
     def enlarge(self) -> None:
         slots = 2 * len(self.voxels[0])

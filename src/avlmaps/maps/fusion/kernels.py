@@ -42,8 +42,8 @@ Row = tuple[np.ndarray, ...]
 FrameVoxels = tuple[np.ndarray, ...]
 # Of the map: slots, index, and the sums of `VoxelSums` but those of features.
 Table = tuple[np.ndarray, ...]
-# Of each pair as it was met: its cell, its weight, the pair of the same voxel before; the last of each voxel; the voxel
-# of each pair, and the pairs that were used last.
+# Of each pair as it was met: its cell, its weight, the pair of the same voxel before; the last of each voxel; the pairs
+# that were used last, and the voxel and cell of each of these in one number.
 Pairs = tuple[np.ndarray, ...]
 
 
@@ -109,17 +109,16 @@ def trace(
     """
     keys, weights, sharp, picture, cells = row
     slot_key, slot_voxel, voxel_key, voxel_sum, voxel_spread = voxels
-    pair_cell, pair_weight, pair_before, last_pair, pair_voxel, recent = pairs
+    pair_cell, pair_weight, pair_before, last_pair, recent, recent_name = pairs
     (x, y), (rotation, translation, origin) = rays, pose
     voxel_size, nearest, farthest, falloff, noise, noise_growth = limits
     projected, to_rgb, (fx, fy, cx, cy), (height, width), (cell_rows, cell_columns) = projection
     columns_of, rows_of, cell_columns_of, cell_rows_of = tables
-    half, mask = np.int64(REACH_VOXELS), np.int64(slot_key.shape[0] - 1)
+    half, mask, last_key = np.int64(REACH_VOXELS), np.int64(slot_key.shape[0] - 1), np.int64(-1)
     lowest, middle, spreads = (np.int64(1) << OFFSET_BITS) - 1, np.zeros(3), voxel_spread.shape[1] > 0
     slot_key[:] = -1
-    recent[:] = -1
+    recent_name[:] = -1
     points = count = paired = voxel = np.int64(0)
-    last_key = np.int64(-1)
     for v in range(depth.shape[0]):
         bx = rotation[0, 1] * y[v] + rotation[0, 2]
         by = rotation[1, 1] * y[v] + rotation[1, 2]
@@ -163,7 +162,7 @@ def trace(
             cells[u] = cell_row * np.int32(cell_columns) + cell_column if inside and cell_columns > 0 else -1
         u = np.int64(0)
         while u < depth.shape[1]:
-            key, cell = keys[u], cells[u]
+            key = keys[u]
             if key < 0:
                 u += 1
                 continue
@@ -182,42 +181,43 @@ def trace(
                 voxel = np.int64(slot_voxel[slot])
                 for axis in range(3):  # the middle of the voxel
                     middle[axis] = ((key >> (OFFSET_BITS * (2 - axis))) & lowest) - half + origin[axis] + 0.5
-            start, exact_sum = u, np.int64(0)
-            total = red = green = blue = seen = 0.0
-            while u < depth.shape[1] and keys[u] == key and cells[u] == cell:
-                weight, pixel = weights[u], picture[u]
-                total += weight
-                exact_sum += sharp[u]
-                if pixel >= 0:
-                    seen += weight
-                    red += weight * rgb[pixel, 0]
-                    green += weight * rgb[pixel, 1]
-                    blue += weight * rgb[pixel, 2]
-                if spreads:
-                    z = np.float64(depth[v, u])
-                    a = (translation[0] + z * (rotation[0, 0] * x[u] + bx)) / voxel_size - middle[0]
-                    b = (translation[1] + z * (rotation[1, 0] * x[u] + by)) / voxel_size - middle[1]
-                    c = (translation[2] + z * (rotation[2, 0] * x[u] + bz)) / voxel_size - middle[2]
-                    for column, value in enumerate((a, b, c, a * a, a * b, a * c, b * b, b * c, c * c)):
-                        voxel_spread[voxel, column] += value
-                u += 1
-            points += u - start
+            first, exact_sum = u, np.int64(0)
+            red = green = blue = seen = 0.0
+            while u < depth.shape[1] and keys[u] == key:
+                cell, total = cells[u], 0.0
+                while u < depth.shape[1] and (keys[u] == key) & (cells[u] == cell):
+                    weight, pixel = weights[u], picture[u]
+                    total += weight
+                    exact_sum += sharp[u]
+                    if pixel >= 0:
+                        seen += weight
+                        red += weight * rgb[pixel, 0]
+                        green += weight * rgb[pixel, 1]
+                        blue += weight * rgb[pixel, 2]
+                    if spreads:
+                        z = np.float64(depth[v, u])
+                        a = (translation[0] + z * (rotation[0, 0] * x[u] + bx)) / voxel_size - middle[0]
+                        b = (translation[1] + z * (rotation[1, 0] * x[u] + by)) / voxel_size - middle[1]
+                        c = (translation[2] + z * (rotation[2, 0] * x[u] + bz)) / voxel_size - middle[2]
+                        for column, value in enumerate((a, b, c, a * a, a * b, a * c, b * b, b * c, c * c)):
+                            voxel_spread[voxel, column] += value
+                    u += 1
+                if cell < 0:
+                    continue
+                place, name = (np.int64(cell) * 5 + voxel * 1237) & (RECENT_PAIRS - 1), voxel << 32 | np.int64(cell)
+                if recent_name[place] == name:
+                    pair_weight[recent[place]] += total
+                    continue
+                recent[place], recent_name[place], pair_cell[paired], pair_weight[paired] = paired, name, cell, total
+                pair_before[paired], last_pair[voxel] = last_pair[voxel], paired
+                paired += 1
+            points += u - first
             voxel_sum[voxel, RED] += red
             voxel_sum[voxel, GREEN] += green
             voxel_sum[voxel, BLUE] += blue
             voxel_sum[voxel, RGB_WEIGHT] += seen
-            voxel_sum[voxel, HITS] += u - start
+            voxel_sum[voxel, HITS] += u - first
             voxel_sum[voxel, SHARP] += exact_sum
-            if cell < 0:
-                continue
-            place = (np.int64(cell) * 5 + voxel * 1237) & (RECENT_PAIRS - 1)
-            pair = np.int64(recent[place])
-            if pair >= 0 and pair_voxel[pair] == voxel and pair_cell[pair] == cell:
-                pair_weight[pair] += total
-                continue
-            recent[place], pair_voxel[paired], pair_cell[paired], pair_weight[paired] = paired, voxel, cell, total
-            pair_before[paired], last_pair[voxel] = last_pair[voxel], paired
-            paired += 1
     return points, count, paired
 
 
