@@ -159,7 +159,7 @@ def test_intrinsics_of_a_picture_of_another_size(tmp_path: Path) -> None:
         open_recording(described(path, intrinsics={"rgb": cropped}))
     assert open_recording(path, corrections=given).rig.depth == CAMERA
     assert validate(path) and not validate(path, corrections=given)
-    with pytest.raises(RecordingError, match=r"of 64x64, pictures of another shape \(64x48\)"):
+    with pytest.raises(RecordingError, match="of 64x64, not of the pictures' shape"):
         open_recording(path, corrections=Reading(intrinsics=("60,61,32,24@64x64",)).corrections())
     small = {"fx": 30.0, "fy": 30.5, "cx": 16.0, "cy": 12.0, "width": 32, "height": 24}
     read = open_recording(described(path, intrinsics={"rgb": small}))

@@ -411,8 +411,8 @@ REFUSED: list[tuple[Callable[[Path], object], str]] = [
     (with_line("stamp_s,tx,ty,tz,qx,qy,qz,qx", 0), "'qx' and 'qx' both name the column qx"),
     (with_line("stamp_s,tx,ty,tz,qx,qy,qz", 0), "the column qw is missing"),
     (with_line("stamp_s,tx [ft],ty [ft],tz [ft],qx,qy,qz,qw", 0), "'tx [ft]' is none of the columns"),
-    (with_depth_of(24, 32), "intrinsics of rgb only (64x48), but depth pictures are 32x24; add intrinsics.depth"),
-    (with_depth_of(64, 48), "but depth pictures are 48x64"),
+    (with_depth_of(24, 32), "intrinsics of rgb only, but colour is 64x48 and depth 32x24; add intrinsics.depth"),
+    (with_depth_of(64, 48), "and depth 48x64"),
     (with_file("frames.csv", b"name,stamp_s\nnone,0\n"), "without their extension"),
     (
         with_file("frames.csv", b"000001,100\n000002,100.1\n"),

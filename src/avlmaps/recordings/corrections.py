@@ -99,7 +99,7 @@ class GivenCamera:
         if given.shaped(width, height):
             return given.resized(width, height)
         raise RecordingError(
-            f"The given intrinsics are of {given.width}x{given.height}, pictures of another shape ({width}x{height})."
+            f"The given intrinsics are of {given.width}x{given.height}, not of the pictures' shape ({width}x{height})."
         )
 
     @staticmethod

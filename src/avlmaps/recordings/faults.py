@@ -50,9 +50,10 @@ def note(*sentences: str) -> None:
 _unfit: ContextVar[list[str] | None] = ContextVar("_unfit", default=None)
 
 
-def misfit(sentence: str) -> None:
+def misfit(sentence: str, of: str = "these pictures") -> None:
     """Refuse pictures that the files' intrinsics do not fit; within ``unfit`` whoever opens decides."""
-    sentence += f" Give the intrinsics of these pictures ({option('intrinsics', 'FX,FY,CX,CY')})."
+    numbers = " ".join(["FX,FY,CX,CY"] * (2 if of.startswith("both") else 1))
+    sentence += f" Give the intrinsics of {of} ({option('intrinsics', numbers)})."
     if (found := _unfit.get()) is None:
         raise RecordingError(sentence)
     found.append(sentence)

@@ -94,10 +94,9 @@ def _fitted_rig(folder: Path, description: Description, found: "_Pictures", vide
                 size = first_picture_size(folder, files)
             size = own if file_turn(folder / files[0]).size(*size) == own else size
         if cameras and description.intrinsics.depth is None and size != (cameras[0].width, cameras[0].height):
-            misfit(
-                f"{file} has the intrinsics of rgb only ({own[0]}x{own[1]}), but depth pictures are {size[0]}x{size[1]}"
-                "; add intrinsics.depth (those of rgb scaled to its size, if depth is registered to colour)."
-            )
+            seen = f"colour is {cameras[0].width}x{cameras[0].height} and depth {size[0]}x{size[1]}"
+            misfit(f"{file} has the intrinsics of rgb only, but {seen}; add intrinsics.depth.", "both, colour first")
+            camera = camera.resized(*size)
         cameras.append(fitted(camera, size, file, what))
     return replace(rig, rgb=cameras[0], depth=cameras[1])
 
@@ -250,8 +249,8 @@ def _interpolated(
     span = "{:.2f} to {:.2f} s".format(*trajectory.stamps_s[[0, -1]])
     if not covered.any():
         raise RecordingError(
-            f"No frame lies within {layout.POSES} ({span}): the frames go from {np.nanmin(stamps_s):.2f} to "
-            f"{np.nanmax(stamps_s):.2f} s; check that both use one clock."
+            f"No frame lies within {layout.POSES} ({span}): the frames go from {np.fmin.reduce(stamps_s):.2f} to "
+            f"{np.fmax.reduce(stamps_s):.2f} s; check that both use one clock."
         )
     if lost := int((~covered).sum()):
         note(f"{lost} of {len(stamps_s)} frame(s) lie outside {layout.POSES} ({span}) or in a gap of it; left out.")
