@@ -94,7 +94,7 @@ def _run(verb: "Verb") -> int:
     except KeyboardInterrupt as stop:
         if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving; its answer is printed
             return _complain(stop, status)
-        return _fail(verb, stop, str(stop) or "stopped; the same command builds on what a build has stored", 130)
+        return _fail(verb, stop, str(stop) or "stopped; a build continues from what it has stored", 130)
     except Exception as fault:
         if isinstance(fault, BrokenPipeError) and _reader_gone():
             return READER_GONE

@@ -96,10 +96,9 @@ class Query(Asking, InFrame, MapVerb):
             avlmap = type(avlmap)(avlmap.data, avlmap.encoders, path=avlmap.path, settings=settings)
         with announce_compiling(now=False):
             found = ask(avlmap, replace(asked, top=MOST_GOALS))
-            drawn = {}
+            told: dict[str, Any] = {**found.to_dict()}
             if self.plot is not None and found.heat is not None:
-                drawn = {"plot": str(found.heat.plot(self.plot, top=self.top))}
-        told: dict[str, Any] = {**found.to_dict(), **drawn}
+                told["plot"] = str(found.heat.plot(self.plot, top=self.top))
         more = sum(goal["probability"] >= self.found_at for goal in told["goals"][self.top :])
         told["goals"] = told["goals"][: self.top]
         if self.frame != "recording":
