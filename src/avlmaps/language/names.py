@@ -225,7 +225,7 @@ def _meant() -> tuple[re.Pattern[str], dict[str, str]]:
     lists = load_word_classes().lists
     right = dict(pair.strip().split("=") for pair in (*lists["misheard"].split(","), *lists["heard_as"].split()))
     longest = "|".join(sorted(right, key=len, reverse=True))
-    return re.compile(rf"(?<![\w'-])(?:{longest})(?![\w'-])", re.IGNORECASE), right
+    return re.compile(rf"(?<![\w'./-])(?:{longest})(?![\w'/-]|\.\w)", re.IGNORECASE), right
 
 
 @cache
@@ -237,7 +237,9 @@ def _better(word: str) -> str | None:
         return meant
     if is_word(word) or word in _words_of("nouns"):  # "forge" is no misspelt "forget"
         return None
-    near = [(other, alike) for other, alike in _speller().suggest(word, 2) if not is_other_form(word, other)]
+    near = [one for one in _speller().suggest(word, 9) if not is_other_form(word, one[0])]
+    if len(word) < 5:  # only what cannot well be another word: letters changed over, or of four one left out
+        near = [one for one in near if sorted(one[0]) == sorted(word) or len(one[0]) > len(word) == 4]
     is_sure = near and (len(near) == 1 or near[0][1] > near[1][1]) and near[0][0][0] == word[0]
     return near[0][0] if is_sure and (1.0 - near[0][1]) * max(len(word), len(near[0][0])) < 1.5 else None  # one letter
 
