@@ -29,7 +29,8 @@ class Chosen(Pixels):
     def __init__(self, model: str) -> None:
         LOADED.append(model)
         weights = WEIGHTS.get(model, model)
-        self.card = replace(Pixels.card, id=model, checksum=hashlib.sha256(weights.encode()).hexdigest())
+        dim = Pixels.card.dim + weights.count("names")
+        self.card = replace(Pixels.card, id=model, dim=dim, checksum=hashlib.sha256(weights.encode()).hexdigest())
 
 
 class Unwanted(Chosen):
@@ -92,9 +93,10 @@ def test_maps_of_earlier_releases_open_unchanged(tmp_path: Path) -> None:
     assert AVLMap.open(tmp_path / "map").encoders == Encoders.named(PROFILE)
 
 
-def test_another_model_of_the_same_name_is_refused_in_one_sentence(tmp_path: Path) -> None:
+@pytest.mark.parametrize("weights", ["trained once more", "trained once more, with more names"])
+def test_another_model_of_the_same_name_is_refused_in_one_sentence(tmp_path: Path, weights: str) -> None:
     build_map(Walk(), tmp_path / "map", used_with("chosen@org/large"), SETTINGS)
-    WEIGHTS["org/large"] = "trained once more"
+    WEIGHTS["org/large"] = weights
     forget_loaded()
     with pytest.raises(MapError, match=r"was built with org/large \(checksum .*build it again, or name the folder"):
         AVLMap.open(tmp_path / "map").require_model(Kind.PIXELS)

@@ -84,7 +84,7 @@ def require_model(info: MapInfo, encoders: Encoders, kind: Kind, path: Path) -> 
     here = public_name(card.id)
     if made_by.backend == GIVEN_FEATURES and card.dim == made_by.dim:
         return
-    if card.dim != made_by.dim:
+    if card.dim != made_by.dim and not made_by.checksum:
         raise MapError(
             f"The features of {path} for {kind.value} have {made_by.dim} numbers, those of {here} {card.dim}; ask with "
             f"the encoder that made them, {made_by.id}, or build the map again with this one."

@@ -36,7 +36,7 @@ _ROOMS = Remembered()  # by network and frame
 class NamedEncoder:
     """An encoder that distinguishes a closed set of names; by default with the two networks and the words that ship.
 
-    The features lie in the space of ``words``; ``licence`` is of the networks.
+    The features lie in the space of ``words`` where it has room for all names; ``licence`` is of the networks.
     """
 
     _names: ClassVar[str]  # ``categories`` or ``rooms`` of the network's notes
@@ -86,8 +86,13 @@ class NamedEncoder:
         return self.meanings.name_weights(word)
 
 
-def orthonormal_codes(words: Float[np.ndarray, "n d"]) -> Float32[np.ndarray, "n d"]:
-    """Return the orthonormal vectors nearest to linearly independent unit vectors, in the same order."""
+def orthonormal_codes(words: Float[np.ndarray, "n d"]) -> Float32[np.ndarray, "n k"]:
+    """Return the orthonormal vectors nearest to linearly independent unit vectors, in the same order.
+
+    More vectors than numbers in each have no such place: theirs is a space of their own, an axis for each.
+    """
+    if len(words) > words.shape[1]:
+        return np.eye(len(words), dtype=np.float32)
     left, _, right = np.linalg.svd(np.asarray(words, np.float64), full_matrices=False)
     return (left @ right).astype(np.float32)
 
