@@ -18,7 +18,7 @@ from avlmaps.language.commands import weighed_readings
 from avlmaps.language.intents import Clarify, Intent, to_json
 from avlmaps.language.learned.decision import Weighed, decided, is_same
 from avlmaps.language.learned.reader import LearnedReader, Read, ReadingLimits
-from avlmaps.language.questions import asked
+from avlmaps.language.questions import asked, by_name
 from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps_sim.bench.language import OUTCOMES, judge_intents, judge_question, read_list
 
@@ -73,7 +73,7 @@ def outcome(one: Heard, limits: ReadingLimits) -> str:
     """Return what became of a row: right, harmless, a question back or misread."""
     if "question" in one.row:
         try:
-            found = asked(one.sentence, one.question, limits)
+            found = by_name(one.sentence) or asked(one.sentence, one.question, limits)
             got: Any = found.inquiry.to_json()
         except QueryError:
             got = _REFUSED

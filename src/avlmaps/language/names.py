@@ -75,6 +75,11 @@ def _is_spelt(word: str) -> bool:
     return any(is_word(one) or one in _words_of("nouns") or _is_compound(one) for one in (word, *singulars_of(word)))
 
 
+def is_place(name: str) -> bool:
+    """Return whether people who use a name mean a room or another area: "potting shed" and "third-floor landing"."""
+    return name.lower().split()[-1:] != [] and name.lower().split()[-1] in _words_of("places")
+
+
 @cache
 def _words_of(name: str) -> frozenset[str]:
     return frozenset(files("avlmaps.language").joinpath(f"{name}.txt").read_text(encoding="utf-8").split())

@@ -11,9 +11,9 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 from avlmaps.language.claims import unanswered, unmet_by
 from avlmaps.language.intents import Ask, Inquiry, Pick, Target, TargetKind
-from avlmaps.language.learned.decision import NameResolver, is_doubtful
+from avlmaps.language.learned.decision import NameResolver, is_doubtful, kind_of
 from avlmaps.language.learned.reader import Read, ReadingLimits, learned_reader
-from avlmaps.language.names import is_known, sounding_forms, third_forms
+from avlmaps.language.names import is_entry, is_known, sounding_forms, sounds_like, third_forms
 from avlmaps.language.sentence import ASK, Attachments, Sentence, language_of, stand_ins
 from avlmaps.language.verbalise import lacks_file, phrase
 from avlmaps.language.word_classes import listed, load_word_classes, pattern, word_list
@@ -76,6 +76,9 @@ def read_question(text: str, given: Attachments | None = None) -> AskedSentence:
     if language is not None:
         raise QueryError(ASK.format(language=language))
     sentence = Sentence(_where_it_sounds(text), given)
+    named = by_name(sentence)
+    if named is not None:
+        return named
     reader = learned_reader()
     return asked(sentence, reader.question(sentence.tokens), reader.limits)
 
@@ -87,6 +90,18 @@ def _where_it_sounds(text: str) -> str:
     if not found["is"] and found["verb"] not in third_forms():
         return text
     return f"where is what is {sounding_forms()[found['verb']]}{found['rest']}"
+
+
+def by_name(sentence: Sentence) -> AskedSentence | None:
+    """Return the query of a sentence that is one name and nothing else, which needs no reading; None for others."""
+    words = [
+        token.text for token in sentence.tokens if token.kind != "punct" and token.text not in _listed("plain_articles")
+    ]
+    name = " ".join(words)
+    plain = all(token.kind in ("word", "punct") for token in sentence.tokens)
+    if not (plain and words and is_entry(name)) or any(sounds_like(word) for word in words):
+        return None
+    return AskedSentence(Inquiry(Ask.WHERE, (Target(kind_of(name, TargetKind.OBJECT), name),)), sentence.notes)
 
 
 def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> AskedSentence:

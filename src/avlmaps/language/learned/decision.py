@@ -19,7 +19,7 @@ from avlmaps.language.intents import Clarify, Intent, Pick, RefusalReason, Refus
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.reader import Read, ReadingLimits
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import is_known, may_name, mended, past_forms, sounding_forms
+from avlmaps.language.names import is_known, is_place, may_name, mended, past_forms, sounding_forms
 from avlmaps.language.sentence import Sentence
 from avlmaps.language.verbalise import missing_file, strange_word, unclear, unknown, verbalise
 from avlmaps.language.word_classes import table
@@ -106,10 +106,25 @@ class NameResolver:
             if better is not None:
                 self.notes.append(f"'{name}' is read as '{better}'.")
                 name = better
-        return replace(target, name=name.replace(" 's", "'s"))
+        return replace(target, name=name.replace(" 's", "'s"), kind=kind_of(name, target.kind))
 
     def _ask(self, question: Clarify) -> None:
         self.problem = self.problem or question
+
+
+def kind_of(name: str, kind: TargetKind) -> TargetKind:
+    """Return whether a name is of a thing or of a room, where only one is possible; else what it was read as."""
+    words = name.split()
+    for start in range(len(words)):
+        tail = " ".join(words[start:])
+        thing, room = (lexicon().find(tail, each) is not None for each in (EntryKind.THING, EntryKind.ROOM))
+        if thing and not room and not start:
+            return TargetKind.OBJECT
+        if room and not thing:
+            return TargetKind.AREA
+        if thing or room:
+            return kind
+    return TargetKind.AREA if is_place(name) else kind
 
 
 def _sound(name: str) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import BackendError
-from avlmaps.language.intents import Inquiry, Intent
+from avlmaps.language.intents import Inquiry, Intent, Target, on_targets
 from avlmaps.language.learned import linear
 from avlmaps.language.learned.features import columns, features
 from avlmaps.language.learned.linear import INDEX, SYMBOLS
@@ -101,7 +101,7 @@ class LearnedReader:
             is_purpose = line.symbols == ("purpose", "end")
             at_source = partial(_at_source, tokens, used)
             meaning = linear.meaning_of(line.symbols, tokens, is_question=is_question, at_source=at_source)
-            key = (meaning, is_purpose)
+            key = (_placeless(meaning), is_purpose)
             before = found.get(key, Read(meaning, 0.0, used, is_purpose))
             found[key] = replace(before, probability=before.probability + float(np.exp(line.log)))
         return sorted(found.values(), key=lambda read: -read.probability)
@@ -183,6 +183,19 @@ def _number(symbol: linear.Symbol) -> int:
 
 def _at_source(tokens: Sequence[Token], used: frozenset[int], own: Sequence[int]) -> bool:
     return seeks_source(tokens, own, used - frozenset(own))
+
+
+def _placeless(meaning: Any) -> Any:
+    """Return a meaning that says of no sound where it is meant to be, which makes no other reading."""
+    match meaning:
+        case Target():
+            return replace(meaning, at=None, near=tuple(map(_placeless, meaning.near)))
+        case Inquiry():
+            return replace(meaning, of=tuple(map(_placeless, meaning.of)))
+        case tuple():
+            return tuple(on_targets(one, _placeless) for one in meaning)
+        case _:
+            return meaning
 
 
 def _check(facts: dict[str, Any]) -> None:
