@@ -15,10 +15,7 @@ from training.pixels.labels import ROOMS
 from training.pixels.network import RoomNetwork, has_bfloat16
 from training.pixels.unfold import unfolded
 
-from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS, Notes
-
-# Agreement at which the second file begins to count, and from which on it counts half.
-NO_SAY, SAME_SAY = 0.75, 0.95
+from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, NO_SAY, SAME_SAY, SYNTHETIC_WEIGHTS, Notes
 
 
 class Teachers(nn.Module):
