@@ -10,7 +10,7 @@ import onnx
 import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
-from training.pixels.export import notes_of
+from training.pixels.export import completed, notes_of
 from training.pixels.labels import ROOMS
 from training.pixels.network import RoomNetwork, has_bfloat16
 from training.pixels.unfold import unfolded
@@ -25,7 +25,7 @@ class Teachers(nn.Module):
         super().__init__()
         self.notes = [notes_of(folder / f"{name}.onnx") for name in (DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS)]
         first, second = (folder / f"{name}.onnx" for name in (DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS))
-        self.temperatures = _temperatures(first)
+        self.temperatures = temperatures_of(first)
         networks = [unfolded(first, len(ROOMS), [], number) for number in range(len(self.temperatures))]
         networks.append(unfolded(second, len(ROOMS), []))
         self.networks = nn.ModuleList(networks)
@@ -35,7 +35,8 @@ class Teachers(nn.Module):
     def forward(self, geometry: Tensor, colour: Tensor) -> Tensor:
         """Return (n, h/2, w/2, kinds) calibrated probabilities."""
         *first, second = (self._scores(network, geometry, colour) for network in self.networks)
-        mean = torch.stack([(s / t).softmax(dim=-1) for s, t in zip(first, self.temperatures, strict=True)]).mean(dim=0)
+        kinds = [(s / t).softmax(dim=-1) for s, t in zip(first, self.temperatures, strict=True)]
+        mean = torch.stack(completed(kinds, dim=-1)).mean(dim=0)
         p, q = (self._calibrated(s, n) for s, n in zip(((mean + 1e-9).log(), second), self.notes, strict=True))
         there = geometry[:, 6, ::2, ::2]
         agreement = ((p * q).sqrt().sum(dim=-1) * there).sum(dim=(1, 2)) / there.sum(dim=(1, 2)).clamp_min(1.0)
@@ -57,7 +58,7 @@ class Teachers(nn.Module):
         return ((score + score.new_tensor(notes.bias)) / notes.temperature).softmax(dim=-1)
 
 
-def _temperatures(path: Path) -> list[float]:
+def temperatures_of(path: Path) -> list[float]:
     """Return what divides the scores of each network of a file."""
     nodes = onnx.load(path).graph.node
     constants = {n.output[0]: n.attribute[0].t for n in nodes if n.op_type == "Constant"}

@@ -73,12 +73,26 @@ class MeanOf(nn.Module):
     def forward(self, geometry: Tensor, colour: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return what a network returns; the floor is the mean."""
         score, room, floor = zip(*(network(geometry, colour) for network in self.networks), strict=True)
-        score = [each / t for each, t in zip(score, self._temperatures, strict=True)]
-        return _log_mean(score), _log_mean(room), torch.stack(floor).mean(dim=0)
+        kinds = [(each / t).softmax(dim=1) for each, t in zip(score, self._temperatures, strict=True)]
+        rooms = [each.softmax(dim=1) for each in room]
+        return _log_mean(completed(kinds)), _log_mean(rooms), torch.stack(floor).mean(dim=0)
 
 
-def _log_mean(scores: Sequence[Tensor]) -> Tensor:
-    return (torch.stack([each.softmax(dim=1) for each in scores]).mean(dim=0) + 1e-9).log()
+def completed(kinds: Sequence[Tensor], dim: int = 1) -> list[Tensor]:
+    """Return probabilities of as many kinds as the first has: of those that another does not know, as the first says.
+
+    The other's own are scaled to what is left.
+    """
+    first, out = kinds[0], []
+    for each in kinds:
+        more = first.narrow(dim, each.shape[dim], first.shape[dim] - each.shape[dim])
+        left = 1.0 - more.sum(dim=dim, keepdim=True)
+        out.append(torch.cat([each * left, more], dim=dim) if more.shape[dim] else each)
+    return out
+
+
+def _log_mean(probabilities: Sequence[Tensor]) -> Tensor:
+    return (torch.stack(list(probabilities)).mean(dim=0) + 1e-9).log()
 
 
 def write_onnx(network: RoomNetwork | MeanOf, path: Path) -> None:
@@ -142,9 +156,10 @@ def quicken(graph: onnx.GraphProto) -> None:
                 of["pads"][:] = [each // 2 for each in more] + [each - each // 2 for each in more]  # as in tower.py
                 node.input[0] = source.input[0]
             case "Softmax", "Div":
-                grid, rows = f"{source.output[0]}_last", f"{source.output[0]}_rows"
-                nodes.append(onnx.helper.make_node("Transpose", [source.output[0]], [grid], perm=[0, 2, 3, 1]))
-                nodes.append(onnx.helper.make_node("Flatten", [grid], [rows], axis=3))
+                last, rows = f"{source.output[0]}_last", f"{source.output[0]}_rows"
+                grid = grid or last  # the first network's: it knows all kinds
+                nodes.append(onnx.helper.make_node("Transpose", [source.output[0]], [last], perm=[0, 2, 3, 1]))
+                nodes.append(onnx.helper.make_node("Flatten", [last], [rows], axis=3))
                 node.input[0] = rows
             case "ReduceMean", "Concat":
                 parts = [made[name].input[0] for name in source.input]
