@@ -5,6 +5,7 @@ A picture's header is compared with the camera before anything is decoded: a PNG
 
 import re
 import struct
+import sys
 import threading
 from collections import Counter
 from collections.abc import Generator, Sequence
@@ -21,7 +22,6 @@ from avlmaps.core.arrays import Float, Float32, UInt8, UInt16
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import PICTURE_BYTES, SOUND_BYTES, checked_size, open_regular, read_regular
-from avlmaps.core.poses import apply
 from avlmaps.core.rvl import decode_rvl
 from avlmaps.recordings.faults import note, readable
 
@@ -361,22 +361,24 @@ def depth_in_colour(depth_m: Float32[np.ndarray, "hd wd"], rig: Rig) -> tuple[Pi
     shrink = min(1.0, rig.depth.fx / rig.rgb.fx, rig.depth.fy / rig.rgb.fy)
     camera = rig.rgb.resized(max(1, round(rig.rgb.width * shrink)), max(1, round(rig.rgb.height * shrink)))
     row, column = np.nonzero(depth_m > 0.0)
-    z = depth_m[row, column].astype(np.float64)
-    x = (column + 0.5 - rig.depth.cx) / rig.depth.fx * z
-    y = (row + 0.5 - rig.depth.cy) / rig.depth.fy * z
-    points = apply(rig.rgb_from_depth, np.stack([x, y, z], axis=1))
-    seen = nearest_depth(points[points[:, 2] > 0.0], camera)
+    z = depth_m[row, column]
+    x = ((np.arange(depth_m.shape[1]) + 0.5 - rig.depth.cx) / rig.depth.fx).astype(np.float32)[column] * z
+    y = ((np.arange(depth_m.shape[0]) + 0.5 - rig.depth.cy) / rig.depth.fy).astype(np.float32)[row] * z
+    towards = rig.rgb_from_depth[:3].astype(np.float32)
+    seen = nearest_depth(np.stack([a * x + b * y + c * z + d for a, b, c, d in towards]), camera)
     seen[np.isinf(seen)] = 0.0
     return camera, seen
 
 
-def nearest_depth(points_camera: Float[np.ndarray, "n 3"], camera: Pinhole) -> Float32[np.ndarray, "h w"]:
+def nearest_depth(points_camera: Float[np.ndarray, "3 n"], camera: Pinhole) -> Float32[np.ndarray, "h w"]:
     """Return the z-depth of the nearest point in each pixel, metres; infinite where there is none."""
-    pixel = np.floor(camera.project(points_camera)).astype(np.int64)
-    inside = ((pixel >= 0) & (pixel < (camera.width, camera.height))).all(axis=1)
+    x, y, z = points_camera
+    with np.errstate(all="ignore"):
+        column, row = np.floor(camera.fx * x / z + camera.cx), np.floor(camera.fy * y / z + camera.cy)
+    inside = (z > sys.float_info.epsilon) & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
     depth_m = np.full(camera.height * camera.width, np.inf, np.float32)
-    at = pixel[inside, 1] * camera.width + pixel[inside, 0]
-    np.minimum.at(depth_m, at, points_camera[inside, 2].astype(np.float32))
+    at = row[inside].astype(np.int64) * camera.width + column[inside].astype(np.int64)
+    np.minimum.at(depth_m, at, z[inside].astype(np.float32))
     return depth_m.reshape(camera.height, camera.width)
 
 

@@ -5,7 +5,6 @@ Works on messages as `rosbags` deserialises them, of ROS 1 and ROS 2 alike, and 
 
 import re
 import struct
-import sys
 from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import takewhile
@@ -244,7 +243,7 @@ def depth_of_points(points_camera: Float[np.ndarray, "n 3"], camera: Pinhole) ->
     """Return a camera's picture of z-depth, metres, of points: the nearest in each pixel, without what is hidden."""
     import cv2
 
-    depth_m = nearest_depth(points_camera[points_camera[:, 2] > sys.float_info.epsilon], camera)
+    depth_m = nearest_depth(points_camera.T, camera)
     around = 2 * _HIDDEN_PIXELS + 1
     nearest = cv2.erode(depth_m, np.ones((around, around), np.uint8), borderValue=np.inf)
     depth_m[np.isinf(depth_m) | (depth_m > _HIDDEN_FACTOR * nearest)] = 0.0
