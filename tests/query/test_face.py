@@ -62,11 +62,11 @@ def test_a_sentence_is_answered_with_count_notes_and_alternatives(m: avlmaps.AVL
 
 def test_the_nearest_of_what_is_found_comes_first(folder: Path) -> None:
     m = avlmaps.AVLMap.open(folder / "home.avlmap", avlmaps.QuerySettings(found_at=0.2))
-    likeliest = m.ask("the sofa near the table")
+    likeliest = m.ask("the chair near the sofa")
     first, second, third = likeliest.goals
     assert third.probability < first.probability / 2.0 <= second.probability + 0.01
     for near in (second.position, ",".join(map(str, second.position)), m.space.level(np.array(second.position))[:2]):
-        answer = m.ask("the nearest sofa near the table", near=near)
+        answer = m.ask("the nearest chair near the sofa", near=near)
         counting = [goal for goal in likeliest.goals if goal.probability >= first.probability / 2.0]
         assert answer.found and answer.goals[0] == min(
             counting, key=lambda goal: np.linalg.norm(np.subtract(goal.position, second.position))

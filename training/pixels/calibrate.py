@@ -27,11 +27,11 @@ PRIOR_SHARE = 0.25
 # What weights are called that do not ship.
 OWN = "own/pixels-1"
 NOTES = {
-    "real": "Networks for homes and offices that began from ImageNet and learnt from rendered rooms and from training "
-    "frames of NYU Depth V2, which is published for research and states no licence: decide whether that suits you, or "
-    "take --profile synthetic.",
-    "synthetic": "A network for homes and offices that began from ImageNet and learnt from rendered rooms alone; it "
-    "goes by shape first.",
+    "real": "Networks for homes and offices that began from ImageNet and learnt from rendered rooms, photographs and "
+    "training frames of NYU Depth V2, which is published for research and states no licence: decide whether that "
+    "suits you, or take --profile synthetic.",
+    "synthetic": "A network for homes and offices that began from ImageNet and learnt from rendered rooms and "
+    "photographs; it goes by shape first.",
 }
 
 

@@ -313,7 +313,7 @@ _PROFILES = {one.name: one for one in (
     ),
     Encoders(
         "synthetic", pixels="embedded-synthetic", views="embedded-synthetic", sounds="embedded", **_KEYPOINTS,
-        about="as embedded, but its eyes learnt from rendered worlds alone; weaker in real rooms",
+        about="as embedded, but its eyes saw rendered worlds and photographs, no NYU Depth V2; weaker in real rooms",
         weight_variance_m2=_EVEN_M2,
     ),
     Encoders(

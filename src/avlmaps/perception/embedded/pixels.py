@@ -109,7 +109,7 @@ SMALLEST_LOG_AREA, LARGEST_LOG_AREA = -4.0, 0.7
 
 
 class EmbeddedPixels(NamedEncoder):
-    """Distinguishes some hundred things of homes and offices by their shape, helped a little by colour."""
+    """Distinguishes 151 things of homes and offices by their shape, helped a little by colour."""
 
     _names = "categories"
 
@@ -169,7 +169,7 @@ class EmbeddedPixels(NamedEncoder):
 
 
 def synthetic_pixels() -> EmbeddedPixels:
-    """Return the encoder whose weights saw rendered worlds alone."""
+    """Return the encoder whose weights saw no NYU Depth V2."""
     return EmbeddedPixels(load_network(SYNTHETIC_WEIGHTS))
 
 
@@ -203,7 +203,7 @@ class EmbeddedViews(NamedEncoder):
 
 
 def synthetic_views() -> EmbeddedViews:
-    """Return the encoder whose weights saw rendered worlds alone."""
+    """Return the encoder whose weights saw no NYU Depth V2."""
     return EmbeddedViews(load_network(SYNTHETIC_WEIGHTS))
 
 

@@ -2,7 +2,7 @@
 
 It looks at geometry in the frame of gravity, and at colour, which joins later and may be finer. It runs in onnxruntime
 at a small size (``Notes.width_px``), for every recording; ``training/pixels`` makes its weights. Two sets ship: one
-that learnt from rendered worlds and real frames, and one that saw rendered worlds alone (the profile ``synthetic``).
+that learnt from rendered worlds and real frames, and one that saw no NYU Depth V2 (the profile ``synthetic``).
 
 ``PairedNetworks`` looks with two networks: where they agree on what a frame shows, it is like the worlds that both
 know, and the mean of the two is right more often than either. Where they do not, it is a real frame, of which the
@@ -386,8 +386,8 @@ def see_multi_scale(network: SceneNetwork | PairedNetworks, frame: Frame) -> See
 
     first, *others = (network.see(frame, one) for one in AUGMENTATIONS)
     rows, columns = first.known.shape
-    resized = [cv2.resize(seen.category, (columns, rows), interpolation=cv2.INTER_LINEAR) for seen in others]
-    category = np.stack([first.category, *resized]).mean(axis=0)
+    halves = ([cv2.resize(half, (columns, rows)) for half in np.array_split(s.category, 2, axis=2)] for s in others)
+    category = np.stack([first.category, *map(np.dstack, halves)]).mean(axis=0)  # OpenCV 5 takes 128 channels at most
     camera, depth_m, rgb = at_working_size(frame, network.notes.width_px)
     cells = np.asarray(cv2.resize(rgb, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
     return replace(
