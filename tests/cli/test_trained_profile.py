@@ -49,7 +49,7 @@ def write_eyes(folder: Path, temperature: float) -> None:
     shutil.copy(shipped / f"{SYNTHETIC_WEIGHTS}.onnx", folder)
     notes = msgspec.json.decode((shipped / f"{SYNTHETIC_WEIGHTS}.json").read_bytes(), type=Notes)
     notes = msgspec.structs.replace(notes, id="own/pixels-1", temperature=temperature)
-    notes = msgspec.structs.replace(notes, checksum=checksum_of(weights, notes), rewritten="")
+    notes = msgspec.structs.replace(notes, checksum=checksum_of(weights, notes))
     (folder / f"{SYNTHETIC_WEIGHTS}.json").write_bytes(msgspec.json.encode(notes))
 
 

@@ -57,7 +57,7 @@ def rewrite(folder: Path, name: str, content: bytes | None = None, **changes: ob
     if content is not None:
         weights.write_bytes(content)
     notes = msgspec.structs.replace(msgspec.json.decode(path.read_bytes(), type=Notes), **changes)
-    notes = msgspec.structs.replace(notes, checksum=checksum_of(weights.read_bytes(), notes), rewritten="")
+    notes = msgspec.structs.replace(notes, checksum=checksum_of(weights.read_bytes(), notes))
     path.write_bytes(msgspec.json.encode(notes))
 
 

@@ -21,6 +21,7 @@ from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, Notes, ch
 from avlmaps_sim.bench.frames import SCORED
 
 PIXELS_PER_FRAME = 400
+LOOKED_AT = 40  # frames of each kind that show what range the features have
 # Of the biases that make single pixels likeliest only this share is applied: they favour walls, which fill most of a
 # view, and a thing whose pixels all lean to the wall is never seen. Instances are calibrated afterwards.
 PRIOR_SHARE = 0.25
@@ -207,7 +208,9 @@ def calibrate(options: Options) -> None:
     )
     options.out.mkdir(parents=True, exist_ok=True)
     weights = options.out / f"{options.name}.onnx"
-    write_onnx(network, weights)
+    frames = (one for part in chosen for one in part[:LOOKED_AT])
+    looked_at = (whole_frame(*one, with_colour=True, fineness=network.fineness)[:2] for one in frames)
+    write_onnx(network, weights, looked_at)
     notes = msgspec.structs.replace(notes, checksum=checksum_of(weights.read_bytes(), notes))
     path.write_bytes(msgspec.json.format(msgspec.json.encode(notes), indent=1) + b"\n")
     for name, part in zip(("rendered", "real"), parts, strict=False):

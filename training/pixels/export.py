@@ -1,11 +1,6 @@
-"""Writing networks for onnxruntime, their kernels in 8 bit, in a form that it is quick at.
+"""Writing networks for onnxruntime, in a form that it is quick at: convolutions in 8 bit."""
 
-``python -m training.pixels.export --weights NAME.onnx`` writes a file of before again in that form; it computes the
-same, to the last bit, and its models keep their ``checksum``.
-"""
-
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import msgspec
@@ -13,12 +8,17 @@ import numpy as np
 import onnx
 import onnxruntime
 import torch
-import tyro
-from onnx import numpy_helper
+from onnxruntime.quantization import (
+    CalibrationDataReader,
+    CalibrationMethod,
+    QuantFormat,
+    QuantType,
+    quantize_static,
+)
 from torch import Tensor, nn
 from training.pixels.network import COLOUR, GEOMETRY, RoomNetwork
 
-from avlmaps.perception.embedded.scene_network import Notes, checksum_of
+from avlmaps.perception.embedded.scene_network import Notes
 
 
 def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
@@ -28,10 +28,6 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
     network = RoomNetwork(len(state["categories"]), len(state["rooms"]), tuple(state["widths"]), has_tower=has_tower)
     network.load_state_dict({name: value.float() for name, value in state[weights].items()})
     return network.eval()
-
-
-# Values of an output's kernel that 8 bit are enough for; depthwise ones have 9 or 25 and vary widely.
-FEWEST = 64
 
 
 def notes_of(weights: Path) -> Notes:
@@ -95,8 +91,14 @@ def _log_mean(probabilities: Sequence[Tensor]) -> Tensor:
     return (torch.stack(list(probabilities)).mean(dim=0) + 1e-9).log()
 
 
-def write_onnx(network: RoomNetwork | MeanOf, path: Path) -> None:
-    """Write the network; its pictures may have any size that is a multiple of 32."""
+def write_onnx(network: RoomNetwork | MeanOf, path: Path, looked_at: Iterable[tuple[np.ndarray, np.ndarray]]) -> None:
+    """Write the network; its pictures may have any size that is a multiple of 32.
+
+    Args:
+        network: what answers.
+        path: the file.
+        looked_at: geometry and colour of some frames, which show what range the features have.
+    """
     n = network.fineness
     inputs = (torch.zeros(1, GEOMETRY, 64, 96), torch.zeros(1, COLOUR, n * 64, n * 96))
     size, finer = {2: "height", 3: "width"}, {2: f"{n}*height", 3: f"{n}*width"} if n > 1 else None
@@ -105,37 +107,36 @@ def write_onnx(network: RoomNetwork | MeanOf, path: Path) -> None:
         dynamic_axes={"geometry": size, "colour": finer or size, "category": {2: "rows", 3: "columns"}},
         opset_version=17, do_constant_folding=True, dynamo=False,
     )  # fmt: skip
-    _pack(path)
-
-
-def _pack(path: Path) -> None:
-    """Store large kernels as whole numbers of 8 bit and a scale for each output, other large arrays in half precision.
-
-    They are widened once, when the file is loaded; what is computed stays in single precision.
-    """
     model = onnx.load(path)
     quicken(model.graph)
-    graph, nodes = model.graph, []
-    for weight in list(graph.initializer):
-        if weight.data_type != onnx.TensorProto.FLOAT or int(np.prod(weight.dims)) < 256:
-            continue
-        values, name = numpy_helper.to_array(weight), weight.name
-        graph.initializer.remove(weight)
-        wide = onnx.TensorProto.FLOAT
-        if values.ndim < 4 or values[0].size < FEWEST:
-            graph.initializer.append(numpy_helper.from_array(values.astype(np.float16), f"{name}_half"))
-            nodes.append(onnx.helper.make_node("Cast", [f"{name}_half"], [name], to=wide))
-            continue
-        scale = np.maximum(np.abs(values).max(axis=(1, 2, 3), keepdims=True), 1e-12) / 127.0
-        whole = np.rint(values / scale).astype(np.int8)
-        graph.initializer.append(numpy_helper.from_array(whole, f"{name}_whole"))
-        graph.initializer.append(numpy_helper.from_array(scale.astype(np.float32), f"{name}_scale"))
-        nodes.append(onnx.helper.make_node("Cast", [f"{name}_whole"], [f"{name}_wide"], to=wide))
-        nodes.append(onnx.helper.make_node("Mul", [f"{name}_wide", f"{name}_scale"], [name]))
-    for node in reversed(nodes):
-        graph.node.insert(0, node)
     onnx.checker.check_model(model)
     onnx.save(model, path)
+    in_8_bit(path, looked_at)
+
+
+def in_8_bit(path: Path, looked_at: Iterable[tuple[np.ndarray, np.ndarray]]) -> None:
+    """Let a file compute its convolutions in whole numbers of 8 bit, in the ranges that some frames show.
+
+    Kernels have a scale for each output and 7 bit: two products of 8 bit overflow the sums of processors without
+    AVX-512 VNNI, and every processor shall see alike. Scores, and what becomes of them, stay in single precision.
+    """
+    model = onnx.load(path)
+    names = [node.name for node in model.graph.node]
+    together = any(name.startswith("/networks.") for name in names)
+    apart = [name for name in names if "/score/" in name or (together and not name.startswith("/networks."))]
+    quantize_static(
+        model, path, _Frames(looked_at), quant_format=QuantFormat.QDQ, per_channel=True, reduce_range=True,
+        activation_type=QuantType.QUInt8, weight_type=QuantType.QInt8, calibrate_method=CalibrationMethod.MinMax,
+        op_types_to_quantize=["Conv", "Add", "Mul", "Concat", "Relu", "Clip", "Resize"], nodes_to_exclude=apart,
+    )  # fmt: skip
+
+
+class _Frames(CalibrationDataReader):
+    def __init__(self, looked_at: Iterable[tuple[np.ndarray, np.ndarray]]) -> None:
+        self._left = iter(looked_at)
+
+    def get_next(self) -> dict[str, np.ndarray] | None:
+        return next(({"geometry": geometry, "colour": colour} for geometry, colour in self._left), None)
 
 
 def quicken(graph: onnx.GraphProto) -> None:
@@ -181,27 +182,3 @@ def quicken(graph: onnx.GraphProto) -> None:
             needed.insert(0, node)
     del graph.node[:]
     graph.node.extend(needed)
-
-
-@dataclass(frozen=True)
-class Options:
-    """Options of writing a file again."""
-
-    weights: Path
-    """The file ``NAME.onnx``, with ``NAME.json`` beside it."""
-
-
-def main(options: Options) -> None:
-    """Write the file and its notes again."""
-    model = onnx.load(options.weights)
-    quicken(model.graph)
-    onnx.checker.check_model(model)
-    onnx.save(model, options.weights)
-    path = options.weights.with_suffix(".json")
-    notes = msgspec.json.decode(path.read_bytes(), type=Notes)
-    notes = msgspec.structs.replace(notes, rewritten=checksum_of(options.weights.read_bytes(), notes))
-    path.write_bytes(msgspec.json.format(msgspec.json.encode(notes), indent=1) + b"\n")
-
-
-if __name__ == "__main__":
-    main(tyro.cli(Options))

@@ -88,11 +88,10 @@ def _read(path: Path, number: int = 0) -> tuple[dict[str, np.ndarray], dict[str,
     graph = onnx.load(path).graph
     arrays = {each.name: np.array(numpy_helper.to_array(each), np.float32) for each in graph.initializer}
     for node in graph.node:
-        if node.input and all(name in arrays for name in node.input):
-            if node.op_type == "Cast":
-                arrays[node.output[0]] = arrays[node.input[0]]
-            elif node.op_type == "Mul":
-                arrays[node.output[0]] = arrays[node.input[0]] * arrays[node.input[1]]
+        if node.op_type == "DequantizeLinear" and node.input[0] in arrays:
+            whole, scale, zero = (arrays[name] for name in node.input)
+            ahead = (-1, *[1] * (whole.ndim - 1)) if scale.ndim else ()
+            arrays[node.output[0]] = (whole - zero.reshape(ahead)) * scale.reshape(ahead)
     nodes = [node for node in graph.node if node.op_type == "Conv"]
     of_one = [node for node in nodes if node.name.startswith(f"/networks.{number}/")]
     if number and not of_one:

@@ -1,16 +1,20 @@
 """The weights that ship, taken apart for training: the same scores, and normalisations that learn on."""
 
+from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
-from training.pixels.export import MeanOf, write_onnx  # noqa: E402
+from training.pixels.export import MeanOf, Shipped, write_onnx  # noqa: E402
 from training.pixels.network import RoomNetwork  # noqa: E402
 from training.pixels.unfold import TRAINED_RMS, unfolded  # noqa: E402
+
+from avlmaps.perception.embedded.scene_network import Notes  # noqa: E402
 
 CATEGORIES, ROOMS, WIDTHS = 5, 3, (8, 12, 16, 20, 24)
 
@@ -19,6 +23,11 @@ def pictures(count: int, seed: int) -> list[tuple["torch.Tensor", "torch.Tensor"
     generator = torch.Generator().manual_seed(seed)
     return [(torch.randn(2, 8, 64, 96, generator=generator), torch.randn(2, 3, 64, 96, generator=generator))
             for _ in range(count)]  # fmt: skip
+
+
+def looked_at() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    for geometry, colour in pictures(6, 1):
+        yield geometry[:1].numpy(), colour[:1].numpy()
 
 
 @pytest.fixture
@@ -32,8 +41,21 @@ def shipped(tmp_path: Path) -> tuple[Path, RoomNetwork]:
     network.train()
     for geometry, colour in pictures(4, 1):
         network(geometry, colour)
-    write_onnx(network.eval(), tmp_path / "network.onnx")
+    write_onnx(network.eval(), tmp_path / "network.onnx", looked_at())
     return tmp_path / "network.onnx", network
+
+
+def test_a_file_of_8_bit_scores_nearly_as_its_network_does(shipped: tuple[Path, RoomNetwork]) -> None:
+    path, network = shipped
+    kinds = {name: "" for name in ("id", "note")} | {name: () for name in ("categories", "rooms", "bias")}
+    notes = Notes(**kinds, temperature=1.0, room_temperature=1.0, called={}, kinds={})
+    path.with_suffix(".json").write_bytes(msgspec.json.encode(notes))
+    file = Shipped(path)
+    for geometry, colour in pictures(3, 5):
+        with torch.no_grad():
+            one = network(geometry[:1], colour[:1])[0].numpy()
+        said = file(geometry[:1], colour[:1])[0].numpy()
+        assert np.corrcoef(said.ravel(), one.ravel())[0, 1] > 0.99
 
 
 def test_it_scores_as_the_file_does(shipped: tuple[Path, RoomNetwork]) -> None:
@@ -50,7 +72,7 @@ def test_of_several_networks_in_a_file_each_can_be_taken(shipped: tuple[Path, Ro
     with torch.no_grad():
         for array in pair[1].parameters():
             array *= 1.0 + 0.2 * torch.randn_like(array)
-    write_onnx(MeanOf(pair, [0.9, 1.2]), tmp_path / "both.onnx")
+    write_onnx(MeanOf(pair, [0.9, 1.2]), tmp_path / "both.onnx", looked_at())
     geometry, colour = pictures(1, 3)[0]
     for number, network in enumerate(pair):
         again = unfolded(tmp_path / "both.onnx", ROOMS, pictures(3, 2), number).eval()

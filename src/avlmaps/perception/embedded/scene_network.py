@@ -158,7 +158,6 @@ class Notes(msgspec.Struct, frozen=True):
     multiple: int = 16  # pictures are padded to a multiple of this
     fineness: int = 1  # how many times as wide and high as geometry the colour is
     checksum: str = ""  # of the weights and of what else makes the features; see ``checksum_of``
-    rewritten: str = ""  # the same of the file as it is, where its graph was written again and computes the same
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,7 +246,7 @@ def read_network(folder: Path, weights: str, remedy: str) -> SceneNetwork:
             content = (folder / f"{weights}.onnx").read_bytes()
         except OSError as fault:
             raise unusable(fault) from fault
-        if checksum_of(content, notes) != (notes.rewritten or notes.checksum):
+        if checksum_of(content, notes) != notes.checksum:
             raise unusable(f"{weights}.onnx and {weights}.json do not belong together")
         return content
 
@@ -264,7 +263,7 @@ def checksum_of(weights: bytes, notes: Notes) -> str:
     How features are read may change, and old maps stay usable: names, instances and the note do not count.
     """
     said = msgspec.structs.replace(notes, called={}, kinds={}, instances=InstanceNotes(), note="")
-    idle = ("checksum", "rewritten", *(["fineness"] if notes.fineness == 1 else []))  # weights of before it was
+    idle = ("checksum", *(["fineness"] if notes.fineness == 1 else []))  # weights of before it was
     makes = {name: value for name, value in msgspec.structs.asdict(said).items() if name not in idle}
     return sha256(weights + msgspec.json.encode(makes)).hexdigest()
 
