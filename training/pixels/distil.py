@@ -60,7 +60,8 @@ class Teachers(nn.Module):
 
 def temperatures_of(path: Path) -> list[float]:
     """Return what divides the scores of each network of a file."""
-    nodes = onnx.load(path).graph.node
-    constants = {n.output[0]: n.attribute[0].t for n in nodes if n.op_type == "Constant"}
-    divided = [n for n in nodes if n.op_type == "Div" and n.input[0].startswith("/networks.")]
+    graph = onnx.load(path).graph
+    constants = {n.output[0]: n.attribute[0].t for n in graph.node if n.op_type == "Constant"}
+    constants |= {array.name: array for array in graph.initializer}
+    divided = [n for n in graph.node if n.op_type == "Div" and n.input[0].startswith("/networks.")]
     return [float(numpy_helper.to_array(constants[n.input[1]])) for n in divided] or [1.0]
