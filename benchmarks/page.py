@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FIGURES, PAGE, README = ROOT / "docs" / "benchmarks.json", ROOT / "docs" / "benchmarks.md", ROOT / "README.md"
 BEGIN, END = "<!-- figures: begin (python benchmarks/report.py --page) -->", "<!-- figures: end -->"
 NOT_YET = "not measured yet"
-_OF_PHOTOS = {"local", "place", "matcher"}
+EYES, EARS, PHOTOS = ("words", "pixels", "views"), ("words", "sounds"), ("local", "place", "matcher")
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,14 +26,14 @@ class Figure:
         row: start of the row's cells, joined by " | "; for a text a regular expression with groups.
         form: shows cells by ``{column}``, the cell right of one by ``{+column}``, one of another row by
             ``{start of the row|column}``; for a text ``{1}`` and so on.
-        photos: whether photos are located, so that the weights of keypoints and places count as well.
+        of: the modules whose weights it depends on; a text is of none.
     """
 
     label: str
     table: str
     row: str
     form: str
-    photos: bool = False
+    of: tuple[str, ...] = EYES
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ def _paper(table: str, ours: str, label: str, beside: str = "") -> Figure:
     form = "**{R@1 < 0.5 m %} %** of {tasks} within 0.5 m ({+R@1 < 0.5 m %}), {R@1 < 1 m %} within 1 m"
     if beside:
         form += f"; {beside} {{{beside} | *|R@1 < 0.5 m %}}, chance {{chance|R@1 < 0.5 m %}}"
-    return Figure(label, table, ours, form, photos=table == "Table V")
+    return Figure(label, table, ours, form, (*EYES, *{"Table IV": EARS, "Table V": PHOTOS}.get(table, ())))
 
 
 def _ours(table: str, ours: str, label: str, beside: str) -> Figure:
@@ -81,7 +81,8 @@ def _tables(suffix: str) -> tuple[Figure, ...]:
 
 def _driven(table: str, label: str, in_a_row: int) -> Figure:
     column = f"{in_a_row} in a row %"
-    return Figure(label, table, "ours", f"all {in_a_row} reached in {{{column}}} % of {{sequences}} ({{+{column}}})")
+    form = f"all {in_a_row} reached in {{{column}}} % of {{sequences}} ({{+{column}}})"
+    return Figure(label, table, "ours", form, (*EYES, *EARS, *PHOTOS))
 
 
 HOMES = tuple(f"house:{1_000_000 + number}:held-out" for number in range(12))
@@ -142,11 +143,11 @@ ENTRIES = (
                "{pixel accuracy} of {frames} frames ({mean over frames, 95 %})"),), "--frames 795"),
     Entry("sounds", "avlmaps bench sounds --sounds SOUNDS --out OUT", (
         Figure("sounds by words, held out: ten kinds of ESC-10", "cross-validation: asked by words",
-               "ESC-10 | dry | right name first among 50 names", "{hits} of {of}, {%} % ({95 %})"),
+               "ESC-10 | dry | right name first among 50 names", "{hits} of {of}, {%} % ({95 %})", EARS),
         Figure("the same, forty household kinds", "cross-validation: asked by words",
-               "household | dry | right name first among 50 names", "{hits} of {of}, {%} % ({95 %})"),
+               "household | dry | right name first among 50 names", "{hits} of {of}, {%} % ({95 %})", EARS),
         Figure("unknown kinds of sound that are refused", "cross-validation: refusing", "dry",
-               "{no to strangers %} % of {strangers}"))),
+               "{no to strangers %} % of {strangers}", EARS))),
     Entry("segmentation", "avlmaps bench segmentation --sounds SOUNDS --out OUT", (
         Figure("sounds cut out of a track, pink noise, 20 dB", "sounds found", "folds 4 and 5 | pink | 20",
                "{found %} % of {sounds} found ({95 %})"),)),
@@ -174,10 +175,10 @@ ENTRIES = (
                "{whole maps left} of {kills}"),), "--kills 40"),
     Entry("sources", "avlmaps bench sources --scenes HOMES --rooms ROOMS --trials 0 --out OUT", (
         Figure("where sounds came from, four microphones (simulated)", "homes", "square4",
-               "median {median error m} m ({+median error m})"),
-        Figure("the same, one microphone", "homes", "mono", "median {median error m} m ({+median error m})"),
+               "median {median error m} m ({+median error m})", ()),
+        Figure("the same, one microphone", "homes", "mono", "median {median error m} m ({+median error m})", ()),
         Figure("the same, a measured room", "a measured room", "4 of 25",
-               "median {median error m} m ({+median error m})")), "--trials 12"),
+               "median {median error m} m ({+median error m})", ())), "--trials 12"),
     Entry("indexing", "avlmaps bench indexing --scenes HOMES --out OUT", _tables("")),
     Entry("indexing-clips", "avlmaps bench indexing --scenes HOMES --sounds SOUNDS --out OUT",
           _tables("; recorded sounds")[1:2]),  # the others ask for no sound
@@ -186,8 +187,10 @@ ENTRIES = (
         _paper("Table IV", "object + sound", "Table IV by the paper's rules"),
         _paper("Table V", "object + image", "Table V by the paper's rules"))),
     Entry("found", "avlmaps bench found --scenes HOMES --out OUT", (
-        Figure("Is found true? Brier score", "found", "all", "{Brier score} of {queries} queries", photos=True),
-        Figure("found, where no such thing is", "found", "all", "{none there: found}", photos=True))),
+        Figure("Is found true? Brier score", "found", "all", "{Brier score} of {queries} queries",
+               (*EYES, *EARS, *PHOTOS)),
+        Figure("found, where no such thing is", "found", "all", "{none there: found}",
+               (*EYES, *EARS, *PHOTOS)))),
     Entry("navigation",
           "avlmaps bench navigation --scenes HOMES --sequences 12 --series sounds-3 images pairs --out OUT", (
         _driven("Table I: four sounds, range 3", "Table I, four sounds, range 3", 4),
@@ -237,7 +240,7 @@ def page(measured: Mapping[str, Any], shipped: Mapping[str, str]) -> str:
     for entry in (one for one in ENTRIES if one.name in measured):
         found = measured[entry.name]
         for number, figure in enumerate(entry.figures):
-            when = f"{weights_of(found, shipped, photos=figure.photos)}, {found['date']}{_homes(found)}"
+            when = f"{weights_of(found, shipped, figure.of)}, {found['date']}{_homes(found)}"
             command = "" if number else f"`{found['command']}`"
             lines.append(f"| {figure.label} | {shown(figure, found)} | {when} | {command} |")
     missing = [entry.name for entry in ENTRIES if entry.name not in measured]
@@ -250,21 +253,20 @@ def _homes(found: Mapping[str, Any]) -> str:
     return f", {len(homes)} home{'s' if len(homes) > 1 else ''}" if homes else ""
 
 
-def weights_of(found: Mapping[str, Any], shipped: Mapping[str, str], *, photos: bool = False) -> str:
-    """Say whether an entry was measured with the weights that ship; those of photos count where they are located."""
+def weights_of(found: Mapping[str, Any], shipped: Mapping[str, str], of: Collection[str]) -> str:
+    """Say whether an entry was measured with the weights that ship, of some modules."""
     answer = found.get("answer")
-    if answer is None or answer.get("weights") == {}:
+    if answer is None or answer.get("weights") == {} or not of:
         return "none" if answer is not None or found["command"].startswith("python") else "-"
     if answer.get("weights") is None:
         return "not recorded"
-    others = set(outdated(answer["weights"], shipped)) - (set() if photos else _OF_PHOTOS)
-    return "older" if others else "shipped"
+    return "older" if set(outdated(answer["weights"], shipped)).intersection(of) else "shipped"
 
 
 def stale(entry: Entry, found: Mapping[str, Any] | None, shipped: Mapping[str, str]) -> bool:
     """Return whether an entry was never measured, or with other weights than those that ship."""
-    photos = any(figure.photos for figure in entry.figures)
-    return found is None or weights_of(found, shipped, photos=photos) in ("older", "not recorded")
+    of = {module for figure in entry.figures for module in figure.of}
+    return found is None or weights_of(found, shipped, of) in ("older", "not recorded")
 
 
 def readme_table(measured: Mapping[str, Any]) -> str:
