@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.progress import progress
 from avlmaps.query.words import VoxelNamer
@@ -105,10 +106,15 @@ def measure(avlmap: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, 
     said, held, best, reached = [], np.zeros(len(centres), bool), {}, {}
     covered: dict[str, np.ndarray] = {}
     for word in words:
-        heat = avlmap.object(word, primary=True)
+        of_word = [number for number in seen if answers(name[number], word)]
+        try:
+            heat = avlmap.object(word, primary=True)
+        except QueryError:  # the encoder was not trained to detect it
+            best[word] = (0.0, bool(of_word))
+            reached |= {word: np.inf} if word in present else {}
+            continue
         factor = heat.factors[0]
         rows = np.flatnonzero(getattr(factor, "mask", np.zeros(len(centres), bool)))
-        of_word = [number for number in seen if answers(name[number], word)]
         held[:] = False
         for number in of_word:
             held[inside[number]] = True
