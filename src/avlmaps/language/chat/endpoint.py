@@ -29,7 +29,6 @@ MOST_BYTES = 1 << 20
 _PREFIX = "AVLMAPS_CHAT_"
 _MODELS_WAIT_S = 10.0
 _SHORTEST_KEY = 8
-_BOUNDED = frozenset({"timeout_s", "retries", "rounds", "temperature", "max_tokens"})
 _BUSY = frozenset({408, 425, 429, 500, 502, 503, 504, 529})
 _STATUSES = {401: "key", 403: "key", 404: "model", 429: "busy"}
 Shape = TypeVar("Shape")
@@ -53,7 +52,7 @@ class ChatSettings:
 
     def __post_init__(self) -> None:
         for name, kind in get_type_hints(type(self), include_extras=True).items():
-            if name in _BOUNDED:
+            if name != "replay":
                 try:
                     msgspec.convert(getattr(self, name), kind)
                 except msgspec.ValidationError as fault:
@@ -241,7 +240,9 @@ class Endpoint:
             )
         self.left_out: list[str] = []
         self._settings = settings
-        self._most_tokens_word = "max_completion_tokens" if settings.hosted else "max_tokens"
+        most = "max_completion_tokens" if settings.hosted else "max_tokens"
+        wanted = {"temperature": settings.temperature, "seed": settings.seed, most: settings.max_tokens}
+        self._optional = {name: value for name, value in wanted.items() if value is not None}
         self._opener = build_opener(_NoRedirect(), *([ProxyHandler({})] if settings.on_this_machine else []))
 
     def complete(self, model: str, messages: Messages, deadline: float | None = None) -> ModelReply:
@@ -250,14 +251,9 @@ class Endpoint:
         deadline = monotonic() + settings.timeout_s if deadline is None else deadline
         attempt = 0
         while True:
-            optional = {
-                "temperature": settings.temperature, "seed": settings.seed, self._most_tokens_word: settings.max_tokens
-            }  # fmt: skip
-            kept = {name: each for name, each in optional.items() if each is not None and name not in self.left_out}
+            asked = {"model": model, "messages": messages, **self._optional}
             try:
-                answer = _reply(
-                    self._asked("chat/completions", deadline, {"model": model, "messages": messages, **kept})
-                )
+                answer = _reply(self._asked("chat/completions", deadline, asked))
                 return msgspec.structs.replace(answer, content=self._without_key(answer.content))
             except _Fault as fault:
                 if self._adapted(fault):
@@ -306,15 +302,14 @@ class Endpoint:
 
     def _adapted(self, fault: _Fault) -> bool:
         """Leave out, or name otherwise, the parameter that the server does not take; return whether there was one."""
-        optional = ("max_tokens", "temperature", "seed")
-        wrong = next((name for name in optional if re.search(rf"\b{name}\b", fault.told)), None)
-        if fault.status not in (400, 422) or wrong is None or wrong in self.left_out:
+        wrong = next((name for name in self._optional if re.search(rf"\b{name}\b", fault.told)), None)
+        if fault.status not in (400, 422) or wrong in (None, "max_completion_tokens"):
             return False
+        value = self._optional.pop(wrong)
         if wrong == "max_tokens":
-            is_new = self._most_tokens_word == "max_tokens"
-            self._most_tokens_word = "max_completion_tokens"
-            return is_new
-        self.left_out.append(wrong)
+            self._optional["max_completion_tokens"] = value
+        else:
+            self.left_out.append(wrong)
         return True
 
     def _sentence(self, fault: _Fault, model: str) -> str:
