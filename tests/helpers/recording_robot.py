@@ -6,7 +6,7 @@ from zlib import crc32
 
 from avlmaps.core.errors import GoalNotFoundError
 from avlmaps.language.program import Skill, skills
-from avlmaps.language.program.vocabulary import Clip, Picture, Place
+from avlmaps.language.program.vocabulary import Clip, Picture, Place, ValueType
 
 ABSENT = "unicorn"
 
@@ -69,7 +69,7 @@ class _Calls:
 
 
 def _method(skill: Skill) -> Any:
-    names = list(skill.parameters)
+    names = list(skill.takes.parameters)
 
     def call(robot: _Calls, *values: Any, **named: Any) -> Any:
         given = dict(zip(names, values, strict=False)) | named
@@ -79,16 +79,16 @@ def _method(skill: Skill) -> Any:
         text = f"{skill.name}({', '.join(f'{name}={_text(value)}' for name, value in given.items())})"
         place = robot.place(crc32(text.encode()) % 1000 / 100, crc32(text[::-1].encode()) % 1000 / 100, 0.5)
         results = {
-            "Picture": lambda: Picture(given["path"]),
-            "Clip": lambda: Clip(given["path"]),
-            "Heat": lambda: RecordedHeat(text),
-            "Place": lambda: place,
-            "list[Place]": lambda: [place, place * 0.5, place / 4.0],
-            "bool": lambda: True,
-            "float": lambda: place.x,
-            "None": lambda: None,
+            ValueType.PICTURE: lambda: Picture(given["path"]),
+            ValueType.CLIP: lambda: Clip(given["path"]),
+            ValueType.HEAT: lambda: RecordedHeat(text),
+            ValueType.PLACE: lambda: place,
+            ValueType.LIST: lambda: [place, place * 0.5, place / 4.0],
+            ValueType.TRUTH: lambda: True,
+            ValueType.NUMBER: lambda: place.x,
+            ValueType.NOTHING: lambda: None,
         }
-        return results[skill.returns_text]()
+        return results[skill.returns]()
 
     return call
 

@@ -88,7 +88,7 @@ class _Rules:
     def __init__(self, text: str) -> None:
         self.rules = dict(line.split(" ::= ", 1) for line in text.splitlines())
         self.words = {json.loads(word) for word in self.rules["word"].split(" | ")}
-        every = " | ".join(self.rules[name] for name in ("count", "m", "s", "deg"))
+        every = " | ".join(self.rules[name] for name in ("n", "m", "s", "deg"))
         self.numbers = {json.loads(number) for number in every.split(" | ")} | {"8"}
         self.expression = re.compile(self._of("root"))
 

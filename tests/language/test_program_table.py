@@ -15,7 +15,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "programs.md"
 def test_a_signature_reads_as_it_is_written() -> None:
     assert skills()["move_north"].signature == "move_north(target: str | Place | Heat, distance_m: float = 0.5) -> None"
     assert skills()["get_contour"].signature == "get_contour(target: str | Place | Heat) -> list[Place]"
-    assert skills()["get_map"].parameters["sound"].kinds == {ValueType.STRING, ValueType.CLIP, ValueType.NOTHING}
+    assert skills()["get_map"].kinds["sound"] == {ValueType.STRING, ValueType.CLIP, ValueType.NOTHING}
 
 
 def test_only_alternatives_must_be_given_one_at_a_time() -> None:

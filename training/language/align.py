@@ -81,9 +81,7 @@ class _Found(Pointers):
         return at
 
     def _end(self, at: int, of: str) -> int:
-        reads = {"metres": lexer.length_at, "degrees": lexer.angle_at, "seconds": lexer.duration_at,
-                 "clock": lexer.clock_at, "count": lexer.number_at}  # fmt: skip
-        return max((end for end, _ in reads[of](self.tokens, at)), default=at)
+        return max((end for end, _ in lexer.READS[of](self.tokens, at)), default=at)
 
     def words(self, name: str, kind: TargetKind) -> list[int]:
         if kind in (TargetKind.IMAGE, TargetKind.CLIP):

@@ -74,7 +74,7 @@ def _writes(row: Row, intent: Intent) -> bool:
         if isinstance(field, Amount):
             if value is None and not field.optional:
                 return False
-            if value is not None and field.amount(value) is None:
+            if value is not None and _amount_of(field, value) is None:
                 return False
         elif not isinstance(field, Slot | tuple) and value != field:
             return False
@@ -83,7 +83,7 @@ def _writes(row: Row, intent: Intent) -> bool:
 
 def _field(field: Any, value: Any, at: Pointers) -> list[Symbol]:
     if isinstance(field, Amount):
-        amount = None if value is None else field.amount(float(value))
+        amount = None if value is None else _amount_of(field, float(value))
         return [] if amount is None else [_amount(amount, field, at)]
     if isinstance(field, tuple):
         return [symbol for each in value for symbol in _target(each, at)]
@@ -92,6 +92,15 @@ def _field(field: Any, value: Any, at: Pointers) -> list[Symbol]:
     if isinstance(field, Slot):
         return [*(symbol for each in value for symbol in _line(each, at)), "close"]
     return []
+
+
+def _amount_of(field: Amount, value: float) -> float | None:
+    """Return the amount to write for the value of a field; None where another row writes such values."""
+    if field.of == "clock":
+        return value
+    if field.wraps:
+        return value % 360.0
+    return abs(value) if (value < 0.0) == (field.sign < 0) else None
 
 
 def _amount(amount: float, field: Amount, at: Pointers) -> Symbol:

@@ -8,7 +8,7 @@ sentence.
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import msgspec
 
@@ -16,7 +16,7 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language import intents as act
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import describes, is_entry, sounding_words, sounds_like
+from avlmaps.language.names import describes, is_entry, sounding_forms, sounds_like
 from avlmaps.language.word_classes import filled, listed, load_word_classes, pattern_of, table, word_list
 
 _ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
@@ -28,9 +28,6 @@ _WAYS = dict.fromkeys(("clockwise", "cw"), act.TurnSense.CLOCKWISE) | dict.fromk
 )
 _ENDS = frozenset(act.Pick(side) for side in ("left", "right", "north", "south", "east", "west"))
 _VAGUE = frozenset({"a", "an", "one", "another"})
-_AMOUNTS = {
-    "clock": lexer.clock_at, "m": lexer.length_at, "deg": lexer.angle_at, "s": lexer.duration_at, "n": lexer.number_at,
-}  # fmt: skip
 
 
 class Row(msgspec.Struct, rename={"of": "if"}):
@@ -44,9 +41,7 @@ class Row(msgspec.Struct, rename={"of": "if"}):
     choices: tuple[str, ...] = ()
 
 
-def claimed_words(name: str) -> frozenset[str]:
-    """Return the words of a list."""
-    return word_list("claims", name)
+claimed_words = partial(word_list, "claims")  # the words of a list
 
 
 def is_alive(name: str) -> bool:
@@ -83,11 +78,6 @@ def _pattern(says: str) -> re.Pattern[str]:
     return re.compile(f"(?<![^ ^@$])(?:{filled(says, _known())})")
 
 
-@cache
-def _asks() -> re.Pattern[str]:
-    return re.compile(_known()["ask"])
-
-
 class _Marked:
     """A sentence as rows see it: its names with marks, its amounts and files as one word each."""
 
@@ -107,7 +97,7 @@ class _Marked:
         token = tokens[at]
         if token.kind in ("image", "clip"):
             return at + 1, "‹file›" if used is None or at in used else "‹file!›"
-        ends = {name: max((end for end, _ in read(tokens, at)), default=at) for name, read in _AMOUNTS.items()}
+        ends = {name: max((end for end, _ in read(tokens, at)), default=at) for name, read in lexer.READS.items()}
         name = max(ends, key=ends.__getitem__)
         reads = used is None or not used.isdisjoint(range(at, ends[name]))
         counted = ends[name] < len(tokens) and tokens[ends[name]].text in claimed_words("counted")
@@ -163,7 +153,7 @@ def unmet_by(tokens: Sequence[Token], inquiry: act.Inquiry, used: frozenset[int]
         facts |= {"sound"} | ({"heard sound"} if _HEARD & {token.text for token in tokens} else set())
         facts |= {"no sound"} if "heard sound" not in facts and not _sounds(about.name) else set()
     facts |= {token.kind for token in tokens if token.kind in ("clip", "image")}
-    if inquiry.ask is act.Ask.EXISTS or _asks().search(marked.text):
+    if inquiry.ask is act.Ask.EXISTS or _pattern("{ask}").search(marked.text):
         facts.add("whether")
     found = _first("question", marked, frozenset(facts))
     return None if found is None else getattr(found, "question", "A map cannot answer this.")
@@ -226,7 +216,7 @@ def _turns(tokens: Sequence[Token], at: int) -> bool:
 def _sounds(name: str) -> bool:
     words = name.split()
     known = any(lexicon().find(" ".join(words[at:]), EntryKind.SOUND) for at in range(len(words)))
-    told = sounding_words() | claimed_words("ringers")
+    told = sounding_forms().keys() | claimed_words("ringers")
     return known or any(sounds_like(word) or word in told for word in words)
 
 
@@ -263,6 +253,6 @@ def _facts(intents: Sequence[act.Intent], targets: Sequence[act.Target]) -> Iter
     for intent in act.every(intents):
         if isinstance(intent, act.If):
             yield from ("if", "if alive") if is_alive(intent.of.name) else ("if",)
-        yield from act.facts_of(intent)
+        yield from (act.Filled().vformat(fact, (), act.values_of(intent)) for fact in act.row_of(intent).facts)
     if len(act.steps_of(intents)) == 1:
         yield "one step"

@@ -2,18 +2,18 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language import intents as act
 from avlmaps.language.claims import claimed_words, forbidden
-from avlmaps.language.gate import NoOrder, no_order
-from avlmaps.language.learned.decision import EXAMPLE, NameResolver, Weighed, decided, refusal_of, weighed
+from avlmaps.language.gate import UNSURE, NoOrder, no_order
+from avlmaps.language.learned.decision import EXAMPLE, Command, NameResolver, Weighed, decided, refusal_of, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.names import respelt
 from avlmaps.language.said_places import SaidStorey, changes_storey, said_storeys
-from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, any_one, language_of, stand_ins
+from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, language_of, stand_ins
 from avlmaps.language.verbalise import verbalise
 from avlmaps.language.word_classes import load_word_classes, pattern
 
@@ -32,22 +32,6 @@ class UnclearError(LanguageError):
         self.choices = choices
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
-    """The meaning of a command."""
-
-    intents: tuple[act.Intent, ...]  # one refusal or question where the robot may not drive
-    notes: tuple[str, ...]  # a sentence each: how words were taken, and what has no effect
-    readings: tuple[Weighed, ...]  # the likeliest first
-    why: str  # a key of `translator._WHY`
-
-    @property
-    def stops(self) -> act.Refuse | act.Clarify | None:
-        """The refusal or the question; None where the robot may drive."""
-        first = self.intents[0]
-        return first if isinstance(first, act.Refuse | act.Clarify) else None
-
-
 def read_command(text: str, given: Attachments | None = None) -> Command:
     """Return the meaning of a command; what may be no order, to the robot, now, becomes a question.
 
@@ -55,11 +39,11 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
     """
     _check_length(text)
     if is_stop(tokenise(text)):
-        return Command((act.Wait(),), (), (), "words")
+        return Command((act.Wait(),))
     read = _read(text, given)
     stop = read.stops
     closed = no_order(text)
-    if closed is None or (stop is not None and (closed.is_unsure or _harms(stop))):
+    if closed is None or (stop is not None and (closed.kind == UNSURE or _harms(stop))):
         return read
     refused = act.Refuse(act.RefusalReason.UNKNOWN, _not_ordered(closed))
     answer = refused if closed.refuses or stop is not None else _asked(closed, read.intents)
@@ -109,11 +93,11 @@ def _read(text: str, given: Attachments | None) -> Command:
         return replace(read, intents=intents, notes=tuple(map(stand.back, read.notes)))
     language = language_of(text)
     if language is not None:
-        return Command((act.Clarify(ASK.format(language=language)),), (), (), "words")
+        return Command((act.Clarify(ASK.format(language=language)),))
     sentence = Sentence(text, given)
     stop = forbidden(sentence.tokens)
     if stop is not None:
-        return Command((refusal_of(stop, sentence.tokens),), (), (), "words")
+        return Command((refusal_of(stop, sentence.tokens),))
     storeys = said_storeys(text)
     if storeys:
         named = _on_storey(text, storeys, given)
@@ -121,16 +105,16 @@ def _read(text: str, given: Attachments | None) -> Command:
             return named
         numbered = [one.said for one in storeys if one.number is not None]
         if numbered:
-            return Command((act.Clarify(ON_ITS_STOREY.format(said=numbered[0])),), (), (), "words")
+            return Command((act.Clarify(ON_ITS_STOREY.format(said=numbered[0])),))
     reader = learned_reader()
     readings = weighed_readings(sentence, reader)
     if not readings:
         question = act.Clarify(f"I do not understand this. Say it like: {EXAMPLE}.")
-        return Command((question,), (), (), "unsure")
+        return Command((question,), why="unsure")
     answer = decided(readings, reader.limits)
     notes = (*sentence.notes, *_without_effect(sentence), *answer.notes, *_lost_sides(answer.intents, sentence))
     intents = _picked(answer.intents, " ".join(token.text for token in sentence.tokens))
-    return Command(intents, tuple(dict.fromkeys(notes)), readings, answer.why)
+    return replace(answer, intents=intents, notes=tuple(dict.fromkeys(notes)))
 
 
 def _picked(intents: Sequence[act.Intent], said: str) -> tuple[act.Intent, ...]:
@@ -140,9 +124,9 @@ def _picked(intents: Sequence[act.Intent], said: str) -> tuple[act.Intent, ...]:
         if target.pick is not act.Pick.ANY or target.kind not in (act.TargetKind.OBJECT, act.TargetKind.AREA):
             return target
         at = re.search(rf"(?<!\S){re.escape(target.name.lower())}(?!\S)", said)
-        if at is None or not any_one(said[: at.start()], said[at.end() :]):
-            return target
-        return replace(target, pick=act.Pick.NEAREST)
+        before, behind = (said[: at.start()], said[at.end() :]) if at else ("", "")
+        leaves_it = pattern("rewrites", "any_before").search(before) or pattern("rewrites", "any_behind").match(behind)
+        return replace(target, pick=act.Pick.NEAREST) if leaves_it else target
 
     def of_any(intent: act.Intent) -> act.Intent:  # "if there is a chair": whichever
         intent = act.within(intent, of_any)

@@ -17,26 +17,16 @@ from avlmaps.language.word_classes import filled, table, words_of
 
 _ORDER = "order"
 _QUOTE = re.compile(r"""(?<=[\w,]) ["'“‘](?=\w)""")
-_UNSURE = "unsure"
-_UNSURE_ANSWER = "Is this an order, to me, now?"
+UNSURE = "unsure"  # the network says so, and no row
 
 
 @dataclass(frozen=True, slots=True)
 class NoOrder:
-    """A sentence that may be no order: the kind of its row, or ``unsure``, and a sentence that says why."""
+    """A sentence that may be no order."""
 
-    kind: str
-    answer: str
-
-    @property
-    def refuses(self) -> bool:
-        """Whether it offers nothing to choose: a quoted order is nobody's."""
-        return bool(table("gate").get(self.kind, {}).get("refuses"))
-
-    @property
-    def is_unsure(self) -> bool:
-        """Whether the network says so, and no row."""
-        return self.kind == _UNSURE
+    kind: str  # of its row, or `UNSURE`
+    answer: str  # a sentence that says why
+    refuses: bool = False  # offers nothing to choose: a quoted order is nobody's
 
 
 def no_order(text: str) -> NoOrder | None:
@@ -47,11 +37,11 @@ def no_order(text: str) -> NoOrder | None:
     closed = (kind for kind, rows in _rows().items() if kind != _ORDER and any(row.search(quoted) for row in rows))
     kind = next(closed, None)
     if kind is not None:
-        return NoOrder(kind, table("gate")[kind]["answer"])
+        return NoOrder(kind, table("gate")[kind]["answer"], "refuses" in table("gate")[kind])
     if any(row.search(ordered) for row in _rows()[_ORDER]):
         return None
     unsure = english().no_order(text if ordered == said else ordered) > english().limit
-    return NoOrder(_UNSURE, _UNSURE_ANSWER) if unsure else None
+    return NoOrder(UNSURE, "Is this an order, to me, now?") if unsure else None
 
 
 @cache

@@ -108,16 +108,10 @@ class Target:
 
     def to_json(self) -> dict[str, Any]:
         """Return the target as JSON has it, such as ``{"object": "chair", "near": [{"area": "kitchen"}]}``."""
-        told: dict[str, Any] = {str(self.kind): self.name if self.kind is not TargetKind.HERE else True}
-        if self.near:
-            told["near"] = [one.to_json() for one in self.near]
-        if self.pick:
-            told["pick"] = str(self.pick)
-        if self.number > 1:
-            told["number"] = self.number
-        if self.at:
-            told["at"] = self.at
-        return told
+        near = [one.to_json() for one in self.near]
+        told = {"near": near, "pick": str(self.pick), "number": self.number if self.number > 1 else 0, "at": self.at}
+        own = {str(self.kind): self.name if self.kind is not TargetKind.HERE else True}
+        return own | {name: value for name, value in told.items() if value}
 
 
 class Step:
@@ -255,25 +249,18 @@ Intent = (
 
 def to_json(intent: Intent) -> dict[str, Any]:
     """Return an intent as JSON has it; what is None or a default is left out."""
-    told: dict[str, Any] = {"do": intent.do}
-    for name in intent.__slots__:
-        value = getattr(intent, name)
-        left_out = name == "meanings" or (name == "side" and value is Side.AHEAD)
-        if left_out or value is None or value in ("", ()):
-            continue
-        if isinstance(value, Target):
-            told[name] = value.to_json()
-        elif isinstance(value, tuple):
-            told[name] = [_inner(one) for one in value]
-        else:
-            told[name] = str(value) if isinstance(value, StrEnum) else value
-    return told
+    told = {name: value for name, value in values_of(intent).items() if name != "meanings"}
+    return {"do": intent.do} | {
+        name: _told(value) for name, value in told.items() if value not in (None, "", (), Side.AHEAD)
+    }
 
 
-def _inner(value: Any) -> Any:
-    if isinstance(value, Target):
-        return value.to_json()
-    return value if isinstance(value, str) else to_json(value)
+def _told(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_told(one) for one in value]
+    if hasattr(value, "do"):
+        return to_json(value)
+    return value.to_json() if isinstance(value, Target) else str(value) if isinstance(value, StrEnum) else value
 
 
 def on_targets(intent: Intent, change: Callable[[Target], Target]) -> Intent:
@@ -344,7 +331,7 @@ class Row(msgspec.Struct, frozen=True):
     words: str
     program: str
     where: dict[str, list[str | float]] = {}
-    facts: tuple[str, ...] = ()
+    facts: tuple[str, ...] = ()  # what the intent does, in the words of `claims.toml`
     head: str = ""
 
     def fits(self, intent: Intent) -> bool:
@@ -377,11 +364,6 @@ def row_of(intent: Intent) -> Row:
         if row.do == intent.do and row.fits(intent):
             return row
     raise ValueError(f"{intent!r} has no row in intents.toml")
-
-
-def facts_of(intent: Intent) -> list[str]:
-    """Return what an intent does, in the words of `claims.toml`."""
-    return [Filled().vformat(fact, (), values_of(intent)) for fact in row_of(intent).facts]
 
 
 class Ask(StrEnum):

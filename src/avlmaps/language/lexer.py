@@ -5,7 +5,7 @@ directions, names of picture and sound files, and media in curly braces as the p
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from unicodedata import normalize
@@ -305,7 +305,7 @@ def _and_smaller(
     joined = at < len(tokens) and tokens[at].text == "and"
     for end, value in number_at(tokens, at + joined):
         ends = end >= len(tokens) or tokens[end].kind == "punct"
-        bare = end >= len(tokens) or not (is_unit(tokens, end) or tokens[end].text in _list("counted"))
+        bare = end >= len(tokens) or not (_is_unit(tokens, end) or tokens[end].text in _list("counted"))
         parts = 100 if units is LENGTHS and unit == 1.0 else 60 if units is _TIMES and unit == 60.0 else 0
         inches = units is LENGTHS and unit == _FOOT and not joined and 1 <= value < 12
         hundredths = (ends or not joined) and 10 <= value < parts
@@ -317,8 +317,7 @@ def _and_smaller(
     return []
 
 
-def is_unit(tokens: Sequence[Token], at: int) -> bool:
-    """Return whether a unit stands at a token."""
+def _is_unit(tokens: Sequence[Token], at: int) -> bool:
     return any(_unit(tokens, at, units) for units in (LENGTHS, _ANGLES, _TIMES))
 
 
@@ -334,21 +333,6 @@ def _unit(tokens: Sequence[Token], at: int, units: Mapping[str, float]) -> float
     return units.get(word) or (units.get(word.removesuffix("s")) if len(word) > 2 else None)
 
 
-def length_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
-    """Return the distances that begin at a token, in metres."""
-    return amounts_at(tokens, i, LENGTHS)
-
-
-def angle_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
-    """Return the angles that begin at a token, in degrees."""
-    return amounts_at(tokens, i, _ANGLES)
-
-
-def duration_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
-    """Return the times that begin at a token, in seconds."""
-    return amounts_at(tokens, i, _TIMES)
-
-
 def clock_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
     """Return the clock direction that begins at a token ("3 o'clock"), in degrees clockwise from straight ahead."""
     return [
@@ -356,3 +340,10 @@ def clock_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
         for end, value in number_at(tokens, i)
         if end < len(tokens) and tokens[end].text == "o'clock" and 1 <= value <= 12
     ]
+
+
+length_at, angle_at, duration_at = (partial(amounts_at, units=units) for units in (LENGTHS, _ANGLES, _TIMES))
+READS: Mapping[str, Callable[[list[Token], int], list[tuple[int, float]]]] = {
+    "clock": clock_at, "m": length_at, "deg": angle_at, "s": duration_at, "n": number_at,
+}  # fmt: skip
+"""What reads each kind of amount at a token: metres, degrees, seconds or a count, each with where it ends."""

@@ -14,7 +14,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.intents import Ask, Inquiry, TargetKind
 from avlmaps.language.lexer import without_spoken_end
-from avlmaps.language.names import mended, sounding_words
+from avlmaps.language.names import mended, sounding_forms
 from avlmaps.language.sentence import OwnName, stand_ins
 from avlmaps.language.verbalise import phrase
 from avlmaps.language.word_classes import filled, pattern, table, words_of
@@ -149,7 +149,7 @@ def _heard(said: Mapping[str, str | None]) -> ListQuestion | None:
 
 
 def _sounds(name: str) -> bool:
-    return bool(sounding_words() & set(name.split())) or lexicon().head(name, EntryKind.SOUND) is not None
+    return bool(sounding_forms().keys() & set(name.split())) or lexicon().head(name, EntryKind.SOUND) is not None
 
 
 def _how_of(said: str) -> str:
@@ -216,8 +216,8 @@ def said_both(text: str) -> tuple[str, ...]:
 
 def _is_named(name: str) -> bool:
     *before, last = name.split() or [""]
-    sounds = last in sounding_words() | {"sound"} and lexicon().head(" ".join(before), EntryKind.SOUND) is not None
-    return bool(lexicon().senses(name)) or sounds
+    sounds = last == "sound" or last in sounding_forms()
+    return bool(lexicon().senses(name)) or (sounds and lexicon().head(" ".join(before), EntryKind.SOUND) is not None)
 
 
 def speaks_of_photo(words: str) -> bool:

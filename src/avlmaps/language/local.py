@@ -25,13 +25,13 @@ from urllib.request import Request, urlopen
 from avlmaps.core.errors import BackendError, LanguageError
 from avlmaps.core.extras import install_command
 from avlmaps.language import intents as act
-from avlmaps.language.commands import Command, read_command
+from avlmaps.language.commands import read_command
 from avlmaps.language.gate import no_order
 from avlmaps.language.intents import Intent, Pick, Refuse, Side, Target, TargetKind, on_targets, targets_of
-from avlmaps.language.learned.decision import NameResolver, Weighed, is_same, weighed, which
+from avlmaps.language.learned.decision import Command, NameResolver, Weighed, is_same, weighed, which
 from avlmaps.language.learned.linear import amount, amount_end
 from avlmaps.language.learned.reader import Read
-from avlmaps.language.lexer import Token, tokenise
+from avlmaps.language.lexer import READS, Token, tokenise
 from avlmaps.language.names import is_known
 from avlmaps.language.program.vocabulary import Skill, ValueType, skills
 from avlmaps.language.sentence import Attachments, Sentence, stand_ins
@@ -50,9 +50,7 @@ _TARGETS = frozenset({ValueType.STRING, ValueType.PLACE, ValueType.HEAT})
 _ARTICLES = frozenset({"a", "an", "the"})
 _SIGNED = ("turn", "move_forward")
 # What may be said without a number, by the unit at the end of a parameter's name: half a metre, parts of a turn.
-_UNSAID: Mapping[str, tuple[str, Sequence[float]]] = {
-    "m": ("metres", (0.5,)), "s": ("seconds", (3.0,)), "deg": ("degrees", (30, 45, 90, 135, 180, 225, 270, 315, 360)),
-}  # fmt: skip
+_UNSAID = {"m": (0.5,), "s": (3.0,), "deg": (30, 45, 90, 135, 180, 225, 270, 315, 360), "n": (2, 3)}
 
 
 # The grammar.
@@ -64,8 +62,7 @@ def grammar(tokens: Sequence[Token]) -> str:
     said = (token.text for token in tokens if token.kind in ("word", "number") and '"' not in token.text)
     words = [_literal(word) for word in dict.fromkeys(said) if word not in _ARTICLES]
     sought = [_literal(f"{name}=") for name in skills()["get_major_map"].alternatives if name != "img"]
-    numbers = {"count": ("count", (2.0, 3.0)), **_UNSAID}
-    said_of = {unit: [_literal(f"{value:g}") for value in _said(tokens, *of)] for unit, of in numbers.items()}
+    said_of = {unit: [_literal(f"{value:g}") for value in _said(tokens, unit)] for unit in _UNSAID}
     rules = {"calls": calls, "words": words or ['"it"'], "sought": sought, **said_of}
     text = files("avlmaps.language").joinpath("local_grammar.gbnf").read_text(encoding="utf-8")
     return Template(text.strip()).substitute({name: " | ".join(rule) for name, rule in rules.items()})
@@ -73,17 +70,17 @@ def grammar(tokens: Sequence[Token]) -> str:
 
 def _call(skill: Skill) -> str:
     parts = [_literal(f"robot.{skill.name}(")]
-    for at, parameter in enumerate(skill.parameters.values()):
-        unit = parameter.name.rsplit("_", 1)[-1]
-        value = "target" if parameter.kinds & _TARGETS else f'"-"? {unit}' if skill.name in _SIGNED else unit
+    for at, (name, parameter) in enumerate(skill.takes.parameters.items()):
+        unit = name.rsplit("_", 1)[-1]
+        value = "target" if skill.kinds[name] & _TARGETS else f'"-"? {unit}' if skill.name in _SIGNED else unit
         value = value if at == 0 else f'", " {value}'
-        parts.append(value if parameter.default is None else f"({value})?")
+        parts.append(value if parameter.default is parameter.empty else f"({value})?")
     return " ".join([*parts, '")"'])
 
 
-def _said(tokens: Sequence[Token], of: str, unsaid: Sequence[float]) -> list[float]:
-    said = (amount(tokens, at, of) for at in range(len(tokens)))
-    return list(dict.fromkeys([*(value for value in said if value is not None and value >= 0.0), *unsaid]))
+def _said(tokens: Sequence[Token], unit: str) -> list[float]:
+    said = (amount(tokens, at, unit) for at in range(len(tokens)))
+    return list(dict.fromkeys([*(value for value in said if value is not None and value >= 0.0), *_UNSAID[unit]]))
 
 
 def _literal(text: str) -> str:
@@ -92,8 +89,7 @@ def _literal(text: str) -> str:
 
 # What a program means.
 
-_SIDES = {"left": Side.LEFT, "right": Side.RIGHT, "behind": Side.BEHIND, "north": Side.NORTH, "south": Side.SOUTH,
-          "east": Side.EAST, "west": Side.WEST}  # fmt: skip
+_SIDES = {str(side): side for side in Side if side not in (Side.FRONT, Side.AHEAD)}
 _STEPS: Mapping[str, Callable[..., Intent]] = {
     "move_to": act.Go, "move_to_object": act.Go, "face": act.Face, "move_forward": act.Move, "turn": act.Turn,
     "wait": act.Wait,
@@ -183,7 +179,7 @@ def examples() -> tuple[tuple[str, str], ...]:
 
 def prompt(command: str) -> str:
     """Return the examples that are nearest to a command, the nearest last, and the command as a comment."""
-    own, forms, weights = _form(command), _forms(), _weights()
+    own, (forms, weights) = _form(command), _forms()
 
     def likeness(at: int) -> float:
         size = sum(weights[part] for part in forms[at])
@@ -210,14 +206,11 @@ def _form(text: str) -> frozenset[str]:
 
 
 @cache
-def _forms() -> tuple[frozenset[str], ...]:
-    return tuple(_form(command) for command, _ in examples())
-
-
-@cache
-def _weights() -> Mapping[str, float]:
-    counts = Counter(part for form in _forms() for part in form)
-    return {part: math.log(len(_forms()) / count) for part, count in counts.items()}
+def _forms() -> tuple[Sequence[frozenset[str]], Mapping[str, float]]:
+    """Return the words and pairs of words of each example, and how much each of these tells."""
+    forms = [_form(command) for command, _ in examples()]
+    counts = Counter(part for form in forms for part in form)
+    return forms, {part: math.log(len(forms) / count) for part, count in counts.items()}
 
 
 # The model.
@@ -349,7 +342,7 @@ def _used(intents: Sequence[Intent], tokens: Sequence[Token]) -> frozenset[int]:
     values = (value for one in act.every(intents) for value in act.values_of(one).values())
     numbers = {abs(value) for value in values if isinstance(value, float | int)}
     for at in range(len(tokens)):
-        said = {amount(tokens, at, of) for of in ("metres", "degrees", "seconds", "count")}
+        said = {amount(tokens, at, of) for of in READS}
         if at not in used and amount_end(tokens, at) > at and said & numbers:
             used.add(at)
     return frozenset(used)

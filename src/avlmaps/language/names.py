@@ -169,11 +169,6 @@ def sounding_thing(word: str, noun: str) -> bool:
     return sounds and noun in listed("nameless") and not _is_name(f"{word} {noun}")
 
 
-def sounding_words() -> frozenset[str]:
-    """Return all forms of the verbs that sound."""
-    return frozenset(sounding_forms())
-
-
 @cache
 def class_words() -> frozenset[str]:
     """Return all words of the classes; none of them is a misspelt name."""
@@ -260,4 +255,4 @@ def _known() -> frozenset[str]:
     texts = (text for text in classes.lists.values() if isinstance(text, str))
     listed = (word.strip(",") for text in texts for word in text.split())
     phrases = (word for each in classes.words.values() for phrase in each for word in phrase.split())
-    return frozenset({*listed, *phrases, *lexicon().words, *WORDS, *sounding_words()})
+    return frozenset({*listed, *phrases, *lexicon().words, *WORDS, *sounding_forms()})

@@ -36,7 +36,7 @@ class AskedSentence:
     @property
     def questions(self) -> tuple[Question, ...]:
         """One question for each target; any of them answers. None where the lists of a map do."""
-        return tuple(question_of(target) for target in self.inquiry.of)
+        return tuple(_question_of(target) for target in self.inquiry.of)
 
 
 def parse_sentence(sentence: str) -> Question:
@@ -47,8 +47,7 @@ def parse_sentence(sentence: str) -> Question:
     return read_question(sentence, Attachments(knows=lambda _: True)).questions[0]
 
 
-def question_of(target: Target) -> Question:
-    """Return a target as a question to the map."""
+def _question_of(target: Target) -> Question:
     parts = [Part(_MODALITIES[one.kind], one.name, is_file=one.is_file, at=one.at) for one in (target, *target.near)]
     return Question.of(parts)
 

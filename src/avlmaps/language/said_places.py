@@ -14,7 +14,7 @@ from functools import cache, partial
 from itertools import pairwise
 
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import past_forms, sounding_thing, sounding_words, sounds_like, third_forms
+from avlmaps.language.names import past_forms, sounding_forms, sounding_thing, sounds_like, third_forms
 from avlmaps.language.word_classes import listed, pattern, table, word_list
 
 _storey = partial(pattern, "storey_words", flags=re.IGNORECASE)
@@ -105,7 +105,7 @@ def _sounds_itself(text: str, sound: Collection[str]) -> bool:
         verb = found[2]
         if verb not in sound if sound else verb in listed("silent"):
             continue
-        if found[1] and (sounds_like(verb) or verb in sounding_words()):
+        if found[1] and (sounds_like(verb) or verb in sounding_forms()):
             return True
         # "That bark" and "that barking" point at a sound; "that barks" and "that barked" say what a thing does.
         if not found[1] and verb in past_forms() | third_forms():

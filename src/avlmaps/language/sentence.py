@@ -19,17 +19,9 @@ from avlmaps.core.question import HeardAt
 from avlmaps.language.claims import claimed_words
 from avlmaps.language.intents import Target, TargetKind
 from avlmaps.language.lexer import WORDS, Token, in_figures, tokenise
-from avlmaps.language.names import (
-    as_meant,
-    class_words,
-    is_known,
-    respelt,
-    sounding_forms,
-    sounding_words,
-    third_forms,
-)
+from avlmaps.language.names import as_meant, class_words, is_known, respelt, sounding_forms, third_forms
 from avlmaps.language.verbalise import phrase
-from avlmaps.language.word_classes import filled, listed, load_word_classes, pattern, table, words_of
+from avlmaps.language.word_classes import filled, listed, load_word_classes, table, words_of
 from avlmaps.perception.embedded.words import is_word
 
 OwnName = tuple[str, bool]
@@ -74,7 +66,7 @@ class Attachments:
 class Sentence:
     """A tokenised sentence, with the files that came along behind it."""
 
-    def __init__(self, text: str, given: "Attachments | None" = None) -> None:
+    def __init__(self, text: str, given: Attachments | None = None) -> None:
         given = given or Attachments()
         self.text = text
         plain, self.order_notes = rewritten(as_meant(text))
@@ -171,12 +163,6 @@ def _form(says: str) -> re.Pattern[str]:
     return re.compile(filled(says, words), re.IGNORECASE)
 
 
-def any_one(before: str, behind: str) -> bool:
-    """Return whether the words round a name leave it to the robot which thing of that name is meant: "any chair"."""
-    found = pattern("rewrites", "any_before").search(before) or pattern("rewrites", "any_behind").match(behind)
-    return found is not None
-
-
 @cache
 def _order_words() -> frozenset[str]:
     classes = load_word_classes().words
@@ -234,7 +220,7 @@ def _is_unknown(found: list[str]) -> bool:
     english = 3 * sum(map(is_word, several)) <= len(several) >= 1
     if len(found) < _SEVERAL or not english:
         return False
-    usual = [word for word in several if word in class_words() | WORDS | sounding_words() or is_known(word)]
+    usual = [word for word in several if word in class_words() | WORDS | sounding_forms().keys() or is_known(word)]
     if not usual and len(several) >= _SEVERAL:
         return True
     strange = any(not word.isascii() for word in several if word not in usual)

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from avlmaps.language.commands import Command, UnclearError, read_command
+from avlmaps.language.commands import UnclearError, read_command
 from avlmaps.language.intents import Clarify
+from avlmaps.language.learned.decision import Command
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.sentence import Attachments
 from avlmaps.language.verbalise import verbalise

@@ -12,10 +12,11 @@ from avlmaps.language.names import class_words, is_known, may_name, near_names
 from avlmaps.language.word_classes import listed, table
 from avlmaps.perception.embedded.words import is_word
 
-_FILES = {
-    TargetKind.IMAGE: "Which picture? Attach it, or name its file in the sentence.",
-    TargetKind.CLIP: "Which recording? Attach it, or name its file in the sentence.",
+MISSING = {
+    TargetKind.IMAGE: Clarify("Which picture? Attach it, or name its file in the sentence."),
+    TargetKind.CLIP: Clarify("Which recording? Attach it, or name its file in the sentence."),
 }
+"""The questions for "this photo" and "this recording" where no file came along."""
 _SHORT = 3  # letters; shorter words are spelt like too many others
 _ORDINALS = {2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "sixth"}
 _HEARD = {
@@ -84,17 +85,6 @@ def _picked(target: Target) -> str:
             return f"{nth}{target.name} from the {target.pick}" if nth else f"{target.name} furthest {target.pick}"
 
 
-def is_strange(word: str) -> bool:
-    """Return whether a word is none that is known."""
-    known = is_word(word) or is_known(word) or may_name(word) or word in class_words() | listed("choices")
-    return len(word) > _SHORT and word.isalpha() and not known
-
-
-def missing_file(kind: TargetKind) -> Clarify:
-    """Return the question for "this photo" or "this recording" where no file came along."""
-    return Clarify(_FILES[kind])
-
-
 def unknown(name: str) -> Clarify:
     """Return the question for a name whose head is not known."""
     near = tuple(word for word, _ in near_names(name.split()[-1]))[:3]
@@ -108,13 +98,15 @@ def lacks_file(tokens: Sequence[Token]) -> Clarify | None:
     for before, word in pairwise(words):
         if before in claimed_words("these") and word in claimed_words("pictures") | claimed_words("recordings"):
             kind = TargetKind.IMAGE if word in claimed_words("pictures") else TargetKind.CLIP
-            return None if any(token.kind == str(kind) for token in tokens) else missing_file(kind)
+            return None if any(token.kind == str(kind) for token in tokens) else MISSING[kind]
     return None
 
 
 def strange_word(tokens: Sequence[Token]) -> str | None:
-    """Return the first word of a sentence that is none; None where all are words."""
-    return next((token.text for token in tokens if token.kind == "word" and is_strange(token.text)), None)
+    """Return the first word of a sentence that is none that is known; None where all are known."""
+    words = [token.text for token in tokens if token.kind == "word" and token.text.isalpha()]
+    strange = (word for word in words if len(word) > _SHORT and word not in class_words() | listed("choices"))
+    return next((word for word in strange if not (is_word(word) or is_known(word) or may_name(word))), None)
 
 
 def unclear(tokens: Sequence[Token]) -> Clarify:

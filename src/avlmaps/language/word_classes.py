@@ -8,7 +8,7 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from typing import Any
 
@@ -75,10 +75,7 @@ def load_word_classes() -> WordClasses:
     return WordClasses(words, classes, longest, data["lists"])
 
 
-@cache
-def listed(name: str) -> frozenset[str]:
-    """Return the words of a list."""
-    return word_list("word_classes", name)
+listed = partial(word_list, "word_classes")  # the words of a list
 
 
 def expanded(text: str) -> list[str]:

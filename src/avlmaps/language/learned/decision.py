@@ -21,7 +21,7 @@ from avlmaps.language.learned.reader import Read, ReadingLimits
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import is_known, is_place, may_name, mended, past_forms, sounding_forms
 from avlmaps.language.sentence import Sentence
-from avlmaps.language.verbalise import missing_file, strange_word, unclear, unknown, verbalise
+from avlmaps.language.verbalise import MISSING, strange_word, unclear, unknown, verbalise
 from avlmaps.language.word_classes import table
 
 EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
@@ -37,19 +37,34 @@ _MEANT: dict[type[Intent], tuple[str, ...]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Weighed:
-    """What the network reads, checked."""
+class Meaning:
+    """What a command may mean."""
 
-    intents: tuple[Intent, ...]  # a `Clarify` where a name or a file is not known
-    probability: float
-    doubtful: bool = False  # see `is_doubtful`
-    notes: tuple[str, ...] = ()  # a sentence each: how words were taken
+    intents: tuple[Intent, ...]  # one refusal or question where the robot may not drive
 
     @property
     def stops(self) -> Refuse | Clarify | None:
         """The refusal or the question; None where the robot may drive."""
         first = self.intents[0]
         return first if isinstance(first, Refuse | Clarify) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Weighed(Meaning):
+    """What the network reads, checked."""
+
+    probability: float
+    doubtful: bool = False  # see `is_doubtful`
+    notes: tuple[str, ...] = ()  # a sentence each: how words were taken
+
+
+@dataclass(frozen=True, slots=True)
+class Command(Meaning):
+    """The meaning of a command."""
+
+    notes: tuple[str, ...] = ()  # a sentence each: how words were taken, and what has no effect
+    readings: tuple[Weighed, ...] = ()  # the likeliest first
+    why: str = "words"  # a key of `translator._WHY`
 
 
 @dataclass(slots=True)
@@ -75,7 +90,7 @@ class NameResolver:
                 given = self.sentence.given
                 path = given.image if target.kind is TargetKind.IMAGE else given.clip
                 if path is None:
-                    self._ask(missing_file(target.kind))
+                    self._ask(MISSING[target.kind])
                 return replace(target, name=path or "", at=self._place(target))
             case TargetKind.OBJECT | TargetKind.AREA:
                 return self._thing(target)
@@ -185,28 +200,19 @@ def _too_much(intents: Sequence[Intent]) -> Clarify | None:
     return None
 
 
-@dataclass(frozen=True, slots=True)
-class Decision:
-    """What to do, and why: ``read``, ``danger``, ``stop`` or ``unsure``."""
-
-    intents: tuple[Intent, ...]  # one refusal or question where the robot may not drive
-    why: str
-    notes: tuple[str, ...] = ()  # of the reading that counts
-
-
-def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Decision:
+def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Command:
     """Return what to do of some readings."""
-    best = readings[0]
+    best, every = readings[0], tuple(readings)
     dangers = [one for one in readings if isinstance(one.stops, Refuse) and one.stops.reason in DANGERS]
     if dangers and sum(one.probability for one in dangers) >= limits.danger:
-        return Decision(dangers[0].intents, "danger")
+        return Command(dangers[0].intents, (), every, "danger")
     if best.stops is not None:
-        return Decision(best.intents, "stop")
+        return Command(best.intents, (), every, "stop")
     alike = sum(one.probability for one in readings if one.stops is None and is_same(one.intents, best.intents))
     if alike >= (limits.doubtful if best.doubtful else limits.command):
-        return Decision(best.intents, "read", best.notes)
+        return Command(best.intents, best.notes, every, "read")
     likely = (one.intents for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
-    return Decision((which(tuple(likely)),), "unsure")
+    return Command((which(tuple(likely)),), (), every, "unsure")
 
 
 def which(meanings: Sequence[tuple[Intent, ...]]) -> Clarify:

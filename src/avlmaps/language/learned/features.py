@@ -16,7 +16,7 @@ from avlmaps.core.words import singulars_of
 from avlmaps.language import lexer
 from avlmaps.language.learned.english import english
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import also_things, describing_words, sounding_words
+from avlmaps.language.names import also_things, describing_words, sounding_forms
 from avlmaps.language.word_classes import listed, load_word_classes
 from avlmaps.perception.embedded.words import word_vectors
 
@@ -26,10 +26,7 @@ _LISTS = (
 )  # fmt: skip
 _MARKS = (".", ",", "?", "!", ":", ";", "-", ">", "(", ")", "&")
 _KINDS = ("word", "number", "image", "clip", "punct")
-_AMOUNTS = {
-    "length": lexer.length_at, "angle": lexer.angle_at, "duration": lexer.duration_at, "clock": lexer.clock_at,
-    "number": lexer.number_at,
-}  # fmt: skip
+_AMOUNTS = {"length": "m", "angle": "deg", "duration": "s", "clock": "clock", "number": "n"}
 _MOST_WORDS = 4
 BUCKETS = 2048
 MOST_PIECES = 12
@@ -95,8 +92,8 @@ def _marked(tokens: list[Token]) -> Float32[np.ndarray, "n f"]:  # noqa: C901
     for at, token in enumerate(tokens):
         for name, end in _classes(tokens, at):
             span(name, at, end)
-        for name, amounts in _AMOUNTS.items():
-            ends = [end for end, _ in amounts(tokens, at)]
+        for name, of in _AMOUNTS.items():
+            ends = [end for end, _ in lexer.READS[of](tokens, at)]
             if ends:
                 span(f"~{name}", at, max(ends))
         text = ""
@@ -128,17 +125,12 @@ def _classes(tokens: Sequence[Token], at: int) -> list[tuple[str, int]]:
 
 @cache
 def _listed(word: str) -> tuple[str, ...]:
-    found = [name for name, words in _lists().items() if word in words]
-    if word in sounding_words():
+    found = [name for name in _LISTS if word in listed(name)]
+    if word in sounding_forms():
         found.append("~sounding")
     if word in describing_words():
         found.append("~described")
     return tuple(found)
-
-
-@cache
-def _lists() -> dict[str, frozenset[str]]:
-    return {name: listed(name) for name in _LISTS}
 
 
 @cache

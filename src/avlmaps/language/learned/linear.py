@@ -35,7 +35,7 @@ class Slot(Enum):
 class Amount:
     """An amount: a pointer to where it is said, or a symbol for one that is said without a number."""
 
-    of: str  # ``metres``, ``degrees``, ``clock``, ``seconds`` or ``count``
+    of: str  # of `lexer.READS`
     said: Mapping[str, float] = field(default_factory=dict)  # the symbols and what they stand for: "a bit", "around"
     optional: bool = False
     sign: int = 1  # −1 where the value is the negative amount; half a turn is 180 degrees either way
@@ -43,19 +43,11 @@ class Amount:
 
     def value(self, amount: float) -> float:
         """Return the value of a field for an amount."""
-        if self.of == "count":
+        if self.of == "n":
             return int(amount)
         if self.wraps:
             return amount % 360.0
-        return amount if self.sign > 0 or (self.of == "degrees" and amount == 180.0) else -amount
-
-    def amount(self, value: float) -> float | None:
-        """Return the amount to write for the value of a field; None where another row writes such values."""
-        if self.of == "clock":
-            return value
-        if self.wraps:
-            return value % 360.0
-        return abs(value) if (value < 0.0) == (self.sign < 0) else None
+        return amount if self.sign > 0 or (self.of == "deg" and amount == 180.0) else -amount
 
 
 @dataclass(frozen=True)
@@ -89,7 +81,7 @@ HEADINGS = {f"h{at}": float(at) for at in range(0, 360, 45)}
 TIMES = {"twice": 2.0, "thrice": 3.0}
 VIEWS = {"views_2": 2.0, "views_3": 3.0, "views_4": 4.0}
 BIT = {"bit": 0.5}
-_METRES = Amount("metres", BIT)
+_METRES = Amount("m", BIT)
 ROWS = (
     _row("go", intents.Go, to=Slot.TARGET),
     _row("face", intents.Face, to=Slot.TARGET, side=intents.Side.AHEAD),
@@ -98,24 +90,24 @@ ROWS = (
         for side in (intents.Side.LEFT, intents.Side.RIGHT, intents.Side.BEHIND)
     ),
     _row("turn", intents.Turn, degrees=Amount("clock"), heading=None),
-    _row("turn left", intents.Turn, degrees=Amount("degrees", DEGREES, sign=-1), heading=None),
-    _row("turn right", intents.Turn, degrees=Amount("degrees", DEGREES), heading=None),
-    _row("turn_to", intents.Turn, degrees=None, heading=Amount("degrees", HEADINGS, wraps=True)),
+    _row("turn left", intents.Turn, degrees=Amount("deg", DEGREES, sign=-1), heading=None),
+    _row("turn right", intents.Turn, degrees=Amount("deg", DEGREES), heading=None),
+    _row("turn_to", intents.Turn, degrees=None, heading=Amount("deg", HEADINGS, wraps=True)),
     _row("forward", intents.Move, metres=_METRES),
-    _row("back", intents.Move, metres=Amount("metres", BIT, sign=-1)),
+    _row("back", intents.Move, metres=Amount("m", BIT, sign=-1)),
     _row("between", intents.Between, of=(Slot.TARGET, Slot.TARGET)),
     *(
-        _row(f"beside_{side}", intents.Beside, metres=Amount("metres", BIT, optional=True), of=Slot.TARGET, side=side)
+        _row(f"beside_{side}", intents.Beside, metres=Amount("m", BIT, optional=True), of=Slot.TARGET, side=side)
         for side in intents.Side
         if side is not intents.Side.AHEAD
     ),
     _row("stop_at", intents.StopAt, metres=_METRES, of=Slot.TARGET),
     _row("circle", intents.Circle, of=Slot.TARGET, views=None),
-    _row("views", intents.Circle, views=Amount("count", VIEWS), of=Slot.TARGET),
+    _row("views", intents.Circle, views=Amount("n", VIEWS), of=Slot.TARGET),
     _row("each", intents.VisitEach, of=Slot.TARGET),
-    _row("wait", intents.Wait, seconds=Amount("seconds", optional=True)),
+    _row("wait", intents.Wait, seconds=Amount("s", optional=True)),
     _row("return", intents.Return),
-    _row("repeat", intents.Repeat, times=Amount("count", TIMES), body=Slot.BODY),
+    _row("repeat", intents.Repeat, times=Amount("n", TIMES), body=Slot.BODY),
     _row("if", intents.If, of=Slot.TARGET, body=Slot.STEPS, otherwise=Slot.STEPS),
     *(_row(f"refuse_{reason}", intents.Refuse, reason=reason) for reason in intents.RefusalReason),
     _row("clarify", intents.Clarify),
@@ -146,24 +138,18 @@ class MalformedError(ValueError):
 
 def amount(tokens: Sequence[Token], at: int, of: str) -> float | None:
     """Return the amount of a kind that begins at a token, in metres, degrees, seconds, or a count; None without one."""
-    read = {
-        "metres": (lexer.length_at, lexer.number_at), "degrees": (lexer.angle_at, lexer.number_at),
-        "clock": (lexer.clock_at,), "seconds": (lexer.duration_at, lexer.number_at), "count": (lexer.number_at,),
-    }[of]  # fmt: skip
-    for each in read:
-        found = each(list(tokens), at)
-        if found:
-            value = max(found, key=lambda one: one[0])[1]
-            return value if of != "count" or value == int(value) else None
-    return None
+    words = list(tokens)
+    found = lexer.READS[of](words, at) or (lexer.number_at(words, at) if of != "clock" else [])
+    value = max(found, key=lambda one: one[0])[1] if found else None
+    return None if value is None or (of == "n" and value != int(value)) else value
 
 
 def amount_end(tokens: Sequence[Token], at: int) -> int:
     """Return where the longest amount that begins at a token ends; the token itself where none does."""
     if at >= len(tokens) or not lexer.begins_amount(tokens[at]):
         return at
-    reads, words = (lexer.length_at, lexer.angle_at, lexer.clock_at, lexer.duration_at, lexer.number_at), list(tokens)
-    return max((end for read in reads for end, _ in read(words, at)), default=at)
+    words = list(tokens)
+    return max((end for read in lexer.READS.values() for end, _ in read(words, at)), default=at)
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,8 +213,7 @@ class Grammar:
     def read(self, line: Iterable[Symbol]) -> "Open | tuple[Intent, ...] | Inquiry | None":
         """Return what may follow a line; of one that has ended its meaning, None of a question without an answer.
 
-        Raises:
-            MalformedError: a symbol stands where it may not.
+        Raises MalformedError where a symbol stands where it may not.
         """
         reading = self._question() if self.is_question else self._command()
         may = next(reading)
@@ -359,11 +344,7 @@ def meaning_of(
     is_question: bool,
     at_source: Callable[[Sequence[int]], bool] = lambda _: False,
 ) -> tuple[Intent, ...] | Inquiry | None:
-    """Return what a line means, see `Grammar.read`.
-
-    Raises:
-        MalformedError: it means nothing.
-    """
+    """Return what a line means, see `Grammar.read`; raises MalformedError where it means nothing."""
     found = Grammar(Pointable(tokens), is_question=is_question, at_source=at_source).read(line)
     if isinstance(found, Open):
         raise MalformedError("the line ends too early")

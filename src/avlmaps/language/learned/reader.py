@@ -17,7 +17,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import BackendError
-from avlmaps.language.intents import Inquiry, Intent, Target, on_targets
+from avlmaps.language.intents import Inquiry, Intent
 from avlmaps.language.learned import linear
 from avlmaps.language.learned.features import columns, features
 from avlmaps.language.learned.linear import INDEX, SYMBOLS
@@ -99,11 +99,13 @@ class LearnedReader:
         for line in self.lines(tokens, is_question=is_question):
             used = frozenset(symbol for symbol in line.symbols if isinstance(symbol, int))
             is_purpose = line.symbols == ("purpose", "end")
-            at_source = partial(_at_source, tokens, used)
-            meaning = linear.meaning_of(line.symbols, tokens, is_question=is_question, at_source=at_source)
-            key = (_placeless(meaning), is_purpose)
-            before = found.get(key, Read(meaning, 0.0, used, is_purpose))
-            found[key] = replace(before, probability=before.probability + float(np.exp(line.log)))
+            # Where a sound is meant to be makes no other reading.
+            key = linear.meaning_of(line.symbols, tokens, is_question=is_question), is_purpose
+            if key not in found:
+                at_source = partial(_at_source, tokens, used)
+                meaning = linear.meaning_of(line.symbols, tokens, is_question=is_question, at_source=at_source)
+                found[key] = Read(meaning, 0.0, used, is_purpose)
+            found[key] = replace(found[key], probability=found[key].probability + float(np.exp(line.log)))
         return sorted(found.values(), key=lambda read: -read.probability)
 
     def lines(self, tokens: Sequence[Token], *, is_question: bool) -> list[Line]:
@@ -112,16 +114,13 @@ class LearnedReader:
 
     def written(self, tokens: Sequence[Token], *, is_question: bool) -> list[Line]:
         """Return what `lines` does; the networks run each time."""
-        seen = features(tokens, self._vocabulary)
-        outputs: Any = self._words.run(None, {name: array[None] for name, array in seen._asdict().items()})
-        states, begin = outputs
-        start = INDEX["start_question" if is_question else "start_command"]
-        return self._search(tokens, states, begin[0, 0], start, is_question=is_question)
-
-    def _search(self, tokens: Sequence[Token], states: Any, begin: Any, start: int, *, is_question: bool) -> list[Line]:
         grammar = linear.Grammar(linear.Pointable(tokens), is_question=is_question)
         texts = [token.text for token in tokens]
-        beam = [_Open((), 0.0, begin, begin)]
+        start = INDEX["start_question" if is_question else "start_command"]
+        seen = features(tokens, self._vocabulary)
+        sentence: Any = self._words.run(None, {name: array[None] for name, array in seen._asdict().items()})
+        states, begin = sentence
+        beam = [_Open((), 0.0, begin[0, 0], begin[0, 0])]
         done: list[Line] = []
         for _ in range(linear.MOST_SYMBOLS):
             last = np.array([[_number(one.symbols[-1]) if one.symbols else start] for one in beam], np.int64)
@@ -183,19 +182,6 @@ def _number(symbol: linear.Symbol) -> int:
 
 def _at_source(tokens: Sequence[Token], used: frozenset[int], own: Sequence[int]) -> bool:
     return seeks_source(tokens, own, used - frozenset(own))
-
-
-def _placeless(meaning: Any) -> Any:
-    """Return a meaning that says of no sound where it is meant to be, which makes no other reading."""
-    match meaning:
-        case Target():
-            return replace(meaning, at=None, near=tuple(map(_placeless, meaning.near)))
-        case Inquiry():
-            return replace(meaning, of=tuple(map(_placeless, meaning.of)))
-        case tuple():
-            return tuple(on_targets(one, _placeless) for one in meaning)
-        case _:
-            return meaning
 
 
 def _check(facts: dict[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """Runs a parsed program over a vocabulary, and its trace. Nothing but the skills of the table is ever called."""
 
 import ast
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from time import monotonic
@@ -122,10 +123,12 @@ class _SkillFailedError(Exception):
         self.fault = fault
 
 
-class _LeftError(Exception):
-    def __init__(self, *, loop: bool) -> None:
-        super().__init__()
-        self.loop = loop
+class _BreakError(Exception):
+    pass
+
+
+class _ContinueError(Exception):
+    pass
 
 
 class _Run:
@@ -181,7 +184,8 @@ class _Run:
                 before, value = self.name(node.lineno, name), self.value(node.value)
                 sign = SIGNS[type(node.op)]
                 if sign == "+" and values.kind_of(before) is values.kind_of(value) is ValueType.LIST:
-                    raise parser.grown(node.lineno, name)
+                    # In Python it changes under all of its names.
+                    raise refused(node.lineno, f"a list is not changed but made again; write `{name} = {name} + [...]`")
                 self.names[name] = self.arithmetic(node.lineno, sign, before, value)
             case ast.Expr():
                 self.value(node.value)
@@ -190,8 +194,10 @@ class _Run:
                 self.block(next((each.body for each in chosen if self.truth(each.test)), otherwise))
             case ast.For():
                 self.loop(node)
-            case ast.Break() | ast.Continue():
-                raise _LeftError(loop=isinstance(node, ast.Break))
+            case ast.Break():
+                raise _BreakError
+            case ast.Continue():
+                raise _ContinueError
 
     def loop(self, node: ast.For) -> None:
         for element in self.needed(node.iter, "walk"):
@@ -199,9 +205,10 @@ class _Run:
             self.give(node.target, element)
             try:
                 self.block(node.body)
-            except _LeftError as left:
-                if left.loop:
-                    return
+            except _ContinueError:
+                continue
+            except _BreakError:
+                return
 
     def give(self, target: ast.expr, value: Any) -> None:
         names = parser.target_names(target)
@@ -210,7 +217,7 @@ class _Run:
         else:
             values.needed(target.lineno, "unpack", value)
         if len(value) != len(names):
-            raise parser.misfit(target.lineno, len(names), len(value))
+            raise refused(target.lineno, f"{len(names)} names cannot take {len(value)} values; give one value to each")
         self.names.update(zip(names, value, strict=True))
 
     # ---- expressions
@@ -332,14 +339,7 @@ class _Run:
 
 
 _COMPARE: dict[str, Callable[[Any, Any], bool]] = {
-    "==": lambda left, right: left == right,
-    "!=": lambda left, right: left != right,
-    "<": lambda left, right: left < right,
-    "<=": lambda left, right: left <= right,
-    ">": lambda left, right: left > right,
-    ">=": lambda left, right: left >= right,
-    "in": values.is_among,
+    "==": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
+    "is": operator.is_, "is not": operator.is_not, "in": values.is_among,
     "not in": lambda left, right: not values.is_among(left, right),
-    "is": lambda left, right: left is right,
-    "is not": lambda left, right: left is not right,
-}
+}  # fmt: skip

@@ -40,7 +40,6 @@ _STRANGE = (
     (re.compile(r"[^\x00-\x7f]"), "the character {0!r} (U+{1:04X}) has no meaning here; names are written in the "
      "letters a to z, phrases between quotes"),
     (re.compile(r"\w{65,}"), "`{0:.20}...` has more than 64 characters; shorten it"),
-    (re.compile(r"\\(?!\n)"), "a backslash stands outside of a string; remove it"),
 )  # fmt: skip
 _KINDS = {ast.List: ValueType.LIST, ast.Tuple: ValueType.TUPLE, ast.Compare: ValueType.TRUTH}
 _REMEDIES = {name: said for names, said in table("program/refusals")["instead"].items() for name in names.split()}
@@ -119,7 +118,7 @@ def given_to(skill: Skill, call: ast.Call) -> Mapping[str, ast.expr]:
     try:
         if len(named) < len(call.keywords):
             raise TypeError("one argument is given twice")
-        return skill.given(call.args, named)
+        return skill.takes.bind(*call.args, **named).arguments
     except TypeError as fault:
         raise refused(call.lineno, f"`{skill.name}`: {fault}; it is {skill.signature}") from None
 
@@ -136,10 +135,9 @@ def branches_of(node: ast.If) -> tuple[list[ast.If], list[ast.stmt]]:
 def check_arguments(line: int, skill: Skill, kinds: Mapping[str, "Guess"]) -> None:
     """Refuse arguments of kinds that a skill does not take, and none or several of what are alternatives."""
     for name, kind in kinds.items():
-        parameter = skill.parameters[name]
-        if isinstance(kind, ValueType) and kind not in parameter.kinds:
-            wanted = _listed([str(each) for each in ValueType if each in parameter.kinds])
-            makers = [f"`{other.name}`" for other in skills().values() if {other.returns} == parameter.kinds]
+        if isinstance(kind, ValueType) and kind not in skill.kinds[name]:
+            wanted = _listed([str(each) for each in ValueType if each in skill.kinds[name]])
+            makers = [f"`{other.name}`" for other in skills().values() if {other.returns} == skill.kinds[name]]
             made = f"; {_listed(makers)} gives one" if makers else ""
             raise refused(
                 line, f"`{skill.name}` takes {wanted} as its `{name}`, not {kind}; it is {skill.signature}{made}"
@@ -149,16 +147,6 @@ def check_arguments(line: int, skill: Skill, kinds: Mapping[str, "Guess"]) -> No
     if skill.alternatives and (surely > 1 or all(kind is ValueType.NOTHING for kind in chosen)):
         names = _listed([f"`{name}`" for name in skill.alternatives])
         raise refused(line, f"`{skill.name}` takes exactly one of {names}, not {surely or 'none'}")
-
-
-def grown(line: int, name: str) -> ProgramError:
-    """Return the refusal of `+=` on a list, which in Python changes it under all of its names."""
-    return refused(line, f"a list is not changed but made again; write `{name} = {name} + [...]`")
-
-
-def misfit(line: int, names: int, values: int) -> ProgramError:
-    """Return the refusal of an assignment of more or fewer values than names."""
-    return refused(line, f"{names} names cannot take {values} values; give one value to each")
 
 
 def target_names(target: ast.expr) -> list[str]:

@@ -3,13 +3,13 @@
 Tables say what goes with what; Python would allow more, such as a string times a billion.
 """
 
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import NoneType
 from typing import Any
 
 from avlmaps.core.errors import ProgramError
-from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Skill, ValueType
+from avlmaps.language.program.vocabulary import KINDS, Clip, Heat, Picture, Place, Skill, ValueType
 from avlmaps.language.word_classes import table
 
 LARGEST = 10**15
@@ -55,11 +55,7 @@ class Made:
 
 Value = None | bool | int | float | str | list[Any] | tuple[Any, ...] | range | Place | Picture | Clip | Made
 
-_KINDS: dict[type, ValueType] = {
-    NoneType: ValueType.NOTHING, bool: ValueType.TRUTH, int: ValueType.NUMBER, float: ValueType.NUMBER,
-    str: ValueType.STRING, list: ValueType.LIST, tuple: ValueType.TUPLE, range: ValueType.RANGE,
-    Place: ValueType.PLACE, Picture: ValueType.PICTURE, Clip: ValueType.CLIP, Made: ValueType.HEAT,
-}  # fmt: skip
+_KINDS = {**KINDS, Made: ValueType.HEAT}
 _NUMBER, _PLACE, _HEAT = ValueType.NUMBER, ValueType.PLACE, ValueType.HEAT
 _COLLECTIONS = frozenset({ValueType.LIST, ValueType.TUPLE, ValueType.RANGE})
 # Neither true nor false: a program that asks one means a comparison that it did not write.
@@ -69,16 +65,16 @@ _SAME = {(kind, kind): kind for kind in (_NUMBER, _PLACE, ValueType.STRING, Valu
 _SCALED = {(_PLACE, _NUMBER): _PLACE}
 # Of each operator: the kinds of its two sides and of its result, in words, and what it does.
 _ARITHMETIC: dict[str, tuple[dict[tuple[ValueType, ValueType], ValueType], str, Callable[[Any, Any], Any]]] = {
-    "+": (_SAME, "two numbers, Places, strings, lists or tuples", lambda left, right: left + right),
-    "-": (_NUMBERS | {(_PLACE, _PLACE): _PLACE}, "two numbers or two Places", lambda left, right: left - right),
+    "+": (_SAME, "two numbers, Places, strings, lists or tuples", operator.add),
+    "-": (_NUMBERS | {(_PLACE, _PLACE): _PLACE}, "two numbers or two Places", operator.sub),
     "*": (
         _NUMBERS | _SCALED | {(_NUMBER, _PLACE): _PLACE, (_HEAT, _HEAT): _HEAT},
         "two numbers, a Place and a number, or two Heats",
-        lambda left, right: left * right,
+        operator.mul,
     ),
-    "/": (_NUMBERS | _SCALED, "two numbers, or a Place and a number", lambda left, right: left / right),
-    "//": (_NUMBERS, "two numbers", lambda left, right: left // right),
-    "%": (_NUMBERS, "two numbers", lambda left, right: left % right),
+    "/": (_NUMBERS | _SCALED, "two numbers, or a Place and a number", operator.truediv),
+    "//": (_NUMBERS, "two numbers", operator.floordiv),
+    "%": (_NUMBERS, "two numbers", operator.mod),
 }
 # The kinds that each part of a program takes; `refusals.toml` has the refusals of others.
 _NEEDS: dict[str, frozenset[ValueType]] = {

@@ -5,6 +5,7 @@ knows no map, so that the class is loaded by its name, when the table is first n
 else, the chat prompt is made from it, and plans are written in it.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,7 +14,7 @@ from importlib import import_module
 from inspect import Signature, getdoc, signature
 from math import isfinite
 from types import MappingProxyType, NoneType, UnionType
-from typing import Any, Protocol, Union, get_args, get_origin, get_type_hints, runtime_checkable
+from typing import Any, Protocol, Union, get_args, get_origin, runtime_checkable
 
 ROBOT = "robot"
 _ROBOT_CLASS = "avlmaps.navigate.skills", "Robot"
@@ -87,27 +88,11 @@ class Clip:
 Target = str | Place | Heat
 
 
-_TYPES: dict[Any, tuple[ValueType, str]] = {
-    NoneType: (ValueType.NOTHING, "None"),
-    bool: (ValueType.TRUTH, "bool"),
-    float: (ValueType.NUMBER, "float"),
-    str: (ValueType.STRING, "str"),
-    Place: (ValueType.PLACE, "Place"),
-    Heat: (ValueType.HEAT, "Heat"),
-    Picture: (ValueType.PICTURE, "Picture"),
-    Clip: (ValueType.CLIP, "Clip"),
-    list[Place]: (ValueType.LIST, "list[Place]"),
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Parameter:
-    """One parameter of a skill; its default is text, None where it must be given."""
-
-    name: str
-    kinds: frozenset[ValueType]
-    annotation: str
-    default: str | None
+KINDS: Mapping[type, ValueType] = {
+    NoneType: ValueType.NOTHING, bool: ValueType.TRUTH, int: ValueType.NUMBER, float: ValueType.NUMBER,
+    str: ValueType.STRING, list: ValueType.LIST, tuple: ValueType.TUPLE, range: ValueType.RANGE,
+    Place: ValueType.PLACE, Heat: ValueType.HEAT, Picture: ValueType.PICTURE, Clip: ValueType.CLIP,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,29 +100,20 @@ class Skill:
     """One skill of the robot: ``takes`` is its signature without the robot, ``doc`` says what it does."""
 
     name: str
-    parameters: Mapping[str, Parameter]
-    returns: ValueType
-    returns_text: str
-    doc: str
     takes: Signature
-
-    def given(self, values: Sequence[Any], named: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return what a call gives to each parameter; raises TypeError where they do not fit."""
-        return self.takes.bind(*values, **named).arguments
+    kinds: Mapping[str, frozenset[ValueType]]  # that each parameter may have
+    returns: ValueType
+    doc: str
 
     @property
     def signature(self) -> str:
-        """The signature as a program's writer reads it."""
-        given = (
-            f"{each.name}: {each.annotation}" + ("" if each.default is None else f" = {each.default}")
-            for each in self.parameters.values()
-        )
-        return f"{self.name}({', '.join(given)}) -> {self.returns_text}"
+        """The signature as a program's writer reads it, without modules."""
+        return self.name + re.sub(r"(?:[a-z_]+\.)+", "", str(self.takes))
 
     @property
     def alternatives(self) -> tuple[str, ...]:
         """The parameters of which exactly one is given: several whose default is None; most skills have none."""
-        names = tuple(each.name for each in self.parameters.values() if each.default == "None")
+        names = tuple(each.name for each in self.takes.parameters.values() if each.default is None)
         return names if len(names) > 1 else ()
 
     @property
@@ -157,19 +133,16 @@ def skills() -> Mapping[str, Skill]:
 
 
 def _skill(name: str, method: Any) -> Skill:
-    hints, takes = get_type_hints(method), signature(method)
+    takes = signature(method, eval_str=True)
     takes = takes.replace(parameters=list(takes.parameters.values())[1:])
-    parameters: dict[str, Parameter] = {}
-    for declared in takes.parameters.values():
-        default = None if declared.default is Signature.empty else repr(declared.default)
-        parameters[declared.name] = Parameter(declared.name, *_kinds_of(hints[declared.name]), default)
-    (returns,), returns_text = _kinds_of(hints["return"])
-    return Skill(name, parameters, returns, returns_text, " ".join((getdoc(method) or "").split()), takes)
+    kinds = {each.name: _kinds_of(each.annotation) for each in takes.parameters.values()}
+    (returns,) = _kinds_of(takes.return_annotation)
+    return Skill(name, takes, kinds, returns, " ".join((getdoc(method) or "").split()))
 
 
-def _kinds_of(hint: Any) -> tuple[frozenset[ValueType], str]:
-    known = [_TYPES[choice] for choice in (get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,))]
-    return frozenset(kind for kind, _ in known), " | ".join(text for _, text in known)
+def _kinds_of(hint: Any) -> frozenset[ValueType]:
+    choices = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint or NoneType,)
+    return frozenset(KINDS[get_origin(choice) or choice] for choice in choices)
 
 
 def skill_lines(prefix: str = f"{ROBOT}.", of: Sequence[Skill] | None = None) -> tuple[str, ...]:

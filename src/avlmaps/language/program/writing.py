@@ -67,14 +67,11 @@ class _Writer(act.Filled):
                     self.add(self.vformat(line, (), values))
                 else:
                     named = dict(self.names)
-                    self.indented(inner)
+                    self.indent += "    "
+                    self.block(inner)
+                    self.indent = self.indent[:-4]
                     if program.startswith("if"):  # what is looked up in a block that may not run has no name behind it
                         self.names = named
-
-    def indented(self, intents: Sequence[Intent]) -> None:
-        self.indent += "    "
-        self.block(intents)
-        self.indent = self.indent[:-4]
 
     def get_value(self, key: int | str, args: Sequence[Any], kwargs: Any) -> Any:
         if key not in kwargs:
