@@ -19,6 +19,7 @@ from training.sounds.fit import EncodeWords
 from training.sounds.in_maps import ROOT, write_json
 from training.sounds.kinds import KINDS, NAMES, TEMPLATES
 from training.sounds.mixtures import MADE_EACH
+from training.sounds.noises import add_noises
 
 from avlmaps.core.progress import say
 from avlmaps.perception.embedded.sounds import evidence_for
@@ -79,6 +80,7 @@ def write_edition(
     learnt = [clip for clip in corpus.clips if clip.may_ship and clip.fold != fold]
     examples = np.bincount(kinds, minlength=len(NAMES)).tolist()
     write_json(folder / "sounds.json", notes(learnt, words, c, examples))
+    add_noises(folder)
 
 
 def notes(
@@ -104,7 +106,7 @@ def notes(
         for k, (name, called) in enumerate(KINDS.items())
     ]
     return {
-        "id": "avlmaps/sounds-5",
+        "id": "avlmaps/sounds-6",
         "dim": words.card.dim,
         "words": words.card.checksum,
         "templates": list(TEMPLATES),

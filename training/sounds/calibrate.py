@@ -21,7 +21,7 @@ from avlmaps.perception.embedded.sounds import (
     typical_examples,
 )
 
-START = SoundCalibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0, 0.0), (-4.0, 8.0))
+START = SoundCalibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0, 0.0), (-4.0, 8.0), (0.0, 0.0))
 
 UNKNOWN_SHARE = 0.2
 RECORDED_COUNT = len(RECORDED)

@@ -1,8 +1,9 @@
 """The embedded sound encoder: a small network into the space of the embedded words, and what it makes of questions.
 
-It knows a closed set of kinds (``vocabulary``) and what the user taught it; what it does not know it refuses, by a
-low score. Kinds of origin ``recorded`` were learnt from recordings, ``synthesised`` ones from sounds made by rule:
-they carry less well to recordings. ``training/sounds`` makes the weights.
+It knows a closed set of kinds (``vocabulary``) and what the user taught it. What it does not know it refuses, by a low
+score, and also what is nearer to a noise without a name (hum, hiss, rumble) than to any example of a kind.
+Kinds of origin ``recorded`` were learnt from recordings, ``synthesised`` ones from sounds made by rule: they carry less
+well to recordings. ``training/sounds`` makes the weights.
 """
 
 import json
@@ -26,6 +27,7 @@ from avlmaps.perception.networks import open_network
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.audio import Sound, resample
 
+Array = Float[np.ndarray, "..."]
 _BATCH = 16
 
 
@@ -40,17 +42,6 @@ class KnownKind:
     called: tuple[str, ...]
     origin: str
     clips: int
-
-
-@dataclass(frozen=True, slots=True)
-class EncodedSound:
-    """How likely a sound holds each kind, the known ones and then the taught, and that it is of any of them.
-
-    They need not sum to one: a long sound may hold several and an unknown one none.
-    """
-
-    kinds: Float[np.ndarray, " kinds"]
-    known: float
 
 
 class EmbeddedSounds:
@@ -76,9 +67,11 @@ class EmbeddedSounds:
         self._words: WordEncoder = cast("WordEncoder", load(Kind.WORDS, "embedded")) if words is None else words
         self.kinds = msgspec.convert(about["kinds"], tuple[KnownKind, ...])
         self.sources = frozenset[int](about.get("sources", ()))  # freesound's numbers of the recordings it learnt from
-        # features of some of the clips that the network learnt from, sorted by kind
-        self._examples = np.load(BytesIO(examples), allow_pickle=False).astype(np.float32)
-        self._starts = np.cumsum([0, *(k["examples"] for k in about["kinds"][:-1])])
+        # features of some of the clips that the network learnt from, sorted by kind; those of noises come last
+        *starts, end = np.cumsum([0, *(k["examples"] for k in about["kinds"])])
+        bank = np.load(BytesIO(examples), allow_pickle=False).astype(np.float32)
+        self._examples, self._noises = bank[:end], bank[end:]
+        self._starts = np.array(starts)
         self._typical = typical_examples(self._examples, self._starts)
         self.calibration = msgspec.convert(about["calibration"], SoundCalibration)
         self.card = ModelCard(
@@ -130,9 +123,9 @@ class EmbeddedSounds:
             return np.zeros((len(sounds), len(words)), np.float32)
         taught = self.taught
         shares, named = self._meant(words, taught)
-        heard = [self._hear(features, taught) for features in sounds]
+        heard = [self._hear(features, taught, self._noises) for features in sounds]
         scores = [
-            [matched(h.kinds, share, float(name), self.calibration) for share, name in zip(shares, named, strict=True)]
+            [matched(h, share, float(name), self.calibration) for share, name in zip(shares, named, strict=True)]
             for h in heard
         ]
         return np.array(scores, np.float32).reshape(len(sounds), len(words))
@@ -145,14 +138,10 @@ class EmbeddedSounds:
         Two things speak for it: that some windows of both are alike, and that both are taken for the same kind.
         """
         taught = self.taught
-        ours = np.sqrt(self._hear(asked, taught).kinds)  # the product of two roots is their Bhattacharyya coefficient
+        ours = np.sqrt(self._hear(asked, taught))  # the product of two roots is their Bhattacharyya coefficient
         cosines = np.array([float((features @ asked.T).max()) for features in sounds])
-        agreement = np.array([float(np.sqrt(self._hear(features, taught).kinds) @ ours) for features in sounds])
+        agreement = np.array([float(np.sqrt(self._hear(features, taught)) @ ours) for features in sounds])
         return np.asarray(same_kind(cosines, agreement, self.calibration), np.float32).reshape(len(sounds))
-
-    def describe(self, features: Float32[np.ndarray, "windows d"]) -> EncodedSound:
-        """Return the scores of a sound, for lists of what a map holds."""
-        return self._hear(features, self.taught)
 
     @cached_property
     def _session(self) -> Any:
@@ -180,10 +169,16 @@ class EmbeddedSounds:
             cosines = np.hstack([cosines, asked @ self._words.encode([t.name for t in taught]).T])
         return kinds_of_phrases(cosines, self.calibration)
 
-    def _hear(self, features: Float32[np.ndarray, "windows d"], taught: Sequence[TaughtSound]) -> EncodedSound:
+    def _hear(
+        self, features: Float32[np.ndarray, "windows d"], taught: Sequence[TaughtSound], noises: Array | None = None
+    ) -> Array:
+        # how likely a sound holds each kind, the known ones and then the taught; a long one may hold several
         near = nearness(features, self._examples, self._starts)
         typical = features @ self._typical.T
         posterior, known = kinds_of_windows(features @ self._prototypes.T, typical, near, self.calibration)
+        if noises is not None:  # they have no name, yet one may be like another
+            bias, slope = self.calibration.noise
+            known *= 1.0 - sigmoid(bias + slope * taught_lead(features, noises, near))
         likely = posterior * known[:, None]
         if taught:
             bias, slope = self.calibration.taught
@@ -191,11 +186,7 @@ class EmbeddedSounds:
             own = sigmoid(bias + slope * leads)
             # the user's own sounds go before the network's scores for a sound that it was not trained on
             likely = np.hstack([likely * (1.0 - own.max(axis=1, keepdims=True)), own])
-            known = np.maximum(known, own.max(axis=1))
-        return EncodedSound(likely.max(axis=0), float(known.max()))
-
-
-Array = Float[np.ndarray, "..."]
+        return likely.max(axis=0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,6 +201,7 @@ class SoundCalibration:
     word: tuple[float, float]  # log-odds that a sound is what a phrase names: bias, log-odds of the match
     pair: tuple[float, float, float]  # log-odds that two are of one kind: bias, cosine, agreement
     taught: tuple[float, float]  # log-odds of a taught kind: bias, ``taught_lead``
+    noise: tuple[float, float]  # log-odds of a noise without a name: bias, its lead likewise
 
 
 def log_odds(p: Array) -> Array:
@@ -294,7 +286,7 @@ def taught_lead(
     examples: Float[np.ndarray, "n d"],
     near: Float[np.ndarray, "windows kinds"],
 ) -> Float[np.ndarray, " windows"]:
-    """Return how much nearer each window is to the nearest taught example than to any known one (cosines)."""
+    """Return how much nearer each window is to the nearest taught example (or noise) than to any known one."""
     return (features @ examples.T).max(axis=1).astype(np.float64) - near.max(axis=1)
 
 

@@ -64,14 +64,14 @@ def others_table(
     rows = []
     for category in sorted(set(categories)):
         mine = [f for f, c in zip(features, categories, strict=True) if c == category]
-        heard = [encoder.describe(f) for f in mine]
-        refused = int((encoder.score_words(mine, names).max(axis=1) < 0.5).sum())
+        scores = encoder.score_words(mine, names)
+        refused = int((scores.max(axis=1) < 0.5).sum())
         kind = kinds.get(category, "")
-        order = [[encoder.kinds[k].name for k in np.argsort(-h.kinds[: len(encoder.kinds)])] for h in heard]
+        order = [[encoder.kinds[k].name for k in likeliest] for likeliest in np.argsort(-scores, axis=1)]
         first = sum(names[0] == kind for names in order)
         five = sum(kind in names[:5] for names in order)
         rows.append([
-            category, kind or "-", origins.get(kind, "unknown to it"), len(heard),
+            category, kind or "-", origins.get(kind, "unknown to it"), len(mine),
             first if kind else "-", five if kind else "-",
             refused, ", ".join(sorted({names[0] for names in order})),
         ])  # fmt: skip
