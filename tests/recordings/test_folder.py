@@ -413,7 +413,7 @@ REFUSED: list[tuple[Callable[[Path], object], str]] = [
     (with_line("stamp_s,tx [ft],ty [ft],tz [ft],qx,qy,qz,qw", 0), "'tx [ft]' is none of the columns"),
     (with_depth_of(24, 32), "intrinsics of rgb only, but colour is 64x48 and depth 32x24; add intrinsics.depth"),
     (with_depth_of(64, 48), "and depth 48x64"),
-    (with_file("frames.csv", b"name,stamp_s\nnone,0\n"), "without their extension"),
+    (with_file("frames.csv", b"name,stamp_s\nnone,0\n"), "the first picture '000000.png'); write the names of"),
     (
         with_file("frames.csv", b"000001,100\n000002,100.1\n"),
         "No frame lies within poses.csv (0.00 to 0.40 s): the frames go from 100.00 to 100.10 s; check that both",

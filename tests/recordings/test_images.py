@@ -60,7 +60,7 @@ def test_a_thumbnails_end_does_not_stand_for_the_pictures_end():
     [
         ("gone.png", None, "gone.png is missing; restore it, or leave that frame out of the recording."),
         ("empty.png", b"", "empty.png is empty"),
-        ("text.png", b"hello there", "text.png is no picture that is read (11 bytes"),
+        ("text.png", b"hello there", "text.png is no picture that is known (11 bytes"),
         ("cut.png", PNG[:-20], f"({len(PNG) - 20} bytes); copy it again or leave that frame out."),
         ("cut.jpg", JPEG[:-20], f"cut.jpg is truncated ({len(JPEG) - 20} bytes)"),
     ],

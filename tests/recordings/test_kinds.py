@@ -69,12 +69,15 @@ def write_tone(file: Path, seconds: float = 1.0) -> None:
     kind = file.suffix
     rate_hz = {".amr": 8_000, ".opus": 48_000, ".webm": 48_000}.get(kind, 16_000)
     tone = (0.5 * np.sin(2 * np.pi * 440 * np.arange(round(seconds * rate_hz)) / rate_hz)).astype(np.float32)
-    plain = {".oga": "OGG", ".opus": "OGG", ".aif": "AIFF"}.get(kind, kind[1:].upper())
+    plain = {".oga": "OGG", ".opus": "OGG", ".aif": "AIFF", ".wave": "WAV", ".bwf": "WAV", ".snd": "AU"}
+    plain = plain.get(kind, kind[1:].upper())
     if plain in soundfile.available_formats():
         soundfile.write(file, tone, rate_hz, "OPUS" if kind == ".opus" else None, format=plain)
         return
     containers = {".m4a": "ipod", ".aac": "adts", ".wma": "asf", ".mka": "matroska", ".mkv": "matroska"}
-    codecs = {".mp3": "libmp3lame", ".wma": "wmav2", ".amr": "libopencore_amrnb", ".webm": "libopus"}
+    containers[".m4v"] = "mp4"
+    codecs = {".mp3": "libmp3lame", ".wma": "wmav2", ".amr": "libopencore_amrnb", ".webm": "libopus", ".mp2": "mp2"}
+    codecs |= {".wv": "wavpack", ".avi": "mp3"}
     with av.open(str(file), "w", format=containers.get(kind, kind[1:])) as container:
         stream: Any = container.add_stream(codecs.get(kind, "aac"), rate=rate_hz)
         stream.layout = "mono"
@@ -95,7 +98,32 @@ def test_a_sound_in_each_container_is_the_sound_of_its_folder(tmp_path: Path, su
     spectrum = np.abs(np.fft.rfft(samples))
     assert np.argmax(spectrum) * track.rate_hz / len(samples) == pytest.approx(440, abs=5)
     content = track.path.read_bytes()[:64]
-    assert self_contained_suffix(content) or suffix in (".aac", ".aif", ".aiff", ".caf", ".w64", ".wma", ".amr")
+    alone = (".aac", ".aif", ".aiff", ".caf", ".w64", ".wma", ".amr", ".au", ".snd", ".rf64", ".mp2", ".wv")
+    assert self_contained_suffix(content) or suffix in alone
+
+
+@pytest.mark.parametrize(
+    ("file", "heard", "said"),
+    [
+        ("track.au", True, "track.au is taken for the sound track"),
+        ("wav/mic.wav", True, "mic.wav is taken for the sound track"),
+        ("video_with_sound.mp4", True, "video_with_sound.mp4 is taken for the sound track"),
+        ("audio.pcm", False, "audio.pcm is not heard"),
+        ("audio.npy", False, "audio.npy is not heard"),
+        ("sound/voice.s16le", False, "voice.s16le is not heard"),
+        ("audio.txt", False, ""),
+    ],
+)
+def test_sound_that_is_there_is_heard_or_named(tmp_path: Path, file: str, heard: bool, said: str) -> None:
+    path = write_folder(tmp_path / "walk", example_truth()) / file
+    path.parent.mkdir(exist_ok=True)
+    if heard:
+        write_tone(path)
+    else:
+        path.write_bytes(bytes(64))
+    recording = open_recording(tmp_path / "walk")
+    assert (recording.audio is not None) == heard
+    assert (said in " ".join(recording.notices)) if said else not recording.notices
 
 
 @pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)

@@ -7,19 +7,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.conformance import Truth, example_truth
+from avlmaps.recordings.conformance import Truth, check, example_truth
 from avlmaps.recordings.formats.ros_transforms import _tree_of_file  # pyright: ignore[reportPrivateUsage]
 from avlmaps.recordings.open import open_recording
 from helpers.format_writers import (
     numbers,
     quaternion,
+    write_avlmaps,
     write_folder,
+    write_hov_sg,
     write_nerfstudio,
     write_polycam,
     write_record3d_exr,
     write_redwood,
+    write_seven_scenes,
 )
 
 TRUTH = example_truth(frames=6)
@@ -148,3 +152,69 @@ def test_the_header_of_a_file_of_poses_for_a_bag_is_followed(tmp_path: Path, ord
     tree = _tree_of_file(tmp_path / "poses.txt", "camera")
     found, known = tree.root_from("camera", TRUTH.stamps_s)
     assert known.all() and np.allclose(found, TRUTH.world_from_camera, atol=1e-9)
+
+
+def in_kind(folder: str, suffix: str) -> Callable[[Path], object]:
+    """Return what writes the pictures of a folder as files of another kind."""
+
+    def change(path: Path) -> None:
+        for file in sorted((path / folder).iterdir()):
+            if suffix == ".npz":
+                np.savez(file.with_suffix(suffix), depth=np.zeros((48, 64), np.uint16))
+            else:
+                Image.open(file).save(file.with_suffix(suffix))
+            file.unlink()
+
+    return change
+
+
+def packed(path: Path) -> None:
+    for file in path.glob("*.depth.png"):
+        file.rename(file.with_suffix(".pgm"))
+
+
+def half(path: Path) -> None:
+    names = [file.stem for file in sorted((path / "rgb").iterdir())]
+    rows = [f"{name},{stamp_s}" for name, stamp_s in zip(names, TRUTH.stamps_s, strict=True)]
+    (path / "frames.csv").write_text("\n".join(["name,stamp_s", *rows]))
+    first = path / f"rgb/{names[0]}.png"
+    Image.open(first).save(first.with_suffix(".gif"))
+    first.unlink()
+    open_recording(path).frame(0)
+
+
+@pytest.mark.parametrize(
+    ("write", "change", "said"),
+    [
+        (write_folder, in_kind("rgb", ".gif"), "holds 6 files of the kind .gif (000000.gif), and none that is read"),
+        (write_folder, in_kind("rgb", ".jp2"), "of the kind .jp2"),
+        (write_folder, in_kind("depth", ".npz"), "of the kind .npz (000000.npz), and none that is read: .png, .npy"),
+        (write_folder, half, "000000.gif is a GIF"),
+        (write_hov_sg, in_kind("rgb", ".ppm"), "of the kind .ppm"),
+        (write_avlmaps, in_kind("rgb", ".ppm"), "of the kind .ppm"),
+        (write_seven_scenes, packed, "unpack the .sens with the Python reader"),
+    ],
+)  # fmt: skip
+def test_a_file_of_another_kind_is_never_called_missing(
+    tmp_path: Path, write: Writer, change: Callable[[Path], object], said: str
+) -> None:
+    path = write(tmp_path / "scene", TRUTH)
+    with pytest.raises(RecordingError) as fault:
+        change(path)
+        open_recording(path)
+    assert said in str(fault.value) and "missing" not in str(fault.value)
+
+
+@pytest.mark.parametrize(
+    ("write", "names"),
+    [
+        (write_hov_sg, {"pose": "poses"}),
+        (write_hov_sg, {"rgb": "Images", "depth": "Depths", "pose": "Poses"}),
+        (write_avlmaps, {"rgb": "images", "depth": "depths"}),
+    ],
+)
+def test_folders_of_other_names_are_read(tmp_path: Path, write: Writer, names: dict[str, str]) -> None:
+    path = write(tmp_path / "scene", TRUTH)
+    for name, other in names.items():
+        (path / name).rename(path / other)
+    check(lambda: open_recording(path), TRUTH, stamps="pose" not in names)

@@ -13,7 +13,9 @@ from avlmaps.core.files import SOUND_BYTES, checked_size
 if TYPE_CHECKING:
     import soundfile
 
-_PLAIN = {".wav", ".w64", ".flac", ".ogg", ".oga", ".opus", ".aif", ".aiff", ".caf"}
+_PLAIN = {
+    ".wav", ".wave", ".bwf", ".rf64", ".w64", ".flac", ".ogg", ".oga", ".opus", ".aif", ".aiff", ".caf", ".au", ".snd",
+}  # fmt: skip
 # First bytes of the containers that hold their own samples, and the suffix by which the readers know each.
 _SELF_CONTAINED = (
     (0, b"RIFF", ".wav"), (0, b"fLaC", ".flac"), (0, b"OggS", ".ogg"), (4, b"ftyp", ".m4a"), (0, b"ID3", ".mp3"),

@@ -32,6 +32,13 @@ MOST_PIXELS = 1 << 26
 DEPTH_SATURATED = 65535
 _JPEG, _PNG = b"\xff\xd8", b"\x89PNG\r\n\x1a\n"
 _HEIF_KINDS = (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1")
+# First bytes of what people put where a picture is meant, and what it is.
+_OTHER_KINDS = (
+    (b"GIF8", "a GIF"), (b"\0\0\0\x0cjP", "JPEG 2000"), (b"\xff\x4f\xff\x51", "JPEG 2000"), (b"P3", "a PPM"),
+    (b"P6", "a PPM"), (b"P5", "a PGM"), (b"P2", "a PGM"), (b"PK\x03\x04", "a ZIP archive, as NPZ is"), (b"Pf", "a PFM"),
+    (b"\x93NUMPY", "an NPY, which only files called .npy may be"), (b"v/1\x01", "OpenEXR"), (b"\xff\x0a", "JPEG XL"),
+    (b"\0\0\0\x0cJXL", "JPEG XL"), (b"\x89HDF", "HDF5"), (b"%PDF", "a PDF"), (b"<svg", "an SVG"),
+)  # fmt: skip
 _HEADER_BYTES = 1 << 18
 _TRIED = 9
 _RESTORE = "restore it, or leave that frame out of the recording"
@@ -148,7 +155,8 @@ def _unknown_kind(path: Path, content: bytes) -> str:
     if content.startswith((_PNG[:4], _JPEG)):
         return f"{path} is truncated or damaged in its header ({len(content)} bytes); copy it again."
     known = ", ".join(suffix[1:] for suffix in COLOUR_SUFFIXES)
-    return f"{path} is no picture that is read ({len(content)} bytes, first {content[:4].hex(' ')}); {known} are."
+    what = next((what for magic, what in _OTHER_KINDS if content.startswith(magic)), "no picture that is known")
+    return f"{path} is {what} ({len(content)} bytes, first {content[:4].hex(' ')}), which is not read; {known} are."
 
 
 def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:

@@ -104,6 +104,24 @@ def some_name(folder: Path, *patterns: str) -> bool:
         return any(fnmatch(entry.name, pattern) for entry in islice(entries, LOOKED_AT) for pattern in patterns)
 
 
+# What people call the folders of a recording; the first that is there counts, in letters of any size.
+FOLDERS = {
+    "colour": ("rgb", "color", "colour", "images", "image"),
+    "depth": ("depth", "depths", "depth_images"),
+    "pose": ("pose", "poses"),
+}
+
+
+def folder_of(path: Path, *kinds: str) -> str:
+    """Return the name of the folder that holds the first of some kinds, where all have one; else nothing."""
+    if not path.is_dir():
+        return ""
+    with os.scandir(path) as entries:
+        there = {entry.name.casefold(): entry.name for entry in islice(entries, LOOKED_AT) if entry.is_dir()}
+    found = [next((there[name] for name in FOLDERS[kind] if name in there), "") for kind in kinds]
+    return found[0] if all(found) else ""
+
+
 def _is_folder(path: Path) -> bool:
     return (path / layout.DESCRIPTION).exists() or (path / layout.UNFINISHED).exists()
 
@@ -127,7 +145,6 @@ FORMATS: tuple[Format, ...] = (
     Format("tum", "rgb.txt, depth.txt and groundtruth.txt", holds("rgb.txt", "depth.txt"), ".listed:open_tum"),
     Format("replica", "traj.txt and results/", holds("traj.txt", "results"), ".layouts:replica"),
     Format("scannet", "color/, depth/, pose/ and intrinsic/", holds("color", "depth", "pose"), ".layouts:scannet"),
-    Format("avlmaps", "poses.txt, rgb/ (and depth/)", holds("poses.txt", "rgb"), ".layouts:open_avlmaps"),
     Format("rosbag", "a .bag, .mcap or .db3 file, or a folder of them", _is_rosbag, ".rosbag:open_rosbag", True),
     Format("record3d", "a .r3d file, or its export", _by("scans:is_record3d"), ".scans:open_record3d"),
     Format("stray-scanner", "odometry.csv, camera_matrix.csv, rgb.mp4 and depth/",
@@ -135,7 +152,10 @@ FORMATS: tuple[Format, ...] = (
     Format("nerfstudio", "transforms.json with depth_file_path", holds("transforms.json"), ".scans:open_nerfstudio"),
     Format("polycam", "keyframes/ with images/, depth/, cameras/", _by("scans:is_polycam"), ".scans:open_polycam"),
     Format("redwood", "trajectory.log, color/ and depth/", _by("layouts:find_redwood_log"), ".layouts:redwood"),
-    Format("hov-sg", "rgb/, depth/ and pose/ of numbers", holds("rgb", "depth", "pose"), ".layouts:hov-sg"),
+    Format("avlmaps", "poses.txt, rgb/ (and depth/)",
+           lambda path: (path / "poses.txt").is_file() and folder_of(path, "colour") != "", ".layouts:open_avlmaps"),
+    Format("hov-sg", "rgb/, depth/ and pose/ of numbers",
+           lambda path: folder_of(path, "colour", "depth", "pose") != "", ".layouts:hov-sg"),
     Format("orb-slam", "associations.txt and a trajectory", _by("listed:is_orb_slam"), ".listed:open_orb_slam"),
     Format("icl-nuim", "associations.txt, rgb/, depth/ and a .gt.freiburg",
            holds("associations.txt", "rgb", "depth"), ".listed:open_icl_nuim"),
@@ -209,6 +229,8 @@ _UNREADABLE: tuple[tuple[Callable[[Path], bool], str], ...] = (
      f"is of KITTI's layout: cameras without depth, and poses of twelve numbers a line; {_EXPORT} (poses as stamp, "
      "position and quaternion)."),
     (holds("lowres_wide", "lowres_depth"), f"is of ARKitScenes' layout, which is not read; {_EXPORT}."),
+    (lambda path: holds("pose_intrinsic_imu.json")(path) or holds("iphone", "dslr")(path),
+     f"is of ScanNet++'s layout, which is not read; unpack its iphone/ with its toolkit, and {_EXPORT}."),
     (holds("images", "sparse"),
      "is a reconstruction of COLMAP, whose scale is not metres and which has no depth; record with a depth "
      f"camera, or {_EXPORT}."),

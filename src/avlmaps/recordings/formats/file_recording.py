@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import wraps
+from itertools import islice
 from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar, runtime_checkable
 
@@ -31,9 +32,13 @@ _SHOWN = 3
 _TRACKS = ("audio", "sound")
 _SOUNDS = (
     ".flac", ".wav", ".ogg", ".oga", ".opus", ".mp3", ".m4a", ".aac", ".aif", ".aiff", ".caf", ".w64", ".wma", ".mka",
-    ".amr", ".3gp",
+    ".amr", ".3gp", ".wave", ".bwf", ".rf64", ".au", ".snd", ".mp2", ".wv",
 )  # fmt: skip
-_FILMS = (".mp4", ".mov", ".mkv", ".webm")
+_FILMS = (".mp4", ".mov", ".mkv", ".webm", ".avi", ".m4v")
+# Samples without a header, under any name; of what is called audio or sound all is meant to be heard but these texts.
+_RAW = (".pcm", ".s16", ".s16le", ".f32", ".f32le")
+_TEXTS = (".json", ".jsonl", ".csv", ".txt", ".md", ".xml", ".yaml", ".yml", ".html")
+_LOOKED_AT = 2000  # files of a folder beside the pictures
 _NUMBER = re.compile(r"([0-9]+(?:\.[0-9]+)?)")
 
 
@@ -178,7 +183,7 @@ class ShotsRecording(Recording):
         shots = settle(path, shots, pose_file)
         more["posed"] = more.get("posed", 1.0) * (len(shots.names) / found if found else 1.0)
         if "audio" not in more:
-            more["audio"] = open_audio(path)
+            more["audio"] = open_audio(path, films=more.get("video") is None)
         if more["audio"] is None and (video := more.get("video")) is not None:
             with suppress(NoAudioStreamError):
                 more["audio"] = AudioTrack.open(video.path, start_s=-video.start_s)
@@ -313,15 +318,30 @@ def number_of(name: str) -> int:
 
 
 def list_names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
-    """Return the names of a folder's files with one of the suffixes, in the order of the numbers in them."""
+    """Return the names of a folder's files with one of the suffixes, in the order of the numbers in them.
+
+    RecordingError: all of its files are of other kinds.
+    """
     try:
         with os.scandir(folder) as entries:
-            names = [entry.name for entry in entries if entry.name.lower().endswith(suffixes)]
+            every = [entry.name for entry in entries if not entry.name.startswith(".")]
     except FileNotFoundError:
         raise RecordingError(f"{folder} is missing; the recording needs it.") from None
     except OSError as error:
         raise RecordingError(f"{folder} cannot be listed ({error.strerror or error}); check the folder.") from None
-    return sorted((name for name in names if not name.startswith(".")), key=natural_key)
+    names = [name for name in every if name.lower().endswith(suffixes)]
+    if not names:
+        refuse_other_kinds(folder, every, suffixes)
+    return sorted(names, key=natural_key)
+
+
+def refuse_other_kinds(folder: Path, names: Sequence[str], suffixes: Sequence[str]) -> None:
+    """Refuse files that would be read if they were of another kind; nothing where there are none."""
+    if kinds := ", ".join(sorted({Path(name).suffix.lower() for name in names} - {""})):
+        raise RecordingError(
+            f"{folder} holds {len(names)} files of the kind {kinds} ({min(names)}), and none that is read: "
+            f"{', '.join(suffixes)}; convert them."
+        )
 
 
 def natural_key(name: str) -> tuple[tuple[str | float, ...], str]:
@@ -330,18 +350,22 @@ def natural_key(name: str) -> tuple[tuple[str | float, ...], str]:
     return tuple(float(part) if at % 2 else part for at, part in enumerate(parts)), name
 
 
-def open_audio(folder: Path, start_s: float = 0.0) -> AudioTrack | None:
+def open_audio(folder: Path, start_s: float = 0.0, films: bool = True) -> AudioTrack | None:
     """Open the sound track that someone put beside a recording's files, and note where it was not certain which.
 
-    It is called ``audio`` or ``sound``, or is the only sound file that is there, also in a folder called so.
+    It is called ``audio`` or ``sound``, or is the only sound file that is there or in a folder below, or the only film
+    with sound (``films``: the pictures are none). What may be sound and is not heard is noted.
     """
     if not folder.is_dir():
         return None
-    inside = [sub for sub in sorted(folder.iterdir()) if sub.name.casefold() in _TRACKS and sub.is_dir()]
-    places = ([sub / file.name for file in sorted(sub.iterdir())] for sub in (folder, *inside))
+    below = [sub for sub in sorted(folder.iterdir()) if sub.is_dir() and not sub.name.startswith(".")]
+    below.sort(key=lambda sub: sub.name.casefold() not in _TRACKS)
+    places = [sorted(folder.iterdir()), *(sorted(islice(sub.iterdir(), _LOOKED_AT)) for sub in below)]
     named, others = next((found for files in places if any(found := _sounds(files))), ((), ()))
     if named:
         return AudioTrack.open(named[0], start_s=start_s)
+    if not others and films:
+        others = [file for file in places[0] if file.suffix.lower() in _FILMS and _may_be_heard(file)]
     if len(others) == 1:
         try:
             track = AudioTrack.open(others[0], start_s=start_s)
@@ -352,7 +376,26 @@ def open_audio(folder: Path, start_s: float = 0.0) -> AudioTrack | None:
     if len(others) > 1:
         names = _some([file.name for file in others])
         note(f"There are {len(others)} sound files ({names}), and none is called audio: give one ({option('audio')}).")
+    if unheard := [] if others else [file.name for files in places for file in files if _is_unheard(file)]:
+        note(
+            f"{_some(unheard)} is not heard: it says no rate and channels, or is of a kind that is not read; convert "
+            f"it to WAV or FLAC, and give it ({option('audio', 'FILE')})."
+        )
     return None
+
+
+def _may_be_heard(film: Path) -> bool:
+    try:
+        return bool(AudioTrack.open(film))
+    except NoAudioStreamError:
+        return False
+    except AudioError:  # opened again, it says why
+        return True
+
+
+def _is_unheard(file: Path) -> bool:
+    kind = file.suffix.lower()
+    return kind in _RAW or (file.stem.casefold() in _TRACKS and kind not in (*_TEXTS, *_FILMS, "") and file.is_file())
 
 
 def likeliest_sound(names: Iterable[str]) -> str | None:

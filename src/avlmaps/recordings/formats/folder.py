@@ -115,7 +115,7 @@ def _open_audio(
     path: Path, start_s: float, video: VideoFrames | None, first_s: float, microphones: MicrophoneNumbers | None
 ) -> AudioTrack | None:
     files = tuple(path / name for name in microphones.files or ()) if microphones is not None else ()
-    track = AudioTrack.open(files[0], start_s=start_s) if files else open_audio(path, start_s)
+    track = AudioTrack.open(files[0], start_s=start_s) if files else open_audio(path, start_s, films=video is None)
     if track is not None and microphones is not None:
         return with_microphones(track, microphones.microphones(), files)
     if track is None and video is not None:
@@ -167,10 +167,10 @@ def _find_video(folder: Path, description: Description) -> VideoFrames | None:
 
 def _find_pictures(folder: Path, description: Description, known: PoseTable, video: VideoFrames | None) -> _Pictures:
     """Find the pictures and their stamps: by frames.csv, else row by row with poses.csv, else by the rate."""
-    depth_of = {name.rsplit(".", 1)[0]: name for name in list_names(folder / "depth", DEPTH_SUFFIXES)}
-    where, found = "depth", depth_of
+    found, depth_of = _by_stem(folder / "depth", DEPTH_SUFFIXES)
+    where, there = "depth", depth_of
     if video is None:
-        where, found = "rgb", {name.rsplit(".", 1)[0]: name for name in list_names(folder / "rgb", COLOUR_SUFFIXES)}
+        where, (found, there) = "rgb", _by_stem(folder / "rgb", COLOUR_SUFFIXES)
     elif len(found) != len(video):
         raise RecordingError(
             f"{video.path} has {len(video)} frames, but {folder / 'depth'} {len(found)} pictures; each frame needs one."
@@ -183,16 +183,16 @@ def _find_pictures(folder: Path, description: Description, known: PoseTable, vid
         stamps_s: Float[np.ndarray, " n"] | None = np.array([row[1] for row in rows], np.float64)
         if not names:
             raise RecordingError(f"{path} lists no frame, so there is nothing to map.")
-        if lost := [name for name in names if name not in found]:
+        if lost := [name for name in names if name not in there]:
             sentence = (
                 f"{len(lost)} of the {len(names)} names in {path} have no picture in {where}/ (the first is "
-                f"{lost[0]!r}); write the names of the files without their extension."
+                f"{lost[0]!r}, the first picture {next(iter(found.values()), 'none')!r}); write the names of the files."
             )
             report(sentence, path, fatal=len(lost) == len(names))
     else:
         names = list(found)
         stamps_s = video.stamps_s if video else _stamps_without_list(folder, names, description, known)
-    colour = [f"rgb/{found.get(name, name + '.png')}" for name in names]
+    colour = [f"rgb/{there.get(name, name + '.png')}" for name in names]
     if description.frames is not None and description.frames != len(names):
         where = path.name if os.path.lexists(path) else "rgb/"
         sentence = f"{folder / layout.DESCRIPTION} lists {description.frames} frames, but {where} has {len(names)}."
@@ -201,6 +201,15 @@ def _find_pictures(folder: Path, description: Description, known: PoseTable, vid
     if video is not None:
         return _Pictures(names, [], depth, stamps_s, range(len(names)))
     return _Pictures(names, colour, depth, stamps_s)
+
+
+def _by_stem(folder: Path, suffixes: tuple[str, ...]) -> tuple[dict[str, str], dict[str, str]]:
+    """Return the pictures of a folder by their names without extension, and its files, of which some may be none.
+
+    A file of another kind is not missing: what reads it says which kind it is.
+    """
+    read = {name.rsplit(".", 1)[0]: name for name in list_names(folder, suffixes)}
+    return read, {name.rsplit(".", 1)[0]: name for name in list_names(folder, ("",))} | read
 
 
 def _stamps_without_list(

@@ -64,17 +64,17 @@ from avlmaps.recordings.formats.file_recording import (
     list_names,
     open_audio,
     opener,
+    refuse_other_kinds,
     sizes,
     whole_frames,
 )
 from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES, first_picture_size
-from avlmaps.recordings.open import why_unreadable
+from avlmaps.recordings.open import FOLDERS, folder_of, why_unreadable
 
 RATE_HZ = 30.0
 _NOT_IN_ORDER = "The poses are not in the order of the pictures; they are matched by their numbers in the log."
 _NO_CLOCK = "The recording has no clock; 30 frames/s are assumed."
-_COLOUR = rf"({'|'.join(re.escape(suffix) for suffix in COLOUR_SUFFIXES)})"
-_DEPTH = rf"({'|'.join(re.escape(suffix) for suffix in DEPTH_SUFFIXES)})"
+_TEXT = (".txt",)
 Z_UP = (0.0, 0.0, 1.0)
 Poses = dict[int, Float[np.ndarray, "4 4"]]
 
@@ -89,16 +89,27 @@ class Cameras:
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Files of a folder whose names count frames: a regular expression whose first group is the number."""
+    """Files of a folder whose names count frames: a regular expression whose first group is the number.
+
+    ``folder`` is a name or one of the kinds of ``folder_of``; none is the recording's own.
+    """
 
     folder: str
-    name: str
+    stem: str
+    suffixes: tuple[str, ...]
 
     def files(self, path: Path) -> dict[int, str]:
-        inside = path / self.folder if self.folder else path
-        found = [(re.fullmatch(self.name, name, re.IGNORECASE), name) for name in list_names(inside, ("",))]
-        below = f"{self.folder}/" if self.folder else ""
-        return dict(sorted((int(match.group(1)), below + name) for match, name in found if match))
+        folder = folder_of(path, self.folder) if self.folder in FOLDERS else self.folder
+        inside, below = path / folder, f"{folder}/" if folder else ""
+        names, pattern = list_names(inside, ("",)), re.compile(rf"{self.stem}(\.\w+)", re.IGNORECASE)
+        found = [(pattern.fullmatch(name), name) for name in names]
+        every = [(match, name) for match, name in found if match]
+        read = {int(m.group(1)): below + name for m, name in every if m.group(2).lower() in self.suffixes}
+        if every and not read:
+            if why := why_unreadable(path):
+                raise RecordingError(why)
+            refuse_other_kinds(inside, [name for _, name in every], self.suffixes)
+        return dict(sorted(read.items()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +133,6 @@ def open_layout(layout: Layout, path: Path) -> FileRecording:
     colour = layout.colour.files(path)
     depth = layout.depth.files(path)
     known, file_of = layout.poses(path, sorted(colour))
-    if not depth and (why := why_unreadable(path)):
-        raise RecordingError(why)
     numbers = whole_frames(path, colour=colour, depth=depth, pose=known)
     shots = Shots(
         names=[_digits(colour[number]) for number in numbers],
@@ -196,8 +205,8 @@ def open_avlmaps(path: Path) -> FileRecording:
     if not os.path.lexists(path / "camera.json"):
         note(f"The stamps are counted at {HABITAT_RATE_HZ:g} frames/s, since poses.txt has none.")
     habitat_from_body = read_habitat_poses(path / "poses.txt")
-    colour = _numbered(path / "rgb", (".png", ".jpg"))
-    depth = _numbered(path / "depth", (".npy", ".png")) if (path / "depth").is_dir() else {}
+    colour = Pattern("colour", r"(\d+)", COLOUR_SUFFIXES).files(path)
+    depth = Pattern("depth", r"(\d+)", DEPTH_SUFFIXES).files(path) if folder_of(path, "depth") else {}
     lines = dict(enumerate(habitat_from_body))
     numbers = whole_frames(path, colour=colour, **({"depth": depth} if depth else {}), line_of_poses=lines)
     if not depth:
@@ -205,8 +214,8 @@ def open_avlmaps(path: Path) -> FileRecording:
     world_from_camera = camera_poses(habitat_from_body[numbers], given)
     shots = Shots(
         names=[f"{number:06d}" for number in numbers],
-        colour=[f"rgb/{colour[number]}" for number in numbers],
-        depth=[f"depth/{depth[number]}" for number in numbers] if depth else [],
+        colour=[colour[number] for number in numbers],
+        depth=[depth[number] for number in numbers] if depth else [],
         stamps_s=np.array(numbers, np.float64) / given.rate_hz,
         world_from_camera=world_from_camera,
     )
@@ -217,11 +226,6 @@ def open_avlmaps(path: Path) -> FileRecording:
         path, "avlmaps", rig, shots, lambda _: path / "poses.txt",
         up_in_world=np.array([0.0, 0.0, 1.0]), audio=audio,
     )  # fmt: skip
-
-
-def _numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, str]:
-    stems = [(name.split(".", 1)[0], name) for name in list_names(folder, suffixes)]
-    return {int(stem): name for stem, name in stems if stem.isascii() and stem.isdigit()}
 
 
 def read_camera_file(path: Path) -> CameraFile:
@@ -281,13 +285,13 @@ def _rows(name: str, path: Path, numbers: Sequence[int]) -> tuple[Poses, Callabl
 
 
 def _of_robot(path: Path, numbers: Sequence[int]) -> tuple[Poses, Callable[[int], Path]]:
-    files = Pattern("pose", r"(\d+)\.txt").files(path)
+    files = Pattern("pose", r"(\d+)", _TEXT).files(path)
     rows = {number: _numbers_of(path / name) for number, name in files.items()}
     lengths = {len(row) for row in rows.values() if len(row)}
     if len(lengths) > 1 or not lengths <= {7, 12, 16}:
         raise RecordingError(
-            f"The files of {path / 'pose'} hold {' and '.join(map(str, sorted(lengths)))} numbers; each is a pose of "
-            "seven (x y z qx qy qz qw) or sixteen (a matrix)."
+            f"The files of {path / folder_of(path, 'pose')} hold {' and '.join(map(str, sorted(lengths)))} numbers; "
+            "each is a pose of seven (x y z qx qy qz qw) or sixteen (a matrix)."
         )
     pose = np.stack([tables.as_poses(row[None])[0] if len(row) else np.full((4, 4), np.nan) for row in rows.values()])
     of_base = lengths == {7}
@@ -469,31 +473,31 @@ def fitted_cameras(path: Path, shots: Shots, camera: Pinhole, file: Path, units_
 _LAYOUTS = (
     Layout(
         "7scenes",
-        Pattern("", rf"frame-(\d+)\.color{_COLOUR}"),
-        Pattern("", r"frame-(\d+)\.depth\.png"),
-        partial(_pose_files, Pattern("", r"frame-(\d+)\.pose\.txt")),
+        Pattern("", r"frame-(\d+)\.color", COLOUR_SUFFIXES),
+        Pattern("", r"frame-(\d+)\.depth", (".png",)),
+        partial(_pose_files, Pattern("", r"frame-(\d+)\.pose", _TEXT)),
         _kinect,
     ),
     Layout(
         "replica",
-        Pattern("results", rf"frame(\d+){_COLOUR}"),
-        Pattern("results", r"depth(\d+)\.png"),
+        Pattern("results", r"frame(\d+)", COLOUR_SUFFIXES),
+        Pattern("results", r"depth(\d+)", (".png",)),
         partial(_rows, "traj.txt"),
         _replica,
         Z_UP,
     ),
     Layout(
         "scannet",
-        Pattern("color", rf"(\d+){_COLOUR}"),
-        Pattern("depth", rf"(\d+){_DEPTH}"),
-        partial(_pose_files, Pattern("pose", r"(\d+)\.txt")),
+        Pattern("color", r"(\d+)", COLOUR_SUFFIXES),
+        Pattern("depth", r"(\d+)", DEPTH_SUFFIXES),
+        partial(_pose_files, Pattern("pose", r"(\d+)", _TEXT)),
         _scannet,
         Z_UP,
     ),
     Layout(
         "hov-sg",
-        Pattern("rgb", rf"(\d+){_COLOUR}"),
-        Pattern("depth", rf"(\d+){_DEPTH}"),
+        Pattern("colour", r"(\d+)", COLOUR_SUFFIXES),
+        Pattern("depth", r"(\d+)", DEPTH_SUFFIXES),
         _of_robot,
         _robot_camera,
         Z_UP,
@@ -518,9 +522,9 @@ def find_redwood_log(path: Path) -> Path | None:
 def open_redwood(path: Path) -> FileRecording:
     """Open a scene of Redwood or Open3D in place."""
     log = find_redwood_log(path)
-    folder = next((name for name in ("color", "rgb", "image") if (path / name).is_dir()), None)
-    if log is None or folder is None:
-        what = "trajectory.log" if log is None else "folder of colour pictures (color, rgb, image)"
+    folder = folder_of(path, "colour")
+    if log is None or not folder:
+        what = "trajectory.log" if log is None else f"folder of colour pictures ({', '.join(FOLDERS['colour'])})"
         raise RecordingError(f"{path} has no {what}; the recording needs it.")
     files = list_names(path / folder, COLOUR_SUFFIXES), list_names(path / "depth", DEPTH_SUFFIXES)
     ids, pose = _read_log(log)
