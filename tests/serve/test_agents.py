@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import cv2
 import numpy as np
@@ -18,6 +19,8 @@ from jsonschema import Draft202012Validator
 
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.agents import MOST_TOKENS, agent_server, fitting, token_count
+from avlmaps.serve.lanes import RequestError
+from avlmaps.serve.requests import file_of
 from avlmaps.serve.service import Service
 from helpers.agent_talk import Agent
 from helpers.office import ROOM_M, ROOMS, names, office_of
@@ -96,15 +99,27 @@ def test_sloppy_arguments_are_taken_as_they_are_meant(agent: Agent, calls: Any) 
             {"sentence": "the red thing", "top": 2},
             {"sentence": "the red thing", "top": "2", "object": "", "primary": "", "near": None, "picture": "false"},
         ),
-        "list_things": ({"name": ["red"], "near": "1,2,0.5"}, {"name": "red", "near": [1, 2, 0.5], "page": 1.0}),
+        "list_things": ({"name": ["red"], "near": "1,2,0.5"}, {"name": "red", "near": [1, 2, 0.5], "page": 1.0},
+                        {"name": '["red"]', "near": "[1, 2, 0.5]"}, {"name": "red", "near": ["1", " 2", "0.5"]},
+                        {"name": "red", "near": {"x": 1, "y": 2, "z": 0.5}}),
         "locate_photo": (
             {"photo": photo}, {"photo": broken, "intrinsics": ""}, {"photo": f"data:image/png;base64,{broken}"},
+            {"photo": photo.replace("+", "-").replace("/", "_").rstrip("=")},
         ),
         "describe_place": ({"x": 4.0, "y": 3.0}, {"x": "4.0", "y": "3", "z": ""}),
     }  # fmt: skip
     for tool, ways in alike.items():
         answers = [agent.call(tool, **way) for way in ways]
         assert all(one == answers[0] for one in answers), tool
+
+
+@pytest.mark.parametrize("address", ["{}", "file://{}", "file://localhost{}"])
+def test_a_file_on_this_machine_is_named_by_its_path_or_its_url(tmp_path: Path, address: str) -> None:
+    (tmp_path / "a photo.png").write_bytes(b"bytes")
+    named = address.format(quote(str(tmp_path / "a photo.png")) if "file:" in address else tmp_path / "a photo.png")
+    assert file_of(named, "photo", 1000, reads_files=True) == b"bytes"
+    with pytest.raises(RequestError, match="base64"):
+        file_of(named, "photo", 1000)
 
 
 @pytest.mark.parametrize(
@@ -123,6 +138,7 @@ def test_sloppy_arguments_are_taken_as_they_are_meant(agent: Agent, calls: Any) 
         ("locate_photo", {"photo": "/etc/passwd"}, "base64"),
         ("locate_photo", {"photo": "aGVsbG8="}, "PNG"),
         ("locate_photo", {}, "photo"),
+        ("locate_photo", {"path": "/tmp/x.png"}, "photo (file)"),
         ("describe_place", {"x": 1.0}, "y"),
         ("goal_near", {"sentence": "the red thing", "near": "here"}, "x,y"),
     ],

@@ -280,7 +280,7 @@ async def _content(
     name, drawn = values.pop("map", None), values.pop("picture", None)
     served = service.shelf.get(str(name) if name else None)
     files = files_in(values, one.files, most, reads_files)
-    query = read(values, one.query)
+    query = read(values, one.query, one.files)
     lane = service.slow if one.slow or files else service.quick
 
     def job(watch: Cancellation) -> tuple[Any, bytes | None]:

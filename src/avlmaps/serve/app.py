@@ -124,7 +124,7 @@ async def _answered(service: Service, operation: Operation, request: Request) ->
     served = service.shelf.get(request.path_params["map"])
     values, files = await values_of(request, operation, service.settings.limits.body_bytes)
     in_path = {name: value for name, value in request.path_params.items() if name != "map"}
-    query = read({**values, **in_path}, operation.query)
+    query = read({**values, **in_path}, operation.query, operation.files)
     lane = service.slow if operation.slow or files else service.quick
     tag = f'"{served.version}-{__version__}"'  # another release draws and names another way, and has another page
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
+from urllib.parse import unquote
 
 import msgspec
 import numpy as np
@@ -33,6 +34,7 @@ from avlmaps.serve.settings import Limits
 R = TypeVar("R", bound=Struct)
 PHOTO, CLIP = "photo", "clip"
 _NUMBER = r"-?\d{1,6}(\.\d{1,9})?"
+_LONGEST_PATH = 1000
 _FOCAL, _OFFSET = r"[1-9]\d{0,4}(\.\d{1,9})?", r"\d{1,5}(\.\d{1,9})?"
 
 
@@ -271,18 +273,18 @@ class TilesQuery(Request):
     ] = None
 
 
-def read(values: Mapping[str, Any], kind: type[R]) -> R:
+def read(values: Mapping[str, Any], kind: type[R], files: Sequence[str] = ()) -> R:
     """Return a request of a kind, out of an address, a form, JSON or an agent's call: the one place that normalises.
 
-    A number may be a text, and a place a list of numbers; one value stands for a list of it; what is null or blank was
-    left out.
+    A number may be a text, and a place a list of numbers; one value stands for a list of it; a list may be written as
+    text; what is null or blank was left out. ``files`` were taken out of the values before, and are told of.
     """
     lists = lists_of(kind)
     given = {name: _normal(value, name in lists) for name, value in values.items() if not _is_blank(value)}
     try:
         return msgspec.convert(given, kind, strict=False)
     except msgspec.ValidationError as fault:
-        known = schema_of(kind)["properties"]
+        known = {name: {"type": "file"} for name in files} | schema_of(kind)["properties"]
         unknown = next((name for name in given if name not in known), None)
         said = f"The request does not fit: {str(fault)[:300]}."
         if unknown is not None:
@@ -302,11 +304,20 @@ def _is_blank(value: Any) -> bool:
 
 
 def _normal(value: Any, is_list: bool) -> Any:
-    if isinstance(value, str | int | float) and is_list:
-        return [value]
-    if isinstance(value, list) and not is_list and all(isinstance(one, int | float) for one in value):
-        return ",".join(str(one) for one in value)
+    if isinstance(value, str) and re.fullmatch(r"\s*[\[(].*[\])]\s*", value, re.DOTALL):
+        with suppress(msgspec.DecodeError, RecursionError):  # words in brackets stay words
+            value = msgspec.json.decode("[" + value.strip()[1:-1] + "]")
+    if is_list:
+        return [_normal(one, False) for one in value] if isinstance(value, list) else [value]
+    if isinstance(value, dict) and value.keys() <= set("xyz"):
+        value = [value[axis] for axis in "xyz" if axis in value]
+    if isinstance(value, list) and all(isinstance(one, int | float) or _is_number(one) for one in value):
+        return ",".join(str(one).strip() for one in value)
     return value
+
+
+def _is_number(text: Any) -> bool:
+    return isinstance(text, str) and re.fullmatch(_NUMBER, text.strip()) is not None
 
 
 def schema_of(kind: type[Struct]) -> dict[str, Any]:
@@ -366,18 +377,23 @@ def files_in(values: dict[str, Any], names: Sequence[str], most_bytes: int, read
 
 
 def file_of(text: str, what: str, most_bytes: int, reads_files: bool = False) -> bytes:
-    """Return the bytes of a file: of base64, perhaps with line breaks or as a data URI, or of a path if it may be."""
-    if reads_files and len(text) < 1000 and user_path(text).is_file():
+    """Return the bytes of a file: of base64 of any alphabet, perhaps as a data URI, or of a path or its URL."""
+    path = unquote(re.sub(r"^file://(localhost)?", "", text.strip())) if text.lstrip().startswith("file:") else text
+    if reads_files and len(text) < _LONGEST_PATH and user_path(path).is_file():
         try:
-            return read_regular(user_path(text), most_bytes)
+            return read_regular(user_path(path), most_bytes)
         except OSError as fault:
             raise RequestError(f"The {what} {text} cannot be read ({fault.strerror or fault}).", 415, what) from None
     plain = re.sub(r"\s+", "", text.partition(",")[2] if text.lstrip().startswith("data:") else text)
+    plain = plain.replace("-", "+").replace("_", "/")
+    if len(plain) > _LONGEST_PATH:  # many leave the signs at its end out
+        plain += "=" * (-len(plain) % 4)
     try:
         return base64.b64decode(plain, validate=True)
     except (binascii.Error, ValueError):
-        also = ", or give the path of a file" if reads_files else ""
-        raise RequestError(f"The {what} is no base64; send the file's bytes in base64{also}.") from None
+        also = ", or give the path of a file here" if reads_files else ""
+        no_path = "no file that is here, and " if reads_files else ""
+        raise RequestError(f"The {what} is {no_path}no base64; send the file's bytes in base64{also}.") from None
 
 
 def decode_photo(content: bytes, limits: Limits) -> UInt8[np.ndarray, "h w 3"]:
