@@ -9,6 +9,7 @@ import pytest
 from build_fakes import SETTINGS, Corners, Places, Walk, Words, _card
 from msgspec import structs
 
+from avlmaps.core.errors import BackendError
 from avlmaps.maps.build import build_map
 from avlmaps.maps.finish import feature_doubts
 from avlmaps.maps.mapper import Mapper
@@ -83,6 +84,19 @@ def test_what_an_encoder_writes_into_changes_nothing(tmp_path: Path) -> None:
         for name, used in (("careless", careless), ("careful", careful))
     ]
     require_same_voxels(*built)
+
+
+class LongViews(ConstantViews):
+    """Says what is longer than one."""
+
+    def encode(self, frames: list[Frame]) -> np.ndarray:
+        return 3.0 * super().encode(frames)
+
+
+@pytest.mark.parametrize("given", [{"pixels": Constant(0.5)}, {"views": LongViews()}])
+def test_features_without_unit_length_are_refused(given: dict[str, Any]) -> None:
+    with pytest.raises(BackendError, match=r"length (0\.5|3) .*divide it by its length"):
+        made(**given)
 
 
 @pytest.mark.parametrize(("said", "word"), [(0.0, "zero"), (1.0, "the same")])

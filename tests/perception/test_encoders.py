@@ -55,7 +55,7 @@ def test_an_object_needs_no_registry_and_brings_a_vocabulary_and_a_card() -> Non
     used = Encoders.named("embedded", pixels=mine)
     assert used.pixels is used.pixels and used.name_of(Kind.PIXELS) == "given:Words"
     assert (used.pixels.card.id, used.pixels.card.dim) == ("Words", 3) and len(used.pixels.card.checksum) == 64
-    assert "chair" in used.pixels.vocabulary
+    assert set(used.pixels.vocabulary) == {"chair", "sofa"}
     assert (used.pixels.understood("sofa"), used.pixels.understood("moon")) == ("sofa", "")
     assert isinstance(used.pixels, PixelEncoder)
 
@@ -103,6 +103,9 @@ def test_words_that_are_no_rows_are_refused() -> None:
         Encoders(pixels=Flat())
     with pytest.raises(BackendError, match="Raising raised KeyError"):
         Encoders(pixels=Raising())
+    knows_none = type("Hues", (Words,), {"encode_words": lambda self, words: np.zeros((len(words), 3), np.float32)})
+    with pytest.raises(BackendError, match=r"Hues has no vocabulary, .* give it one"):
+        Encoders(pixels=knows_none())
 
 
 GUIDE = Path(__file__).parents[2] / "docs"

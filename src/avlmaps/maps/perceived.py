@@ -13,6 +13,7 @@ from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.types import Frame
 
 _UNIT = 0.02
+_LOOKED_AT = slice(None, None, 8)  # rows and columns of an encoder's grid: one that is wrong is wrong in most
 
 
 def encode_pixels(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
@@ -24,9 +25,10 @@ def encode_pixels(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float3
         found = encode_batch(encoder, frames)
     if len(found) != len(frames):
         raise BackendError(f"{who} gave features of {len(found)} frames for {len(frames)} ({names}).")
-    return [
-        as_grid(features, encoder.card.dim, f"{who} gave", frame) for features, frame in zip(found, frames, strict=True)
-    ]
+    grids = [as_grid(grid, encoder.card.dim, f"{who} gave", frame) for grid, frame in zip(found, frames, strict=True)]
+    for grid, frame in zip(grids, frames, strict=True):
+        require_unit(grid[_LOOKED_AT, _LOOKED_AT], f"{who} gave", frame)
+    return grids
 
 
 @contextmanager
@@ -85,9 +87,11 @@ def require_unit(features: np.ndarray, who: str, frame: Frame) -> None:
 
 
 def as_row(found: Any, dim: int, who: str, frame: Frame) -> Float32[np.ndarray, " d"]:
-    """Return the one feature of a picture."""
+    """Return the one feature of a picture, which has unit length."""
     array = np.asarray(found)
     row = array.reshape(-1) if array.ndim in (1, 2) else array
     if array.dtype.kind != "f" or row.shape != (dim,) or not np.isfinite(row).all():
         raise BackendError(f"{who} gave {array.dtype} of {array.shape} for {frame.name}; it is {dim} finite numbers.")
+    if abs((length := float(np.linalg.norm(row))) - 1.0) > _UNIT:
+        raise BackendError(f"{who} gave a feature of length {length:.3g} for {frame.name}; divide it by its length.")
     return row.astype(np.float32)

@@ -51,6 +51,8 @@ def completed(kind: Kind, encoder: object) -> Any:
     missing = {attribute: value for attribute, value in made.items() if not hasattr(encoder, attribute)}
     if not hasattr(encoder, "card"):
         missing["card"] = made_card(kind, encoder)
+    if kind is Kind.PIXELS and "vocabulary" in missing:
+        missing["vocabulary"] = _known_of(encoder, missing["vocabulary"])
     if not missing:
         return encoder
     return with_members(encoder, (name for name in dir(encoder) if not name.startswith("_")), missing)
@@ -124,14 +126,25 @@ def made_card(kind: Kind, encoder: Any) -> ModelCard:
     return ModelCard(type(encoder).__qualname__.rpartition(".")[2], dim, "unknown", digest.hexdigest(), note=note)
 
 
-def _words_of(kind: Kind, encoder: Any) -> Any:
+def _known_of(encoder: Any, names: Sequence[str]) -> tuple[str, ...]:
+    rows = np.asarray(_words_of(Kind.PIXELS, encoder, names))
+    known = tuple(name for name, row in zip(names, rows, strict=False) if np.any(row))
+    if not known:
+        raise BackendError(
+            f"The pixels encoder {type(encoder).__qualname__} has no vocabulary, the names that compete for a voxel, "
+            "and knows none of the lexicon's things; give it one, such as vocabulary = ('red', 'green')."
+        )
+    return known
+
+
+def _words_of(kind: Kind, encoder: Any, words: Sequence[str] = ("chair",)) -> Any:
     try:
-        return encoder.encode_words(["chair"])
+        return encoder.encode_words(list(words))
     except AvlmapsError:
         raise
     except Exception as fault:
         raise BackendError(
-            f"encode_words(['chair']) of the {kind} encoder {type(encoder).__qualname__} raised "
+            f"encode_words({list(words)[:1]}) of the {kind} encoder {type(encoder).__qualname__} raised "
             f"{type(fault).__name__}: {fault}"
         ) from fault
 

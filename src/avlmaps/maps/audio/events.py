@@ -21,6 +21,7 @@ from avlmaps.perception.protocols import FrameSoundEncoder, SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 
 _NEAR_M = 1e-4  # places nearer than this are one
+_UNIT = 0.02
 _EDGE_S = 0.05  # quiet is only what is this far from a sound
 
 
@@ -144,10 +145,12 @@ def _quiet_around(track: AudioTrack, found: Sequence[Segment], index: int, quiet
 def _encoded(encoder: SoundEncoder, sound: Sound) -> Float32[np.ndarray, "windows d"]:
     given = Sound(sound.samples.copy(), sound.rate_hz)  # an encoder may write into what it is given
     feature = np.asarray(encoder.encode(given), np.float32)
-    if feature.ndim != 2 or len(feature) < 1 or feature.shape[1] != encoder.card.dim or not np.isfinite(feature).all():
+    lengths = np.linalg.norm(feature, axis=-1) if feature.ndim == 2 else np.zeros(0)
+    if not len(lengths) or feature.shape[1] != encoder.card.dim or not (np.abs(lengths - 1.0) <= _UNIT).all():
         raise BackendError(
-            f"The sound model {encoder.card.id} returned features of {feature.shape} for {sound.duration_s:.2f} s; its "
-            f"card promises finite ones of (windows, {encoder.card.dim})."
+            f"The sound model {encoder.card.id} returned features of {feature.shape}, of lengths "
+            f"{lengths.min(initial=np.inf):.3g} to {lengths.max(initial=0.0):.3g}, for {sound.duration_s:.2f} s; its "
+            f"card promises finite ones of (windows, {encoder.card.dim}) and unit length."
         )
     return feature
 
