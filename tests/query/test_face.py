@@ -128,11 +128,35 @@ def test_arithmetic_of_heat_is_that_of_its_arrays(m: avlmaps.AVLMap, a: float, b
         ((a * one + two) * b, (a * x + y) * b),
         (-one, -x),
         (np.ones(len(x)) * one, x),
+        (1 - one, 1 - x),
+        (abs(-one) ** 2, x**2),
+        (np.float32(b) * two + x, np.float32(b) * y + x),
+        (np.maximum(one, two)[3:], np.maximum(x, y)[3:]),
     ):
         np.testing.assert_allclose(np.asarray(heat), array, atol=1e-4)
-    np.testing.assert_array_equal(one > 0.5, x > 0.5)
+    for asked, known in ((one > 0.5, x > 0.5), (one == two, x == y), (np.max(one), x.max()), (np.sum(two), y.sum())):
+        np.testing.assert_array_equal(asked, known)
+    assert isinstance(np.float32(a) * one, type(-one)) and {one: 1}[one] == 1
     product = np.asarray((a * one) * two)
     np.testing.assert_allclose(product, a * np.asarray(one * two), atol=1e-4)
+
+
+def test_a_map_draws_into_axes_and_lists_things_with_their_rooms(m: avlmaps.AVLMap) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    axes = figure.subplots()
+    assert m.plot(ax=axes) is figure and axes.has_data()
+    rooms, things = m.rooms(), m.things()
+    assert {thing.room for thing in things} & {room.name for room in rooms}
+    assert [one.name for one in m.things(room=rooms[0])] == [one.name for one in m.things(room=m.where.names[0])]
+    assert {"goals", "values", "plot", "found"} <= set(dir(m.object("chair"))) and "factors" not in dir(
+        m.object("chair")
+    )
+    for number in re.findall(
+        r"\d+\.\d+", str(m.ask("the chair near the sofa").to_dict() | {"level_from_recording": 0})
+    ):
+        assert len(number.partition(".")[2]) <= 4
 
 
 def test_heat_of_two_maps_does_not_mix(m: avlmaps.AVLMap) -> None:

@@ -35,6 +35,7 @@ from avlmaps.query.words import ClosestWords, is_open
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from avlmaps.maps.storeys import Storeys
@@ -371,19 +372,29 @@ class AVLMap:
     @checked(QueryError)
     def things(
         self, names: Sequence[str] | None = None, least_confidence: float = 0.5, structure: bool = False,
-        watch: Watch = lambda stage, done, total: None, *, at: str | int | None = None, room: str | None = None,
+        watch: Watch = lambda stage, done, total: None, *, at: str | int | None = None, room: str | Room | None = None,
     ) -> list[Thing]:  # fmt: skip
-        """Return the things of the map, most confident first; see ``contents.find_things``.
+        """Return the things of the map, most confident first, with their rooms; see ``contents.find_things``.
 
         ``at``: those that were there on a day: a date, or the number of a visit from 1; their ``rows`` hold what is
-        left of them. ``room``: those in a room by its name, or in all rooms of a kind. ``QueryError``: there is no such
-        room, or the map was not seen on such a day.
+        left of them. ``room``: those in a room or by its name, or in all rooms of a kind. ``QueryError``: there is no
+        such room, or the map was not seen on such a day.
         """
+        found = self._things(names, least_confidence, structure, watch, at)
         if room is not None:
+            if not isinstance(room, str):
+                regions = [one.region for one in self.where.rooms]
+                room = self.where.names[regions.index(room.region)] if room.region in regions else room.name
             self.where.require(room)
-            found = self.where.with_rooms(self.things(names, least_confidence, structure, watch, at=at))
             inside = self.where.inside(room, [thing.position for thing in found])
-            return [thing for thing, is_in in zip(found, inside, strict=True) if is_in]
+            found = [thing for thing, is_in in zip(found, inside, strict=True) if is_in]
+        with suppress(BackendError, MapError):  # rooms are not known without the model of views that the map has
+            return self.where.with_rooms(found)
+        return found
+
+    def _things(
+        self, names: Sequence[str] | None, least_confidence: float, structure: bool, watch: Watch, at: str | int | None
+    ) -> list[Thing]:
         if at is not None:
             from avlmaps.query.changes import Days, things_at
             from avlmaps.query.sound_sources import with_heard
@@ -441,8 +452,6 @@ class AVLMap:
         things = self.things(names, least_confidence, structure) if sees else []
         things = with_heard(self, things, are_all=not names)
         rooms = self.rooms() if self.has(Kind.VIEWS) else []
-        if rooms:
-            things = self.where.with_rooms(things)
         return Contents(things, self.sounds(), rooms, self.doubts_of_things, self.storeys)
 
     @checked(QueryError)
@@ -565,16 +574,16 @@ class AVLMap:
 
     # Pictures and other libraries.
 
-    def plot(self, path: str | Path | None = None, *, names: bool = True) -> "Path | Figure":
+    def plot(self, path: str | Path | None = None, *, names: bool = True, ax: "Axes | None" = None) -> "Path | Figure":
         """Draw the map from above with its walk and sounds, and by default the names of its things and rooms.
 
-        ``QueryError``: the picture cannot be written to the path.
+        ``ax``: axes of your own, which are drawn into. ``QueryError``: the picture cannot be written to the path.
         """
         from avlmaps.query.plots import draw_map, save
 
         things = self.things() if names and self.has(Kind.PIXELS) else ()
         rooms = self.rooms() if names and self.has(Kind.VIEWS) else ()
-        figure = draw_map(self, things, rooms)
+        figure = draw_map(self, things, rooms, ax=ax)
         return figure if path is None else save(figure, path)
 
     def _repr_png_(self) -> bytes:

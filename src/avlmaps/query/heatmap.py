@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.core.errors import QueryError
@@ -26,14 +27,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_INSIDE = ("factors", "lead", "of", "only", "shown", "shown_at", "space", "terms", "weighed", "where")
 _CONDITIONS = 5  # the first parts of a query, left out in turn: what more parts do to its likelihood is not bounded
 
 
-class Heat(ABC):
+class Heat(NDArrayOperatorsMixin, ABC):
     """A number for every voxel of a map: ``np.asarray(heat)`` is in the order of the map's ``points``."""
 
     space: Space
-    __array_priority__ = 100.0  # NumPy's numbers leave products to this class
+    __hash__ = object.__hash__  # pyright: ignore[reportAssignmentType] - by identity: ``==`` compares the numbers
 
     @property
     @abstractmethod
@@ -64,8 +66,20 @@ class Heat(ABC):
         """Return the heat as an array."""
         return np.array(self.values, dtype, copy=True if copy is None else copy)
 
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **of_numpy: Any) -> Any:
+        """Compute a function of NumPy on the numbers; times one of NumPy's numbers it is a heat."""
+        if ufunc is np.multiply and method == "__call__" and isinstance(inputs[0], Real) and not of_numpy:
+            return self * inputs[0]
+        return getattr(ufunc, method)(*(one.values if isinstance(one, Heat) else one for one in inputs), **of_numpy)
+
     def __len__(self) -> int:
         return len(self.space)
+
+    def __getitem__(self, key: Any) -> Any:
+        return self.values[key]
+
+    def __dir__(self) -> list[str]:
+        return [name for name in super().__dir__() if not name.startswith("_") and name not in _INSIDE]
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r}, {len(self):,} voxels)"
@@ -93,13 +107,13 @@ class Heat(ABC):
             self._require_same(other, "multiplied")
             pairs = [(a * b, one * two) for a, one in self._terms for b, two in other._terms]
             return Blend(self.space, tuple(pairs))
-        return self.values * other if isinstance(other, np.ndarray) else NotImplemented
+        return super().__mul__(other)
 
     def __rmul__(self, other: object) -> Any:
         return self.__mul__(other)
 
     def __truediv__(self, other: object) -> Any:
-        return self.__mul__(1.0 / float(other)) if isinstance(other, Real) else NotImplemented
+        return self.__mul__(1.0 / float(other)) if isinstance(other, Real) else super().__truediv__(other)
 
     def __add__(self, other: object) -> Any:
         if isinstance(other, Heat):
@@ -107,32 +121,15 @@ class Heat(ABC):
             return Blend(self.space, (*self._terms, *other._terms))
         if isinstance(other, Real) and other == 0:  # of sum([...])
             return self
-        return self.values + other if isinstance(other, Real | np.ndarray) else NotImplemented
+        return super().__add__(other)
 
     __radd__ = __add__
 
     def __sub__(self, other: object) -> Any:
-        if isinstance(other, Real | np.ndarray):
-            return self.values - other
-        return self + -1.0 * other if isinstance(other, Heat) else NotImplemented
-
-    def __rsub__(self, other: object) -> Any:
-        return np.asarray(other) - self.values if isinstance(other, Real | np.ndarray) else NotImplemented
+        return self + -1.0 * other if isinstance(other, Heat) else super().__sub__(other)
 
     def __neg__(self) -> "Blend":
         return -1.0 * self
-
-    def __gt__(self, other: Any) -> Bool[np.ndarray, " n"]:
-        return self.values > np.asarray(other)
-
-    def __ge__(self, other: Any) -> Bool[np.ndarray, " n"]:
-        return self.values >= np.asarray(other)
-
-    def __lt__(self, other: Any) -> Bool[np.ndarray, " n"]:
-        return self.values < np.asarray(other)
-
-    def __le__(self, other: Any) -> Bool[np.ndarray, " n"]:
-        return self.values <= np.asarray(other)
 
     def _require_same(self, other: "Heat", how: str) -> None:
         if self.space is not other.space:

@@ -165,12 +165,17 @@ def png_of(figure: "Figure") -> bytes:
 
 
 def draw_map(
-    avlmap: "AVLMap", things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = (), title: str | None = None
-) -> "Figure":
-    """Draw a map top-down, with the camera's path, the sounds, and the names of rooms and of ``MOST_NAMES`` things."""
+    avlmap: "AVLMap", things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = (), title: str | None = None,
+    ax: "Axes | None" = None,
+) -> "Figure":  # fmt: skip
+    """Draw a map top-down, with the camera's path, the sounds, and the names of rooms and of ``MOST_NAMES`` things.
+
+    ``ax``: axes of the caller's, which are drawn into.
+    """
     space = Space(avlmap.data.grid, avlmap.data.voxels.index, avlmap.data.up_in_world, avlmap.data)
     view = TopDown.of(space)
-    figure, axes = panels(view, 1)
+    figure, axes = panels(view, 1) if ax is None else (ax.get_figure(root=True), [ax])
+    assert figure is not None  # axes that are drawn into have one
     draw_ground(axes[0], view, space)
     sounds = avlmap.data.sounds
     for k in range(len(sounds)):
@@ -184,7 +189,8 @@ def draw_map(
     axes[0].set_title(
         f"{name}: {len(space):,} voxels, {len(sounds)} sounds", fontsize=10, color=INK, loc="left", fontweight="bold"
     )
-    finish(figure, axes, with_heat=False)
+    if ax is None:
+        finish(figure, axes, with_heat=False)
     return figure
 
 

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
+_DECIMALS = 4
+
+
 def row_of(value: object, schema: type[T], **given: Any) -> T:
     """Return a value's attributes as a JSON object of a schema; None and "" only where it requires the key."""
     row: dict[str, Any] = {}
@@ -26,8 +29,18 @@ def row_of(value: object, schema: type[T], **given: Any) -> T:
     for key in cast(Any, schema).__annotations__:
         one = given[key] if key in given else getattr(value, key, None)
         if key not in optional or not (one is None or (isinstance(one, str | tuple | list) and not one)):
-            row[key] = list(cast("tuple[Any, ...]", one)) if isinstance(one, tuple) else one
+            row[key] = _short(one)
     return cast(T, row)
+
+
+def _short(value: Any) -> Any:
+    if isinstance(value, float):
+        return round(value, _DECIMALS)
+    if isinstance(value, dict):
+        return {key: _short(one) for key, one in cast("dict[Any, Any]", value).items()}
+    if isinstance(value, list | tuple):  # the rows of a matrix stay as they are
+        return [one if isinstance(one, list) else _short(one) for one in cast("Sequence[Any]", value)]
+    return value
 
 
 Position = Annotated[list[float], Meta(min_length=3, max_length=3, description="x, y, z in metres, recording frame")]
