@@ -242,5 +242,5 @@ def test_an_array_that_is_no_rgb_picture_is_refused(heard: AVLMap, picture: np.n
 
 
 def test_heat_is_not_multiplied_by_words(heard: AVLMap) -> None:
-    with pytest.raises(TypeError, match=r"can.t multiply|unsupported operand"):
+    with pytest.raises(TypeError):
         _ = heard.object("chair") * "3"
