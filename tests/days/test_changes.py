@@ -124,6 +124,17 @@ def test_where_a_thing_was_last_seen_is_where_its_last_stay_was() -> None:
     assert last_seen(days(), "piano", means("piano"), lambda place: None)["seen"] == []
 
 
+def test_a_name_that_is_not_known_is_asserted_nowhere() -> None:
+    doubtful = stay("sofa", 0, 0, gone=1, looked=1, confidence=0.04)
+    life = Life.of([doubtful, stay("cup", 0, 1)], [np.full((2, 3), number, np.int32) for number in range(2)])
+    known = Days(tuple(visit(number, day) for number, day in enumerate(DATES[:2])), life)
+    assert text_of(changes_answer(known, "home")) == "Since 2026-11-23: something is gone, noticed on 2026-11-24."
+    seen = last_seen(known, "sofa", means("sofa"), lambda place: None)
+    assert last_seen_text(seen).startswith("What may be a sofa (probability 0.04) was last seen on 2026-11-23")
+    often = usual(known, lambda _: True)
+    assert changes.usual_text(often, "here") == "Usually here: cup (2 of 2 days). Seen there on 1 day only: something."
+
+
 def test_what_a_map_of_colours_calls_red_is_the_red_thing() -> None:
     assert means("red thing")("red") and means("red")("red")
     assert not means("red thing")("blue") and not means("red chair")("red") and not means("thing")("")

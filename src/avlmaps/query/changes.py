@@ -26,6 +26,13 @@ if TYPE_CHECKING:
 SOMETHING = "something"
 """A thing that changed and is of no name with a probability of ``FOUND_AT``."""
 ChangeKind = Literal["new", "gone", "moved", "first seen"]
+
+
+def name_of(stay: "Stay") -> str:
+    """Return a thing's name where it is known, else ``SOMETHING``."""
+    return stay.name if stay.confidence >= FOUND_AT else SOMETHING
+
+
 RoomOf = Callable[[tuple[float, float, float]], str | None]
 """Returns the name of the room that holds a place."""
 
@@ -138,7 +145,7 @@ def changes_answer(
         before = None if one.before is None else stays[one.before]
         after = None if one.after is None else stays[one.after]
         listed.append(row_of(
-            stay, ChangeAnswer, kind=one.kind, name=stay.name if stay.confidence >= FOUND_AT else SOMETHING,
+            stay, ChangeAnswer, kind=one.kind, name=name_of(stay),
             room=room_of(stay.position), noticed=when(days, one.visit),
             last_seen=when(days, stay.last, stay.last_seen_s),
             first_seen=when(days, stay.first if before is None else before.first),
@@ -155,10 +162,10 @@ def changes_answer(
 
 
 def last_seen(days: Days, name: str, same: Callable[[str], bool], room_of: RoomOf) -> "LastSeenAnswer":
-    """Return where things of a name were last seen, those that are there still first, then the latest."""
+    """Return where things of a name were last seen: those of a known name, those that are there still, the latest."""
     stays = days.life.stays
     own = [stay for stay in stays if same(stay.name) and stay.moved_to is None]
-    own.sort(key=lambda stay: (stay.gone is not None, -stay.last_seen_s, -stay.confidence))
+    own.sort(key=lambda stay: (stay.confidence < FOUND_AT, stay.gone is not None, -stay.last_seen_s, -stay.confidence))
 
     def row(stay: "Stay") -> LastSeenPlace:
         return row_of(
@@ -216,7 +223,11 @@ def last_seen_text(answer: "LastSeenAnswer") -> str:
         return f"No {answer['name']} was seen on any day."
     one = answer["seen"][0]
     room = f"in {the_room(one['room'])}, " if one["room"] else ""
-    text = f"The {one['name']} was last seen on {said(one['last_seen'])}, {room}at {place_text(one['position'])}."
+    sure = one["confidence"] >= FOUND_AT
+    what = (
+        f"The {one['name']}" if sure else f"What may be {_article(one['name'])} (probability {one['confidence']:.2f})"
+    )
+    text = f"{what} was last seen on {said(one['last_seen'])}, {room}at {place_text(one['position'])}."
     if one["gone"] is not None:
         return f"{text} On {said(one['gone'])} it was gone from there."
     if one["last_seen"]["visit"] == answer["last_day"]["visit"]:
@@ -247,6 +258,11 @@ class Usual:
     def share(self) -> float:
         """Share of the days that looked."""
         return self.there / self.looked
+
+    @property
+    def name(self) -> str:
+        """Its name, or ``SOMETHING``."""
+        return name_of(self.stay)
 
     @property
     def is_usual(self) -> bool:
@@ -300,8 +316,12 @@ def usual_text(found: Sequence[Usual], where: str) -> str:
 
 
 def _listed(some: Sequence[Usual], *, counted: bool = True) -> str:
-    number = Counter((one.stay.name, f" ({one.counted})" if counted else "") for one in some)
-    return ", ".join(f"{name if n == 1 else f'{n} {plural_of(name)}'}{days}" for (name, days), n in number.items())
+    number = Counter((one.name, f" ({one.counted})" if counted else "") for one in some)
+    several = {SOMETHING: "things"}
+    return ", ".join(
+        f"{name if n == 1 else f'{n} {several.get(name) or plural_of(name)}'}{days}"
+        for (name, days), n in number.items()
+    )
 
 
 def usual_place_text(days: Days, name: str, found: Sequence[Usual], room_of: RoomOf) -> str:

@@ -262,7 +262,7 @@ def _usual(lists: _Lists) -> Answer:
     days = Days.of(avlmap, "nobody knows what is usual there")
     if not how:
         meant = means(name)
-        found = changes.usual(days, lambda stay: meant(stay.name))
+        found = changes.usual(days, lambda stay: meant(changes.name_of(stay)))
         text = changes.usual_place_text(days, name, found, avlmap.where.name_of)
     elif how == "in":
         if not lists.avlmap.where.has(name):
@@ -278,7 +278,7 @@ def _usual(lists: _Lists) -> Answer:
         marks = [goal for goal in subject.goals if goal.probability >= avlmap.settings.found_at]
         found = changes.usual(days, lambda stay: any(lies(avlmap, how, stay, mark) for mark in marks))
         text = changes.usual_text(found, f"{how} the {name}")
-    whole = lists.answer([_goal(one.stay.position, one.share, one.stay.name, one.stay.size) for one in found], text)
+    whole = lists.answer([_goal(one.stay.position, one.share, one.name, one.stay.size) for one in found], text)
     is_known = bool(found) and found[0].is_usual
     return replace(whole, found=is_known, usual=tuple(one.to_json() for one in found))
 
