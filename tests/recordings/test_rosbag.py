@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import soundfile
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
@@ -289,6 +290,38 @@ def test_plain_samples_without_audio_info_say_how_to_name_them(
     for words in ("fast", "16000,x", "0", "16000,0"):
         with pytest.raises(RecordingError, match="audio_pcm"):
             open_rosbag(path, {"audio_pcm": words})
+
+
+@pytest.mark.parametrize(
+    ("kind", "declared", "said"),
+    [
+        ("FLAC", (2, 44_100, "", 0, "flac"), "says 44100 samples a second, the stream itself 16000"),
+        ("OGG", (1, 16_000, "", 0, "mp3"), ""),
+        ("WAV", (2, 44_100, "S16LE", 0, "wave"), "says 44100 samples a second, the stream itself 16000"),
+        ("RAW", (1, 16_000, "S16LE", 0, "mp3"), r"no mp3 stream, .*audio_pcm=16000,1"),
+        ("RAW", (1, 8_000, "S16LE", 0, "wave"), "does not agree with itself"),
+    ],
+)
+def test_what_audio_info_declares_is_held_against_the_stream(
+    tmp_path: Path, kind: str, declared: tuple[object, ...], said: str
+) -> None:
+    tone = 0.25 * np.sin(np.arange(16_000) * 0.2)
+    soundfile.write(tmp_path / "tone", tone, 16_000, format=kind, subtype="VORBIS" if kind == "OGG" else "PCM_16")
+    content = np.frombuffer((tmp_path / "tone").read_bytes(), np.uint8)
+
+    def more(maker: BagMaker) -> None:
+        maker.write("/audio/audio_info", maker.t("audio_common_msgs/msg/AudioInfo", *declared), START_S)
+        for piece, part in enumerate(np.array_split(content, 10)):
+            maker.write("/audio/audio", maker.t("audio_common_msgs/msg/AudioData", part), START_S + piece * 0.1)
+
+    path = write_bag(tmp_path, "ros2", more=more)
+    if kind == "RAW":
+        with pytest.raises(RecordingError, match=said):
+            open_rosbag(path)
+        return
+    recording = open_rosbag(path)
+    assert recording.audio is not None and recording.audio.rate_hz == 16_000
+    assert recording.audio.duration_s == pytest.approx(1.0, abs=0.02) and said in " ".join(recording.notices)
 
 
 def test_the_samples_of_ros_2_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

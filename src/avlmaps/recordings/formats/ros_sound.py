@@ -172,8 +172,10 @@ def extract_audio(sound: SoundTopic, info: Any, folder: Path, pcm: Pcm | None = 
     times_s = sound.times_s()
     if getattr(first[1], "__msgtype__", "") == STAMPED:
         return _sampled(lambda: sampled_pieces(_messages(sound), sound.name), sound.name, folder, times_s)
-    coding = (getattr(info, "coding_format", "") or "").lower()
-    if pcm is None and coding in _PCM:
+    content = _content(first[1])
+    coding = next((known for start, known in _BEGINNINGS.items() if content.startswith(start)), "")
+    coding = coding or (getattr(info, "coding_format", "") or "").lower()
+    if pcm is None and coding in _PCM and not content.startswith(b"RIFF"):
         sample_format = getattr(info, "sample_format", "") or "S16LE"
         if sample_format.upper() != "S16LE":
             note(f"The sound on {sound.name} is {sample_format}; of plain samples only S16LE is read.")
@@ -181,8 +183,13 @@ def extract_audio(sound: SoundTopic, info: Any, folder: Path, pcm: Pcm | None = 
         pcm = Pcm.check_rate(int(info.sample_rate), int(info.channels), f"The AudioInfo of {sound.name}")
     if pcm is not None:
         return _sampled(lambda: _plain(_messages(sound), pcm), sound.name, folder, times_s)
-    suffix = _coding_of(sound, _content(first[1]), coding, times_s)
-    return _compressed(sound, suffix, folder, times_s)
+    track = _compressed(sound, _coding_of(sound, content, coding, times_s), folder, times_s)
+    if info is not None and int(info.sample_rate) not in (0, track.rate_hz):
+        note(
+            f"The AudioInfo of {sound.name} says {info.sample_rate} samples a second, the stream itself "
+            f"{track.rate_hz}, which count."
+        )
+    return track
 
 
 def _messages(sound: SoundTopic) -> Iterator[Any]:
@@ -308,10 +315,17 @@ def _compressed(sound: SoundTopic, suffix: str, folder: Path, times_s: Float[np.
         for part, (begin, end) in zip(parts, pairwise(edges), strict=True):
             with part.open("wb") as stream:
                 stream.writelines(_content(message) for message in islice(every, end - begin))
-    tracks = [
-        AudioTrack.open(part, start_s=float(times_s[at]), label=sound.name)
-        for part, at in zip(parts, edges[:-1], strict=True)
-    ]
+    try:
+        tracks = [
+            AudioTrack.open(part, start_s=float(times_s[at]), label=sound.name)
+            for part, at in zip(parts, edges[:-1], strict=True)
+        ]
+    except AudioError:
+        raise RecordingError(
+            f"The sound on {sound.name} is no {suffix} stream, though it is declared as one; if it is plain 16-bit "
+            f"samples, say how many a second and in how many channels ({option('topics', 'audio_pcm=16000,1')}). "
+            f"{_otherwise()}"
+        ) from None
     first = tracks[0]
     if len(tracks) == 1:
         came_s = float(np.ptp(times_s)) + usual_s
@@ -334,9 +348,6 @@ def _coding_of(sound: SoundTopic, beginning: bytes, said: str, times_s: Float[np
                 f"The AudioInfo of {sound.name} says {said[:20]!r}, no coding of sound. {_otherwise()}"
             )
         return said
-    for start, coding in _BEGINNINGS.items():
-        if beginning.startswith(start):
-            return coding
     if len(beginning) > 2 and beginning[0] == 0xFF and beginning[1] & 0xE6 == 0xE2:  # an MPEG frame of layer 3
         return "mp3"
     size = sum(len(_content(message)) for message in _messages(sound))
