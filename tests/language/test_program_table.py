@@ -4,7 +4,7 @@ import os
 import re
 from pathlib import Path
 
-from avlmaps.language.program import parse_program, run_program, skill_lines, skills
+from avlmaps.language.program import parse_program, run_program, skills
 from avlmaps.language.program.parser import BUILTINS
 from avlmaps.language.program.vocabulary import ValueType
 from helpers.recording_robot import RecordingRobot
@@ -20,13 +20,6 @@ def test_a_signature_reads_as_it_is_written() -> None:
 
 def test_only_alternatives_must_be_given_one_at_a_time() -> None:
     assert {name for name, skill in skills().items() if skill.alternatives} == {"get_map", "get_major_map"}
-
-
-def test_lines_for_a_prompt_hold_every_signature_and_what_it_does() -> None:
-    lines = skill_lines()
-    assert len(lines) == len(skills())
-    assert lines[0] == "robot.load_image(path: str) -> Picture: Load a picture from a file, to ask where it was taken."
-    assert skill_lines("", [skills()["turn"]])[0].startswith("turn(angle_deg: float) -> None: Turn on the spot")
 
 
 def test_the_page_shows_the_table_as_it_is() -> None:

@@ -10,9 +10,9 @@ from avlmaps.language.claims import claimed_words, forbidden
 from avlmaps.language.gate import UNSURE, NoOrder, no_order
 from avlmaps.language.learned.decision import EXAMPLE, Command, NameResolver, Weighed, decided, refusal_of, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
-from avlmaps.language.lexer import Token, tokenise
+from avlmaps.language.lexer import tokenise
 from avlmaps.language.names import respelt
-from avlmaps.language.said_places import SaidStorey, changes_storey, said_storeys
+from avlmaps.language.said_places import SaidStorey, said_storeys
 from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, language_of, stand_ins
 from avlmaps.language.verbalise import verbalise
 from avlmaps.language.word_classes import load_word_classes, pattern
@@ -38,7 +38,7 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
     Raises LanguageError where it is empty or too long.
     """
     _check_length(text)
-    if is_stop(tokenise(text)):
+    if is_stop(text):
         return Command((act.Wait(),))
     read = _read(text, given)
     stop = read.stops
@@ -50,15 +50,16 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
     return replace(read, intents=(answer,), why="gate")
 
 
-def is_stop(tokens: Sequence[Token]) -> bool:
+def is_stop(text: str) -> bool:
     """Return whether a command says to stop, and orders nothing else: "stop!", "halt, please", "stop, the cat!"."""
-    forms = (tokens, respelt(list(tokens))[0])
-    if any(pattern("gate", "stop").search(" ".join(token.text for token in form)) for form in forms):
-        return True
-    stops = claimed_words("stops")
+    tokens, stops = tokenise(text), claimed_words("stops")
     only = stops | claimed_words("beside_stops") | claimed_words("robots")
-    said = ({token.text for token in form if token.kind != "punct"} for form in forms)
-    return any(not stops.isdisjoint(texts) and texts <= only for texts in said)
+    for form in (tokens, respelt(tokens)[0]):
+        said = {token.text for token in form if token.kind != "punct"}
+        is_alone = not stops.isdisjoint(said) and said <= only
+        if is_alone or pattern("gate", "stop").search(" ".join(token.text for token in form)):
+            return True
+    return False
 
 
 def check_order(text: str) -> None:
@@ -144,7 +145,8 @@ def _back(intent: act.Intent, stand: StandIns) -> act.Intent:
 def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | None) -> Command | None:
     """Return a command whose one target is on a storey, by the target's name: "bed upstairs"; None for any other."""
     word = storeys[0]
-    if len(storeys) > 1 or not word.said or word.isnt or not word.rest or changes_storey(text):
+    changes_storey = pattern("storey_words", "changes").search(text.lower())
+    if len(storeys) > 1 or not word.said or word.isnt or not word.rest or changes_storey:
         return None
     inner = _read(word.rest, given)
     targets = {target for intent in inner.intents for target in act.targets_of(intent)}

@@ -4,6 +4,7 @@ The networks read those for which they have symbols, rows of `list_questions.tom
 """
 
 import re
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -104,48 +105,41 @@ def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
         read = read_list(stand.text)
         return None if read is None else replace(read, name=stand.back(read.name), other=stand.back(read.other))
     plain = _plain(text)
-    matched = ((of, found.groupdict()) for of, says in _rows() if (found := says.fullmatch(plain)))
-    questions = (_heard(said) if of is Listed.HEARD else _listed(of, said) for of, said in matched)
+    matched = ((of, found.groupdict("")) for of, says in _rows() if (found := says.fullmatch(plain)))
+    questions = ((_heard if of is Listed.HEARD else _listed)(of, defaultdict(str, said)) for of, said in matched)
     return next(filter(None, questions), None)
 
 
-def _listed(of: Listed, said: dict[str, str | None]) -> ListQuestion | None:
-    how = _how_of(said.get("how") or "")
-    if of is Listed.CHANGES or how == "in":
-        said["room"] = said.pop("place")
-    elif how:
-        said["thing"] = said.pop("place")
-    room, thing = said.get("room") or "", said.get("thing") or ""
-    room = mended(room) or room
+def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
+    how = _how_of(said["how"])
+    said["room" if of is Listed.CHANGES or how == "in" else "thing"] += said["place"]
+    room, thing = mended(said["room"]) or said["room"], said["thing"]
     if room and lexicon().find(room, EntryKind.ROOM) is None:
         return None
     if speaks_of_photo(thing) or " or " in thing:
         return None
-    since, change = f"{said.get('visit') or ''}{said.get('date') or ''}", said.get("change") or ""
-    change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(change)), "")
-    how = "rooms" if said.get("names") else how
-    name = room or thing or said.get("seen") or ""
-    return ListQuestion(of, name, since=since, change=change, how=how, other=said.get("other") or "")
+    change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(said["change"])), "")
+    name, since = room or thing or said["seen"], said["visit"] + said["date"]
+    how = "rooms" if said["names"] else how
+    return ListQuestion(of, name, since=since, change=change, how=how, other=said["other"])
 
 
-def _heard(said: Mapping[str, str | None]) -> ListQuestion | None:
-    room = said.get("room")
+def _heard(of: Listed, said: Mapping[str, str]) -> ListQuestion | None:
+    room = mended(said["room"]) or said["room"]
     if room:
-        known = lexicon().find(mended(room) or room, EntryKind.ROOM) is not None
-        return ListQuestion(Listed.HEARD, mended(room) or room, how="in") if known else None
-    if said.get("thing"):
-        return ListQuestion(Listed.HEARD, said["thing"] or "", how="near")
-    name, other = said.get("heard") or said.get("sounded") or "", said.get("other") or ""
-    name = f"{name} {said.get('sounding') or ''}".strip()
+        return None if lexicon().find(room, EntryKind.ROOM) is None else ListQuestion(of, room, how="in")
+    if said["thing"]:
+        return ListQuestion(of, said["thing"], how="near")
+    name, other = f"{said['heard'] or said['sounded']} {said['sounding']}".strip(), said["other"]
     if pattern(_TABLE, "tail").search(f"{name} {other}") is not None:  # "... near the buffet" is read by the networks
         return None
-    verbs = said.get("sounded") or other  # "when did the phone ring", and no "when did the parcel come"
+    verbs = said["sounded"] or other  # "when did the phone ring", and no "when did the parcel come"
     if verbs and not all(map(_sounds, filter(None, (name, other)))):
         return None
     first, both, second = name.partition(" and ")
     if both and _sounds(first) and _sounds(second):
         raise QueryError(f"Ask for one sound at a time: for {first}, then for {second.removeprefix('the ')}.")
-    return ListQuestion(Listed.HEARD, name, counts=bool(said.get("counts")), how=said.get("how") or "", other=other)
+    return ListQuestion(of, name, counts=bool(said["counts"]), how=said["how"], other=other)
 
 
 def _sounds(name: str) -> bool:

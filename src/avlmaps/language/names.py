@@ -37,15 +37,10 @@ def mended(name: str) -> str | None:
         return None
     for tail in range(min(2, len(words)), 0, -1):
         wrong = " ".join(words[-tail:])
-        near = near_names(wrong)
-        if (
-            near
-            and near[0][0][0] == wrong[0]
-            and not is_other_form(wrong, near[0][0])
-            and near[0][1] >= _ALIKE
-            and (len(near) == 1 or near[0][1] - near[1][1] >= _APART)
-        ):
-            right = (*words[:-tail], *near[0][0].split())
+        (better, alike), (_, next_alike) = (*near_names(wrong), ("", 0.0), ("", 0.0))[:2]
+        is_sure = alike >= _ALIKE and alike - next_alike >= _APART
+        if is_sure and better[0] == wrong[0] and not is_other_form(wrong, better):
+            right = (*words[:-tail], *better.split())
             if _is_known(right):
                 return " ".join(right)
     return None
@@ -107,7 +102,7 @@ def _is_known(words: tuple[str, ...]) -> bool:
         at = words.index("of", 1)
         thing = _is_name(words[at - 1]) or _is_known(words[:at])
         return thing and words[at - 1] not in _adjectives() and not any(word in never for word in words[at + 1 :])
-    if words[1:] and words[-1] in _colours():  # "the door red"
+    if words[1:] and words[-1] in " ".join(lexicon().colours).split():  # "the door red"
         return _is_known(words[:-1])
     may_stand_before = sides | listed("choices")
     for start in range(1, len(words)):
@@ -199,13 +194,7 @@ def _adjectives() -> frozenset[str]:
 @cache
 def describing_words() -> frozenset[str]:
     """Return the words of the lexicon's colours and materials."""
-    book = lexicon()
-    return frozenset(word for phrase in (*book.colours, *book.materials) for word in phrase.split())
-
-
-@cache
-def _colours() -> frozenset[str]:
-    return frozenset(word for phrase in lexicon().colours for word in phrase.split())
+    return frozenset(" ".join((*lexicon().colours, *lexicon().materials)).split())
 
 
 def respelt(tokens: list[Token]) -> tuple[list[Token], dict[str, str]]:

@@ -34,11 +34,6 @@ class SaidStorey:
     lists: bool = False  # whether all that is there is sought
 
 
-def changes_storey(command: str) -> bool:
-    """Return whether a command orders to go to another storey: "go upstairs and look at the sofa"."""
-    return pattern("storey_words", "changes").search(command.lower()) is not None
-
-
 def asks_how_many_storeys(sentence: str) -> bool:
     """Return whether a question asks how many storeys there are."""
     return _storey("how_many").search(sentence) is not None

@@ -52,14 +52,11 @@ class Attachments:
     def tokens(self, words: Iterable[str], at: int) -> list[Token]:
         """Return files that a sentence may speak of as tokens behind it, so that "this photo" can point to one."""
         said = frozenset(words)
-        files = (
-            ("image", self.image, claimed_words("of_pictures")),
-            ("clip", self.clip, claimed_words("of_recordings")),
-        )
+        files = (("image", self.image, "of_pictures"), ("clip", self.clip, "of_recordings"))
         return [
             Token(name, name, kind, at, at)
             for kind, name, means in files
-            if name and said & (means | claimed_words("points"))
+            if name and said & (claimed_words(means) | claimed_words("points"))
         ]
 
 

@@ -79,10 +79,10 @@ class LearnedTranslator:
         Raises an UnclearError, which says why or asks back, where it is refused or unclear.
         """
         read = self.last_read(command)
-        stop, intents, number = read.stops, read.intents, self.choose or 0
-        chosen = isinstance(stop, Clarify) and 1 <= number <= len(stop.meanings)
-        if isinstance(stop, Clarify) and chosen:
-            intents = stop.meanings[number - 1]
+        stop, number = read.stops, self.choose or 0
+        meanings = stop.meanings if isinstance(stop, Clarify) else ()
+        chosen = 1 <= number <= len(meanings)
+        intents = meanings[number - 1] if chosen else read.intents
         said = verbalise(intents)
         if stop is not None and not chosen:
             raise UnclearError(said, getattr(stop, "choices", ()))

@@ -98,15 +98,13 @@ def _phrases(pieces: Sequence[str], at: int) -> tuple[list[str], int]:
     found: list[str] = []
     current = [""]
     while at < len(pieces) and pieces[at] not in ("]", ")"):
-        if pieces[at] == "|":
+        piece, at = pieces[at], at + 1
+        if piece == "|":
             found, current = found + current, [""]
-            at += 1
             continue
-        if pieces[at] in ("[", "("):
-            inner, end = _phrases(pieces, at + 1)
-            inner = inner if pieces[at] == "(" else ["", *inner]
-            at = end + 1
-        else:
-            inner, at = [pieces[at]], at + 1
+        inner = [piece]
+        if piece in ("[", "("):
+            within, end = _phrases(pieces, at)
+            inner, at = within if piece == "(" else ["", *within], end + 1
         current = [f"{before} {after}".strip() for before in current for after in inner]
     return found + current, at

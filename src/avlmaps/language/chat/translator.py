@@ -16,7 +16,7 @@ from time import monotonic
 from avlmaps.core.errors import LanguageError, ProgramError
 from avlmaps.language.chat.endpoint import ChatSettings, Endpoint, ModelReply, Replay, quoted
 from avlmaps.language.commands import check_order
-from avlmaps.language.program import Program, parse_program, skill_lines, skills
+from avlmaps.language.program import ROBOT, Program, parse_program, skills
 from avlmaps.language.program.parser import called
 from avlmaps.language.translator import Translation
 
@@ -239,7 +239,8 @@ def _parsed(program: str, answer: ModelReply) -> Program:
 def system_prompt() -> str:
     """Return the prompt that precedes any command."""
     told = files("avlmaps.language.chat").joinpath("prompt.md").read_text(encoding="utf-8")
-    return told.replace("{skills}", "\n".join(f"- {line}" for line in skill_lines()))
+    lines = (f"- {ROBOT}.{skill.signature}: {skill.doc}" for skill in skills().values())
+    return told.replace("{skills}", "\n".join(lines))
 
 
 def command_message(command: str) -> str:

@@ -66,23 +66,13 @@ def columns() -> tuple[str, ...]:
     """Return the names of the marks, in their order."""
     classes = sorted(load_word_classes().words)
     both = [*classes, *(f"~{name}" for name in _AMOUNTS), "~thing", "~room", "~sound"]
-    single = [
-        *(f"={kind}" for kind in _KINDS),
-        *(f"mark {mark}" for mark in _MARKS),
-        *_LISTS,
-        "~sounding",
-        "~described",
-    ]
-    return (*(f"begin {name}" for name in both), *(f"in {name}" for name in both), *single, "first", "last")
-
-
-@cache
-def _column() -> dict[str, int]:
-    return {name: at for at, name in enumerate(columns())}
+    spans = (*(f"begin {name}" for name in both), *(f"in {name}" for name in both))
+    single = (*(f"={kind}" for kind in _KINDS), *(f"mark {mark}" for mark in _MARKS), *_LISTS)
+    return (*spans, *single, "~sounding", "~described", "first", "last")
 
 
 def _marked(tokens: list[Token]) -> Float32[np.ndarray, "n f"]:  # noqa: C901
-    column = _column()
+    column = {name: at for at, name in enumerate(columns())}
     found = np.zeros((len(tokens), len(column)), np.float32)
 
     def span(name: str, start: int, end: int) -> None:

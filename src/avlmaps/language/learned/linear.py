@@ -59,11 +59,6 @@ class Row:
     # In the order in which they are written: an `Amount`, a `Slot`, a pair of those, or what the symbols stand for.
     fields: Mapping[str, Any]
 
-    @property
-    def ends(self) -> bool:
-        """Whether the line ends behind the symbols."""
-        return issubclass(self.intent, intents.Refuse | intents.Clarify)
-
     @cached_property
     def slots(self) -> tuple[Slot | Amount, ...]:
         """What is written behind the symbols."""
@@ -116,8 +111,8 @@ ASKS = {f"ask_{ask}": ask for ask in intents.Ask}
 KINDS = tuple(str(kind) for kind in intents.TargetKind)
 PICKS = {f"pick_{pick}": pick for pick in Pick if pick}
 NUMBERS = {f"number_{number}": number for number in range(2, 7)}  # "the second nearest", "third from the left"
-STOPS = tuple(row.symbols[0] for row in ROWS if row.ends)
-STARTS = tuple(dict.fromkeys(row.symbols[0] for row in ROWS if not row.ends))
+STOPS = tuple(row.symbols[0] for row in ROWS if row.intent in (intents.Refuse, intents.Clarify))  # they end a line
+STARTS = tuple(dict.fromkeys(row.symbols[0] for row in ROWS if row.symbols[0] not in STOPS))
 SYMBOLS = (
     "start_command", "start_question", "end", *STARTS, "close", *STOPS, "refuse", "purpose", *ASKS, *KINDS, *PICKS,
     *NUMBERS, "near", "inside", "left", "right", *DEGREES, *HEADINGS, *TIMES, *VIEWS, *BIT,

@@ -6,8 +6,8 @@
 from avlmaps.language.program.interpreter import Step, Trace, run_program
 from avlmaps.language.program.parser import Program, parse_program
 from avlmaps.language.program.values import Budget
-from avlmaps.language.program.vocabulary import ROBOT, Skill, skill_lines, skills
+from avlmaps.language.program.vocabulary import ROBOT, Skill, skills
 
 __all__ = [
-    "ROBOT", "Budget", "Program", "Skill", "Step", "Trace", "parse_program", "run_program", "skill_lines", "skills",
+    "ROBOT", "Budget", "Program", "Skill", "Step", "Trace", "parse_program", "run_program", "skills",
 ]  # fmt: skip

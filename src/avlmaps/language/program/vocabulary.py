@@ -6,7 +6,7 @@ else, the chat prompt is made from it, and plans are written in it.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
@@ -143,8 +143,3 @@ def _skill(name: str, method: Any) -> Skill:
 def _kinds_of(hint: Any) -> frozenset[ValueType]:
     choices = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint or NoneType,)
     return frozenset(KINDS[get_origin(choice) or choice] for choice in choices)
-
-
-def skill_lines(prefix: str = f"{ROBOT}.", of: Sequence[Skill] | None = None) -> tuple[str, ...]:
-    """Return the table as lines for people and language models: a signature, then what it does."""
-    return tuple(f"{prefix}{skill.signature}: {skill.doc}" for skill in of or tuple(skills().values()))

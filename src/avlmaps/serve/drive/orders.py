@@ -28,7 +28,6 @@ from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable, printable_json
 from avlmaps.language.commands import MOST_CHARACTERS, is_stop
-from avlmaps.language.lexer import tokenise
 from avlmaps.language.program import Budget, parse_program
 from avlmaps.language.translator import LearnedTranslator, Translation
 from avlmaps.navigate.brake import Brake
@@ -256,7 +255,7 @@ class Dispatcher:
         """
         begun = self.begun if begun is None else begun
         with self._refusing(who, words=words, program=program):
-            if is_stop(tokenise(words)):
+            if is_stop(words):
                 raise _refused("stop", "Nothing drives" if self._running is None else self.stop(who)["note"])
             with self._preparing:
                 self._require_idle()
