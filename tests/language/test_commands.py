@@ -33,7 +33,7 @@ REACHED = {
 
 # Of every other sentence of many speakers: as many are right at least, and misread at most.
 SPEAKERS = {
-    "speakers_commands.jsonl": (256, 4),
+    "speakers_commands.jsonl": (254, 4),
     "speakers_commands_2.jsonl": (54, 2),
     "speakers_commands_3.jsonl": (34, 2),
     "speakers_commands_4.jsonl": (31, 2),

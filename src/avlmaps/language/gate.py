@@ -1,7 +1,7 @@
 """Whether a sentence is an order, to the robot, now: decided before anything that could move it.
 
 `gate.toml` has a row for each plain case ("cancel ...", "my brother went ..."). Of the others a small network says how
-likely one is no order: three layers of a model of English, fitted to such sentences (`training/language/gate`). Asking
+likely one is no order: four layers of a model of English, fitted to such sentences (`training/language/gate`). Asking
 back costs a second and a drive costs more, so the limit is below one half.
 """
 

@@ -1,1 +1,1 @@
-"""The gate's network: sentences from frames, three layers of a model of English, one ONNX graph in 8 bits."""
+"""The gate's network: sentences from frames, hands and lists, and a layer on a model of English, in 8 bits."""

@@ -1,4 +1,4 @@
-"""Sentences of `frames.tsv` with their slots filled, and the orders and refusals of the lists."""
+"""Sentences of frames with their slots filled, and the orders and refusals of the lists."""
 
 import csv
 import json
@@ -13,16 +13,16 @@ _FORMS = ("vp", "ving", "ved", "vpp", "vs")
 _KEPT_BACK = ("v33", "v36")
 
 
-def frames() -> list[tuple[str, str]]:
-    """Return the kind of each frame, and the frame."""
-    with (HERE / "frames.tsv").open(encoding="utf-8", newline="") as file:
+def frames(name: str) -> list[tuple[str, str]]:
+    """Return the kind of each frame of a file, and the frame."""
+    with (HERE / f"{name}.tsv").open(encoding="utf-8", newline="") as file:
         return [(row["kind"], row["frame"]) for row in csv.DictReader(file, delimiter="\t")]
 
 
-def filled(random: Random, times: int) -> Iterator[tuple[bool, str]]:
-    """Yield each frame several times with other words, and whether it is no order."""
+def filled(random: Random, name: str, times: int) -> Iterator[tuple[bool, str]]:
+    """Yield each frame of a file several times with other words, and whether it is no order."""
     slots = _slots()
-    for kind, frame in frames():
+    for kind, frame in frames(name):
         for _ in range(times):
             text = frame
             whole = random.random() < 0.07
@@ -31,8 +31,8 @@ def filled(random: Random, times: int) -> Iterator[tuple[bool, str]]:
             for form, said in zip(_FORMS, verb, strict=True):
                 text = text.replace(f"{{{form}}}", said + place)
             text = text.replace("{trip}", f"{random.choice(slots['trip'])} {random.choice(slots['P'])}")
-            for name in ("P", "NAME", "FAM", "ASSISTANT"):
-                text = text.replace(f"{{{name}}}", random.choice(slots[name]))
+            for slot in ("P", "NAME", "FAM", "ASSISTANT"):
+                text = text.replace(f"{{{slot}}}", random.choice(slots[slot]))
             first = random.random()
             text = text[0].lower() + text[1:] if first < 0.25 else text[0].upper() + text[1:] if first < 0.4 else text
             yield kind != "order", text.rstrip(".!") if random.random() < 0.3 else text
@@ -49,10 +49,11 @@ def of_lists() -> Iterator[tuple[bool, str]]:
                 yield False, row["say"]
 
 
-def of_hands() -> Iterator[tuple[bool, str]]:
-    """Yield the sentences of `hands.tsv`, and whether each is no order: written by hands that knew no frame."""
+def of_hands(hands: str) -> Iterator[tuple[bool, str]]:
+    """Yield the sentences of some hands in `hands.tsv`, and whether each is no order: they had seen no frame."""
     with (HERE / "hands.tsv").open(encoding="utf-8", newline="") as file:
-        yield from ((row["is"] == "no", row["sentence"]) for row in csv.DictReader(file, delimiter="\t"))
+        rows = (row for row in csv.DictReader(file, delimiter="\t") if row["hand"] in hands)
+        yield from ((row["is"] == "no", row["sentence"]) for row in rows)
 
 
 @cache

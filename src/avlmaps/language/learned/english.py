@@ -1,7 +1,7 @@
-"""Three layers of a model of English, as the gate and the reader take them.
+"""Layers of a model of English, as the gate and the reader take them.
 
-They are the first three of all-MiniLM-L6-v2, fitted to tell orders from what is no order (`training/language/gate`).
-The gate takes their verdict on a sentence, the reader the state of each word in its sentence.
+They are the first of all-MiniLM-L6-v2, fitted to tell orders from what is no order (`training/language/gate`). The
+reader takes the state of each word in its sentence behind three layers, the gate the verdict of a fourth.
 """
 
 import json
@@ -29,18 +29,22 @@ class English:
         folder = files("avlmaps.language.learned").joinpath("weights")
         try:
             facts = json.loads(folder.joinpath("gate.json").read_text(encoding="utf-8"))
-            self._network = open_network(folder.joinpath("gate.onnx").read_bytes())
+            graphs = [folder.joinpath(f"{name}.onnx").read_bytes() for name in ("gate", "order")]
         except (OSError, ValueError) as fault:
             raise BackendError(f"The gate of commands lacks its files ({fault}); install the package again.") from fault
         self._pieces, self.limit = WordPieces(facts["pieces"]), float(facts["limit"])
+        self._layers, self._order = map(open_network, graphs)
 
     def no_order(self, text: str) -> float:
         """Return how likely a sentence is no order; pictures in it say nothing."""
-        found = self._rows(text)[:_MOST_PIECES]
-        if not found:
+        if not self._rows(text):
             return 0.0
-        (logit,) = self._run(found, "logit")
+        logit = np.asarray(self._order.run(None, {"states": self.sentence(text)[None]})[0])
         return float(1.0 / (1.0 + np.exp(-logit[0])))
+
+    def sentence(self, text: str) -> Float32[np.ndarray, "n 384"]:
+        """Return the states of a sentence's pieces, of its begin and of its end."""
+        return self._run(self._rows(text)[:_MOST_PIECES])
 
     def states(self, words: Sequence[str]) -> Float32[np.ndarray, "n 384"]:
         """Return the state of each word in its sentence, the mean of its pieces'; 0 for words beyond the last piece."""
@@ -48,21 +52,18 @@ class English:
         owners = np.repeat(np.arange(len(each)), [len(rows) for rows in each])[:_MOST_PIECES]
         found = [row for rows in each for row in rows][:_MOST_PIECES]
         states = np.zeros((len(words), WIDTH), np.float32)
-        if found:
-            (inside,) = self._run(found, "states")
-            np.add.at(states, owners, inside[0, 1:-1])
-            states /= np.maximum(np.bincount(owners, minlength=len(words)), 1)[:, None]
-        return states
+        np.add.at(states, owners, self._run(found)[1:-1])
+        return states / np.maximum(np.bincount(owners, minlength=len(words)), 1)[:, None].astype(np.float32)
 
     def _rows(self, text: str) -> list[int]:
         plain = text.lower().replace("’", "'").encode("ascii", "ignore").decode()
         unknown = [self._pieces.rows["[UNK]"]]
         return [row for word in _WORD.findall(plain) for row in self._pieces.rows_of_word(word) or unknown]
 
-    def _run(self, found: list[int], output: str) -> list[np.ndarray]:
+    def _run(self, found: list[int]) -> Float32[np.ndarray, "n 384"]:
         rows = self._pieces.rows
         line = np.array([[rows["[CLS]"], *found, rows["[SEP]"]]], np.int64)
-        return [np.asarray(each) for each in self._network.run([output], {"pieces": line})]
+        return np.asarray(self._layers.run(["states"], {"pieces": line})[0])[0]
 
 
 @cache
