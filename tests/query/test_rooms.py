@@ -223,7 +223,7 @@ def test_the_rooms_of_the_map_are_listed_by_walls() -> None:
     assert sorted(room.name for room in rooms) == ["bedroom", "kitchen"]
     assert {room.name: room.views for room in rooms} == {"kitchen": 4, "bedroom": 4}
     for room in rooms:
-        told = room.to_json("kitchen 1")
+        told = room.to_json(("kitchen 1",))
         assert told["probability"] == told["confidence"] == told["names"][0]["probability"]
         assert told["area_m2"] == pytest.approx(8.6, abs=1.0) and len(told["outline"]) >= 4
 
@@ -232,7 +232,7 @@ def test_one_of_two_kitchens_is_asked_for_by_the_number_that_the_lists_give_it()
     m = home(door_m=0.0, two_kitchens=True)
     x, y = m.points[:, 0], m.points[:, 1]
     inside, sides = (y > 0.3) & (y < 2.7), {False: (x > 0.3) & (x < 2.8), True: (x > 3.3) & (x < 5.6)}
-    names = {room.to_json(name)["room"]: room for room, name in zip(m.rooms(), m.where.names, strict=True)}
+    names = {room.to_json((name,))["room"]: room for room, name in zip(m.rooms(), m.where.names, strict=True)}
     assert set(names) == {"kitchen 1", "kitchen 2"} == set(m.where.numbered)
     for name, room in names.items():
         is_right = room.position[0] > 3.0
@@ -305,18 +305,29 @@ def test_each_voxel_has_the_colour_of_its_room_and_a_question_its_things() -> No
     assert np.median(left) != np.median(right) and {*np.unique(left)} == {np.median(left)}
     where = m.where
     assert where.areas_m2() == pytest.approx([8.6, 8.6], abs=1.0)
-    np.testing.assert_array_equal(where.parts_of(lambda kind: kind == "kitchen", np.r_[LEFT, RIGHT]), [True, False])
+    np.testing.assert_array_equal(where.inside("kitchen", np.r_[LEFT, RIGHT]), [True, False])
 
 
-def test_an_open_plan_is_one_room_of_two_names_and_a_part_answers_to_the_other() -> None:
-    m = home(door_m=2.8, things=False)
+def test_an_open_plan_is_one_room_of_two_parts_and_all_tell_it_alike() -> None:
+    m = home(door_m=2.8, things=False, clocks=[(5, 8), (29, 32), (93, 8)])
     (room,) = m.rooms()
-    assert {name for name, _ in room.names} >= {"kitchen", "office"} and (room.area_m2 or 0.0) > 16.0
+    assert set(room.parts) == {"kitchen", "office"} and room.name == " and ".join(room.parts)
     where, ends = m.where, np.array([[0.6, 1.5, 1.0], [4.6, 1.5, 1.0]])
-    own = room.name  # its name says the whole; another of its names the part that looks most like it
-    assert where.parts_of(lambda kind: kind == own, ends).all()
-    other = "office" if own == "kitchen" else "kitchen"
-    assert where.parts_of(lambda kind: kind == other, ends).tolist() == [other == "kitchen", other == "office"]
+    assert where.inside(room.name, ends).all() and (room.area_m2 or 0.0) > 16.0
+    assert [where.inside(part, ends).tolist() for part in ("kitchen", "office")] == [[True, False], [False, True]]
+    assert m.ask("how many rooms are there").count == 1 and room.name in m.ask("how many rooms are there").text
+    listed = [thing for thing in m.contents().things if thing.name == "clocks"]
+    for part, likely in room.names:
+        answer = m.ask(f"where is the {part}")
+        assert answer.found and answer.probability == pytest.approx(likely, abs=2e-3) and likely >= room.confidence
+        inside = [thing.position for thing in listed if thing.room == part]
+        assert inside == [thing.position for thing in m.things(["clocks"], room=part)]
+        assert len(inside) == m.ask(f"how many clocks are in the {part}").count
+        goals = m.ask(f"what is in the {part}", top=40).goals
+        assert [goal.position for goal in goals if goal.name == "clocks"] == inside
+    assert {thing.room for thing in listed} == set(room.parts)
+    page = page_of_things(MapLists(m), Wanted(room="kitchen"))["things"]
+    assert page and {row.get("room") for row in page} == {"kitchen"}
 
 
 def test_the_papers_rules_know_no_walls_and_no_things() -> None:

@@ -201,7 +201,7 @@ def room_lines(rooms: "Sequence[RoomAnswer]", frame: str = "recording") -> list[
         "area": lambda room: f"{room['area_m2']:.1f} m²",
         f"position ({frame} frame)": "position",
         "views": "views",
-        "or": lambda room: likely(room["names"][1:]),
+        "or": lambda room: "" if "parts" in room else likely(room["names"][1:]),
     }
     return table(columns | _storeys(rooms), rooms) if rooms else ["no rooms"]
 

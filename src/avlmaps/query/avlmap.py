@@ -23,7 +23,7 @@ from avlmaps.maps.store.folder import read
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.perception.protocols import read_room_contents
 from avlmaps.query import contents, modalities
-from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch, Whereabouts, region_named
+from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch, Whereabouts, part_named
 from avlmaps.query.edits import Edited, means
 from avlmaps.query.findings import MapNames, MapRooms
 from avlmaps.query.heatmap import HeatCache, Heatmap
@@ -204,10 +204,10 @@ class AVLMap:
         part = Part(Modality.AREA, word, _role(primary))
         encoder = self.encoders.views
         self.require_model(Kind.VIEWS)
-        settings, number = self.settings, region_named(self, word)
+        settings, own = self.settings, part_named(self, word)
         factor = area_factor(
             self.space, self.data.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes,
-            self._settled if number is None else partial(self._with_room, number),
+            self._settled if own is None else partial(self._with_part, own),
         )  # fmt: skip
         return Heatmap.of(factor, settings.found_at)
 
@@ -560,9 +560,9 @@ class AVLMap:
         assert self.room_regions is not None
         return self.edited.room_field(field.settled(self.room_regions, self._rooms.room_of_cells))
 
-    def _with_room(self, number: int, field: "RoomField") -> "RoomField":
-        # One room is a kind of its own behind all others.
-        return self._settled(field).with_certain([("", self._rooms.room_of_cells == number)])
+    def _with_part(self, own_name: str, field: "RoomField") -> "RoomField":
+        # One room, or part of one, is a kind of its own behind all others.
+        return self._settled(field).with_certain([("", self.where.cells_of(own_name))])
 
     @cached_property
     def things_in_rooms(self) -> "ThingsInRooms | None":

@@ -23,7 +23,7 @@ from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.modalities import sound_features
 from avlmaps.query.objects import Instances
 from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer, row_of
-from avlmaps.query.settings import FEWEST_VIEWS, FOUND_AT, LEAST_PART
+from avlmaps.query.settings import FEWEST_VIEWS, FOUND_AT
 from avlmaps.query.voxel_space import middle_of
 from avlmaps.query.words import unknown_note
 
@@ -99,29 +99,38 @@ class Room:
     views: int  # number of keyframes
     # Middle of what each of its keyframes saw, metres, recording frame.
     places: Float[np.ndarray, "k 3"] = field(repr=False)
-    # Kinds that it may be and how likely it is each, best first; several of an open plan.
+    # Kinds that it may be and how likely it is each, best first; of an open plan those of its parts, the largest first.
     names: tuple[tuple[str, float], ...] = ()
+    parts: tuple[str, ...] = ()  # kinds of the parts of an open plan; none for a room of one kind
     region: int = -1  # its number in ``AVLMap.room_regions``
     area_m2: float = 0.0  # of its floor
     # Corners on its floor, metres, recording frame.
     outline: Float[np.ndarray, "c 3"] = field(repr=False, default_factory=lambda: np.zeros((0, 3)))
     edited: str = ""  # who named it and when, in words; empty for what nobody corrected
 
-    def to_json(self, own_name: str) -> "RoomAnswer":
-        """Return the room as ``avlmaps rooms --json`` prints it, with a name that no other room of the map has."""
+    def to_json(self, own_names: Sequence[str]) -> "RoomAnswer":
+        """Return the room as ``avlmaps rooms --json`` prints it, with names that no other part of the map has."""
         names = [{"name": name, "probability": likely} for name, likely in self.names]
         outline = [[round(value, 3) for value in corner] for corner in self.outline.tolist()]
-        return row_of(self, RoomAnswer, room=own_name, probability=self.confidence, names=names, outline=outline)
+        return row_of(
+            self, RoomAnswer, room=joined(own_names), parts=list(own_names) if self.parts else None,
+            probability=self.confidence, names=names, outline=outline,
+        )  # fmt: skip
 
     @property
     def polygon(self) -> Float[np.ndarray, "c 2"]:
         """The corners of its outline, x and y, metres, recording frame."""
         return self.outline[:, :2]
 
-    def may_be(self, kind: Callable[[str], bool]) -> bool:
-        """Return whether the room is of a kind, or a part of it is: an open plan has several names."""
-        parts = [name for name, likely in self.names if likely >= LEAST_PART] if self.name != UNKNOWN else []
-        return any(map(kind, [self.name, *parts]))
+
+@dataclass(frozen=True, slots=True)
+class RoomPart:
+    """A room of one kind, or a part of an open plan."""
+
+    room: int  # number of the room in its list
+    kind: str
+    name: str  # that no other part has: the kind, and a number where there are several
+    probability: float  # of the kind
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,8 +163,29 @@ def put_storeys(rows: list[Row], storeys: "Storeys | None") -> list[Row]:
 
 def listed_rooms(rooms: Sequence[Room], storeys: "Storeys | None") -> "list[RoomAnswer]":
     """Return all rooms of a map as an answer lists them."""
-    names = numbered([room.name for room in rooms])
-    return put_storeys([room.to_json(name) for room, name in zip(rooms, names, strict=True)], storeys)
+    names = own_names_of(rooms)
+    return put_storeys([room.to_json(own) for room, own in zip(rooms, names, strict=True)], storeys)
+
+
+def parts_of(rooms: Sequence[Room]) -> tuple[RoomPart, ...]:
+    """Return the rooms and the parts of open plans, in the order of their rooms."""
+    every = [(number, room, kind) for number, room in enumerate(rooms) for kind in room.parts or (room.name,)]
+    names = numbered([kind for _, _, kind in every])
+    return tuple(
+        RoomPart(number, kind, name, dict(room.names).get(kind, room.confidence))
+        for (number, room, kind), name in zip(every, names, strict=True)
+    )
+
+
+def own_names_of(rooms: Sequence[Room]) -> list[tuple[str, ...]]:
+    """Return the names of the parts of each room, all different."""
+    parts = parts_of(rooms)
+    return [tuple(part.name for part in parts if part.room == number) for number in range(len(rooms))]
+
+
+def joined(names: Sequence[str]) -> str:
+    """Return the name of a room with these parts: "living room and kitchen" of an open plan."""
+    return " and ".join(names)
 
 
 def numbered(names: Sequence[str]) -> tuple[str, ...]:
@@ -268,15 +298,19 @@ def find_rooms(avlmap: "AVLMap", least_confidence: float = 0.0) -> list[Room]:
 
 
 def _rooms_by_floor(field: "RoomField", regions: "RoomRegions", places: Float[np.ndarray, "k 3"]) -> Iterator[Room]:
-    own, share, has_parts = regions.at(places), field.of_rooms(regions), field.parts_of_rooms(regions)
+    own, share, surest = regions.at(places), field.of_rooms(regions), field.surest_of_rooms(regions)
+    in_parts = field.parts_of_rooms(regions)
     for number in np.unique(own[own >= 0]).tolist():
         seen = places[own == number]
-        best: list[int] = np.argsort(-share[number], kind="stable")[:_MOST_ROOM_NAMES].tolist()
-        likely = [(field.kinds[k], round(float(share[number, k]), 3)) for k in best]
-        known = likely[0][1] >= FOUND_AT or bool(has_parts[number].any())
+        best: list[int] = np.argsort(-share[number], kind="stable").tolist()
+        parts = [k for k in best if in_parts[number, k]]
+        likely = [(field.kinds[k], round(float(surest[number, k]), 3)) for k in parts or best[:_MOST_ROOM_NAMES]]
+        several = tuple(field.kinds[k] for k in parts)
+        name = joined(several) or (likely[0][0] if likely[0][1] >= FOUND_AT else UNKNOWN)
+        confidence = min(one[1] for one in likely) if parts else likely[0][1]
         yield Room(
-            likely[0][0] if known else UNKNOWN, likely[0][1], plain_point(middle_of(seen)), len(seen), seen,
-            tuple(one for one in likely if one[1] >= _LEAST_ROOM_NAME) or (likely[0],),
+            name, confidence, plain_point(middle_of(seen)), len(seen), seen,
+            tuple(one for one in likely if one[1] >= _LEAST_ROOM_NAME) or (likely[0],), several,
             number, round(float(regions.areas_m2[number]), 2), regions.outline(number),
         )  # fmt: skip
 
@@ -295,7 +329,8 @@ class Whereabouts:
     def __init__(self, avlmap: "AVLMap") -> None:
         self._map, has_rooms = avlmap, avlmap.has(Kind.VIEWS)
         self.rooms = tuple(avlmap.rooms()) if has_rooms else ()
-        self.names = numbered([room.name for room in self.rooms])  # all different: the kind, and a number of several
+        self.parts = parts_of(self.rooms)  # with the names that things in them have
+        self.names = tuple(map(joined, own_names_of(self.rooms)))  # of the rooms, all different
         self.regions = avlmap.room_regions if has_rooms else None  # their floors; None without a floor plan
 
     @cached_property
@@ -316,51 +351,72 @@ class Whereabouts:
         """Return the number of each point's room, by its region, else of the nearest view; or ``NOWHERE``."""
         points = np.asarray(points, np.float64).reshape(-1, 3)
         field = self._map.room_field if self.rooms and len(points) else None
-        if field is None or self.regions is None:
-            return np.full(len(points), NOWHERE, np.int64)
-        listed = np.full(len(self.regions) + 1, NOWHERE, np.int64)
+        return np.full(len(points), NOWHERE, np.int64) if field is None else self._listed[field.room_of(points)]
+
+    @cached_property
+    def _listed(self) -> Int[np.ndarray, " r"]:
+        # The number of the room of each region; the last is that of no region.
+        listed = np.full((0 if self.regions is None else len(self.regions)) + 1, NOWHERE, np.int64)
         listed[[room.region for room in self.rooms]] = np.arange(len(self.rooms))
-        return listed[field.room_of(points)]
+        return listed
+
+    def parts_at(self, points: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+        """Return the number of the part that each point lies in, of the room that it lies in; or ``NOWHERE``."""
+        points = np.asarray(points, np.float64).reshape(-1, 3)
+        return self._parts(self.rooms_of(points), lambda rows, field: field.at(points[rows]))
+
+    def _parts(
+        self, room: Int[np.ndarray, " m"], likely: "Callable[[Int[np.ndarray, ' k'], RoomField], np.ndarray]"
+    ) -> Int[np.ndarray, " m"]:
+        # ``likely``: how likely some places, by their numbers, are each kind.
+        own, field = [part.room for part in self.parts], self._map.room_field if self.parts else None
+        first = np.array([own.index(number) for number in range(len(self.rooms))] + [NOWHERE])
+        part = first[room]
+        for number, one in enumerate(self.rooms):
+            rows = np.flatnonzero(room == number)
+            if one.parts and field is not None and len(rows):
+                part[rows] += likely(rows, field)[:, [field.kinds.index(kind) for kind in one.parts]].argmax(axis=1)
+        return part
+
+    def cells_of(self, name: str) -> Bool[np.ndarray, " c"]:
+        """Return the cells of the floor plan that a part covers, by its own name."""
+        field = self._map.room_field
+        assert field is not None and field.rooms is not None
+        part = self._parts(self._listed[field.rooms[1]], lambda rows, field: field.share[rows])
+        return part == [one.name for one in self.parts].index(name)
+
+    def names_at(self, points: Sequence[Sequence[float]] | np.ndarray) -> list[str | None]:
+        """Return the name of the part that each point lies in; None in no room."""
+        numbers: list[int] = self.parts_at(np.array(points, np.float64)).tolist()
+        return [None if number == NOWHERE else self.parts[number].name for number in numbers]
 
     def name_of(self, place: Sequence[float]) -> str | None:
-        """Return the name of the room of a place; None in a map without rooms."""
-        number = int(self.rooms_of(np.array([place]))[0])
-        return None if number == NOWHERE else self.names[number]
+        """Return the name of the part that a place lies in; None in a map without rooms."""
+        return self.names_at([place])[0]
 
     def with_rooms(self, things: "Sequence[Thing]") -> "list[Thing]":
         """Return things that know their rooms."""
-        rooms: list[int] = self.rooms_of(np.array([thing.position for thing in things]).reshape(-1, 3)).tolist()
-        named = [self.names[room] if room != NOWHERE else None for room in rooms]
+        named = self.names_at([thing.position for thing in things])
         return [replace(thing, room=name) for thing, name in zip(things, named, strict=True)]
 
     def areas_m2(self) -> Float[np.ndarray, " r"]:
         """Return the floor area of each room; none for a map without a floor plan."""
         return np.array([room.area_m2 for room in self.rooms], np.float64)
 
-    def parts_of(self, kind: Callable[[str], bool], points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
-        """Return which points (metres, recording frame) lie in a room whose name is meant, or such a part of one."""
-        points = np.asarray(points, np.float64).reshape(-1, 3)
-        own = self.rooms_of(points)
-        whole = np.array([kind(room.name) for room in self.rooms] + [False])[own]
-        part = np.array([room.may_be(kind) for room in self.rooms] + [False])[own] & ~whole
-        field = self._map.room_field if part.any() else None
-        if field is None:
-            return whole
-        likeliest = field.at(points[part]).argmax(axis=1)
-        whole[part] = np.array([kind(name) for name in field.kinds])[likeliest]
-        return whole
-
     def inside(self, asked: str, points: Sequence[Sequence[float]] | np.ndarray) -> Bool[np.ndarray, " m"]:
-        """Return which points lie in one room by its own name, or in all rooms and parts of a kind."""
-        places, own = np.array(points, np.float64).reshape(-1, 3), self._one_named(asked)
-        if own is not None and self.names[own] != self.rooms[own].name:
-            return self.rooms_of(places) == own
-        return self.parts_of(self._kind(asked), places)
+        """Return which points lie in one room or part by its own name, or in all of a kind."""
+        return np.array([*self._meant(asked), False])[self.parts_at(np.array(points, np.float64))]
 
     def has(self, asked: str) -> bool:
         """Return whether a word names a room of the map, or a part of one."""
-        kind = self._kind(asked)
-        return self._one_named(asked) is not None or any(room.may_be(kind) for room in self.rooms)
+        return any(self._meant(asked))
+
+    def _meant(self, asked: str) -> list[bool]:
+        # Which parts a word means: one by its own name, those of a room by its, or all of a kind.
+        word, kind = _plain(asked), self._kind(asked)
+        own = [{part.name.casefold(), self.names[part.room].casefold()} - {part.kind.casefold()} for part in self.parts]
+        named = [word in names for names in own]
+        return named if any(named) else [kind(part.kind) for part in self.parts]
 
     def require(self, asked: str) -> None:
         """Raise ``QueryError`` where a word names no room; the sentence lists those that there are."""
@@ -376,26 +432,20 @@ class Whereabouts:
     def numbers_of(self, asked: str) -> list[int]:
         """Return the numbers of the rooms that a word names, or parts of which it names. ``QueryError``: see above."""
         self.require(asked)
-        own, kind = self._one_named(asked), self._kind(asked)
-        if own is not None:
-            return [own]
-        whole = [number for number, room in enumerate(self.rooms) if kind(room.name)]
-        return whole or [number for number, room in enumerate(self.rooms) if room.may_be(kind)]
-
-    def _one_named(self, asked: str) -> int | None:
-        return next((number for number, name in enumerate(self.names) if name.casefold() == _plain(asked)), None)
+        meant = [part for part, is_meant in zip(self.parts, self._meant(asked), strict=True) if is_meant]
+        called = [part for part in meant if part.name.casefold() == _plain(asked)]
+        return sorted({part.room for part in called or meant})
 
     def _kind(self, asked: str) -> Callable[[str], bool]:
         word = _plain(asked)
-        if word == UNKNOWN and word in (room.name for room in self.rooms):  # else "the room" is any room
+        if word == UNKNOWN and word in (part.kind for part in self.parts):  # else "the room" is any room
             return lambda kind: kind == word
         return lambda kind: kind.casefold() == word or lexicon().is_a(kind, word, EntryKind.ROOM)
 
     @cached_property
-    def numbered(self) -> dict[str, int]:
-        """The region of each room that shares its name with others, by the name with its number."""
-        rooms = zip(self.names, self.rooms, strict=True)
-        return {plain_name(name): room.region for name, room in rooms if name != room.name}
+    def numbered(self) -> dict[str, str]:
+        """The own name of each part that shares its kind with others, by that name as questions have it."""
+        return {plain_name(part.name): part.name for part in self.parts if part.name != part.kind}
 
 
 _POSSESSIVES = ("the ", "a ", "an ", "my ", "your ", "our ")
@@ -411,15 +461,15 @@ def _plain(asked: str) -> str:
     return " ".join(asked.casefold().split()).removeprefix("the ")
 
 
-def _numbered(avlmap: "AVLMap") -> dict[str, int]:
+def _numbered(avlmap: "AVLMap") -> dict[str, str]:
     try:
         return avlmap.where.numbered
     except AvlmapsError:  # its encoder is not here: a question of something else needs none
         return {}
 
 
-def region_named(avlmap: "AVLMap", phrase: str) -> int | None:
-    """Return the region of the room that a phrase names with its number; None where a person called something so."""
+def part_named(avlmap: "AVLMap", phrase: str) -> str | None:
+    """Return the own name of the part that a phrase names by its number; None where a person called something so."""
     if not _NUMBERED.search(phrase) or avlmap.edited.knows(phrase):
         return None
     return _numbered(avlmap).get(plain_name(phrase))

@@ -320,12 +320,13 @@ def _room_of(lists: _Lists) -> Answer:
     if not subject.found:
         return replace(subject, goals=())
     where, goal = lists.avlmap.where, subject.goals[0]
-    number = int(where.rooms_of(np.array([goal.position]))[0])
+    number = int(where.parts_at(np.array([goal.position]))[0])
     if number == NOWHERE:
         raise QueryError("The map has no rooms: it was built without a model of views.")
-    inside = _goal(goal.position, min(goal.probability, where.rooms[number].confidence), where.names[number], goal.size)
+    room = where.parts[number]
+    inside = _goal(goal.position, min(goal.probability, room.probability), room.name, goal.size)
     words = in_words([one.part for one in subject.parts])
-    return lists.answer([inside], placed(f"{words} is in {the_room(where.names[number])}", inside), subject)
+    return lists.answer([inside], placed(f"{words} is in {the_room(room.name)}", inside), subject)
 
 
 def _contents(lists: _Lists) -> Answer:
@@ -336,8 +337,10 @@ def _contents(lists: _Lists) -> Answer:
     where, things = lists.avlmap.where, lists.things()
     inside = where.inside(name, [thing.position for thing in things])
     goals = [_thing_goal(thing) for thing, is_in in zip(things, inside, strict=True) if is_in]
-    text = f"In {the_room(name)}: {counted([goal.name for goal in goals])}." if where.has(name) else _no_room(name)
-    return lists.answer(goals, text, subject)
+    number = f"{len(goals)} things: " if lists.question.counts and goals else ""
+    text = f"In {the_room(name)}: {number}{counted([goal.name for goal in goals])}."
+    text = text if where.has(name) else _no_room(name)
+    return lists.answer(goals, text, subject, count=len(goals))
 
 
 def _beside(lists: _Lists) -> Answer:

@@ -165,44 +165,47 @@ class RoomField:
 
     def of_rooms(self, regions: RoomRegions) -> Float[np.ndarray, "r n"]:
         """Return which share of each room's floor is of each kind; rows add up to 1."""
-        total = self._sum_of_floors(regions, self.share.astype(np.float64)) + 1e-6
+        total = self._over_floors(regions, self.share) + 1e-6
         return total / total.sum(axis=1, keepdims=True)
 
-    def _sum_of_floors(self, regions: RoomRegions, of_cells: Float[np.ndarray, "c n"]) -> Float[np.ndarray, "r n"]:
+    def surest_of_rooms(self, regions: RoomRegions) -> Float[np.ndarray, "r n"]:
+        """Return how likely each kind is where a room is most likely of it: in an open plan, in its part."""
+        return self._over_floors(regions, self.share, np.maximum)
+
+    def _over_floors(
+        self, regions: RoomRegions, of_cells: Float[np.ndarray, "c n"] | Bool[np.ndarray, "c n"], by: np.ufunc = np.add
+    ) -> Float[np.ndarray, "r n"]:
         room = np.where(self.plan.open.reshape(-1), regions.of_plan_cells, NONE)
         own = np.flatnonzero(room != NONE)
         total = np.zeros((len(regions), of_cells.shape[1]))
-        np.add.at(total, room[own], of_cells[own])
+        by.at(total, room[own], of_cells[own])
         return total
-
-    def whole_rooms(self, regions: RoomRegions) -> Float[np.ndarray, "r n"]:
-        """Return how likely each room is each kind, if it is of one kind; rows add up to 1."""
-        # The looks at different parts of one floor are evidence for one room: their mean log counts ``_LOOKS`` times. A
-        # room that leads to few others is seldom a passage, though one sees a hallway through its door.
-        cells = self._sum_of_floors(regions, np.ones((len(self.share), 1)))
-        nats = self._sum_of_floors(regions, np.log(np.maximum(self.share, _LEAST_SHARE))) / np.maximum(cells, 1.0)
-        passage = _among(self.kinds, _PASSAGES)
-        fewest = np.minimum(regions.neighbours, len(_PASSAGE_ODDS) - 1)
-        total = np.exp(_LOOKS * nats) * np.where(passage, np.array(_PASSAGE_ODDS)[fewest][:, None], 1.0)
-        return total / total.sum(axis=1, keepdims=True)
 
     def parts_of_rooms(self, regions: RoomRegions) -> Bool[np.ndarray, "r n"]:
         """Return which kinds are parts of which rooms: of an open plan, those of much of its sure floor."""
-        sure = self._sum_of_floors(regions, (self.share >= FOUND_AT).astype(np.float64))
+        sure = self._over_floors(regions, self.share >= FOUND_AT)
         parts = sure >= np.maximum(LEAST_PART * sure.sum(axis=1, keepdims=True), _LEAST_PART_M2 / CELL_M**2)
         parts &= _among(self.kinds, _OPEN)
         parts[np.count_nonzero(parts, axis=1) < 2] = False
         return parts
 
     def settled(self, regions: RoomRegions, room_of_cell: Int[np.ndarray, " c"]) -> "RoomField":
-        """Return the field in which a room is of one kind, and each place of an open plan of one of its parts."""
+        """Return the field in which a room, or each part of an open plan, is of one kind, as likely everywhere."""
         inside = np.flatnonzero(room_of_cell != NONE)
-        room = room_of_cell[inside]
-        parts, whole = self.parts_of_rooms(regions)[room], self.whole_rooms(regions)[room]
-        in_parts = np.where(parts, self.share[inside] + 1e-6, 0.0)
-        in_parts /= np.maximum(in_parts.sum(axis=1, keepdims=True), 1e-12)
+        room, own = room_of_cell[inside], self.share[inside]
+        kind = np.where(self.parts_of_rooms(regions)[room], own, -1.0).argmax(axis=1)
+        parts, part = np.unique(room * len(self.kinds) + kind, return_inverse=True)
+        # The looks at different places of one floor are evidence for one room: their mean log counts ``_LOOKS`` times.
+        # A room that leads to few others is seldom a passage, though one sees a hallway through its door.
+        floor = self.plan.open.reshape(-1)[inside] & (regions.of_plan_cells[inside] == room)
+        nats = np.zeros((len(parts), len(self.kinds)))
+        np.add.at(nats, part[floor], np.log(np.maximum(own[floor], _LEAST_SHARE)))
+        nats /= np.maximum(np.bincount(part, floor, len(parts)), 1.0)[:, None]
+        fewest = np.minimum(regions.neighbours[parts // len(self.kinds)], len(_PASSAGE_ODDS) - 1)
+        passage = _among(self.kinds, _PASSAGES)
+        whole = np.exp(_LOOKS * nats) * np.where(passage, np.array(_PASSAGE_ODDS)[fewest][:, None], 1.0)
         share = self.share.copy()
-        share[inside] = np.where(parts.any(axis=1, keepdims=True), in_parts, whole)
+        share[inside] = (whole / whole.sum(axis=1, keepdims=True))[part]
         return replace(self, share=share, rooms=(regions, room_of_cell))
 
 

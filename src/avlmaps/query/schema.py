@@ -312,12 +312,15 @@ class RoomAnswer(TypedDict):
 
     name: Annotated[str, Meta(description="kind of room")]
     room: Annotated[str, Meta(description="its own name: the kind, and a number where there are several of a kind")]
+    parts: NotRequired[
+        Annotated[list[str], Meta(description="of an open plan: the own names of its parts, as things have them")]
+    ]
     confidence: Unit
     position: Position
     views: Annotated[int, Meta(description="number of keyframes that show it")]
     storey: NotRequired[Storey]
     probability: Annotated[float, Meta(ge=0.0, le=1.0, description="of the name")]
-    names: Annotated[list[RoomName], Meta(description="kinds that it may be, best first; several of an open plan")]
+    names: Annotated[list[RoomName], Meta(description="kinds that it may be, best first; or those of its parts")]
     area_m2: Annotated[float, Meta(description="of its floor")]
     outline: Annotated[list[Position], Meta(description="corners on its floor, counter-clockwise from above")]
     edited: NotRequired[Edited]

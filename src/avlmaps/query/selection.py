@@ -111,7 +111,7 @@ class Selected:
     """One thing that is meant."""
 
     thing: ThingAnswer  # as it is listed
-    room: int  # number of its room; negative without one
+    part: int  # number of its room, or its part of one, among ``Whereabouts.parts``; negative without one
     away_m: float | None = None  # from the place that it should be near, metres; None where none is named
 
 
@@ -124,8 +124,8 @@ def page_of_things(lists: MapLists, wanted: Wanted) -> ThingsPage:
         rows = [ListedThing(**thing) for thing in lists.wanted(wanted)]
     else:
         chosen, about = selected(lists, wanted)
-        names = lists.avlmap.where.names
-        rows = [_row(one, names[one.room] if one.room >= 0 else None) for one in chosen]
+        parts = lists.avlmap.where.parts
+        rows = [_row(one, parts[one.part].name if one.part >= 0 else None) for one in chosen]
     top = max(len(rows), 1) if wanted.top is None else wanted.top
     things, pages = page_of(rows, top, wanted.page, "things")
     answer: ThingsPage = {"things": things, "total": len(rows), "page": wanted.page, "pages": pages}
@@ -141,8 +141,8 @@ def things_with_rooms(lists: MapLists, wanted: Wanted) -> list[Selected]:
     things = lists.wanted(wanted)
     key = ("rooms of things", wanted.least, tuple(wanted.name), wanted.structure, wanted.at)
     places = np.array([thing["position"] for thing in things], np.float64).reshape(-1, 3)
-    rooms: list[int] = lists.once(key, lambda: lists.avlmap.where.rooms_of(places).tolist())
-    return [Selected(thing, room) for thing, room in zip(things, rooms, strict=True)]
+    parts: list[int] = lists.once(key, lambda: lists.avlmap.where.parts_at(places).tolist())
+    return [Selected(thing, part) for thing, part in zip(things, parts, strict=True)]
 
 
 def selected(lists: MapLists, wanted: Wanted) -> tuple[list[Selected], NearAnswer | None]:

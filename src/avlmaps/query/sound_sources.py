@@ -274,10 +274,10 @@ class _Places:
 
     def _rooms_of(self, known: SourceMap, joined: Joined) -> tuple[tuple[str, float], ...]:
         likely = joined.share > 1e-5
-        number = self._rooms.rooms_of(known.place[likely])
-        share = np.bincount(np.maximum(number, 0), joined.share[likely] * (number >= 0), len(self._rooms.names))
+        number, parts = self._rooms.parts_at(known.place[likely]), self._rooms.parts
+        share = np.bincount(np.maximum(number, 0), joined.share[likely] * (number >= 0), len(parts))
         order: list[int] = np.argsort(-share, kind="stable")[:_MOST_NAMED].tolist()
-        return tuple((self._rooms.names[i], round(float(share[i]), 3)) for i in order if share[i] >= _LEAST_NAMED)
+        return tuple((parts[i].name, round(float(share[i]), 3)) for i in order if share[i] >= _LEAST_NAMED)
 
     def _things_of(self, known: SourceMap, joined: Joined) -> tuple[tuple[str, tuple[float, float, float], float], ...]:
         likely = [(self._things[number], share) for number, share in things_that_may_be(known, joined, self._things)]

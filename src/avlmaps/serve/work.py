@@ -290,7 +290,7 @@ def describe_building(task: WorkInput, query: NoQuery) -> dict[str, Any]:
 
 def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, Any]:
     lists = lists_of(task)
-    rooms, names = lists.avlmap.where.names, query.name
+    parts, names = lists.avlmap.where.parts, query.name
     known = [name for name in names if task.map.avlmap.knows(name)]
     unknown = [name for name in names if name not in known]
     wanted = Wanted(**{**msgspec.structs.asdict(query), "name": known})
@@ -298,7 +298,7 @@ def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, A
     rows: list[dict[str, Any]] = [
         {
             **{key: one.thing[key] for key in ("name", "confidence", "position", "size")},
-            "room": rooms[one.room] if one.room >= 0 else None,
+            "room": parts[one.part].name if one.part >= 0 else None,
             "distance_m": one.away_m,
             "heard": one.thing.get("heard", [])[:_MOST_HEARD] or None,
         }
@@ -315,14 +315,13 @@ def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, A
 def tool_rooms(task: WorkInput, query: requests.RoomsToolQuery) -> dict[str, Any]:
     lists = lists_of(task)
     where = lists.avlmap.where
-    count = Counter(one.room for one in selection.things_with_rooms(lists, Wanted()))
+    count = Counter(where.parts[one.part].room for one in selection.things_with_rooms(lists, Wanted()) if one.part >= 0)
     floors = where.floors_of(_places([room.position for room in where.rooms]))
     if query.floor is not None and not 0 <= query.floor < where.floor_count:
         raise RequestError(f"There is no floor {query.floor}; the map has {where.floor_count}, counted from 0.")
     wanted = range(len(where.rooms))
     if names := query.name:
-        known = {room.name.casefold() for room in where.rooms} | {name.casefold() for name in where.names}
-        wanted = sorted({k for name in names if name.casefold() in known for k in where.numbers_of(name)})
+        wanted = sorted({k for name in names if where.has(name) for k in where.numbers_of(name)})
     rows = [
         {
             "room": where.names[k],
@@ -342,7 +341,7 @@ def tool_rooms(task: WorkInput, query: requests.RoomsToolQuery) -> dict[str, Any
 def tool_sounds(task: WorkInput, query: requests.SoundsToolQuery) -> dict[str, Any]:
     lists, names = lists_of(task), {name.casefold() for name in query.name}
     where, sounds = lists.avlmap.where, lists.sounds()
-    rooms = where.rooms_of(_places([sound["position"] for sound in sounds]))
+    rooms = where.names_at(_places([sound["position"] for sound in sounds]))
     rows = [
         {
             "name": _first_name(sound),
@@ -350,9 +349,9 @@ def tool_sounds(task: WorkInput, query: requests.SoundsToolQuery) -> dict[str, A
             "onset_s": sound["onset_s"],
             "offset_s": sound["offset_s"],
             "position": sound["position"],
-            "room": where.names[room] if room >= 0 else None,
+            "room": room,
         }
-        for sound, room in zip(sounds, rooms.tolist(), strict=True)
+        for sound, room in zip(sounds, rooms, strict=True)
         if not names or _first_name(sound).casefold() in names
     ]
     return _paged(task, "sounds", rows, query.top, query.page)

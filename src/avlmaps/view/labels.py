@@ -12,7 +12,7 @@ from jaxtyping import Int, UInt8
 from avlmaps.core.arrays import Bool, Float
 from avlmaps.core.errors import AvlmapsError, QueryError
 from avlmaps.maps.sources.candidates import CELL_M
-from avlmaps.query.contents import listed_rooms, numbered
+from avlmaps.query.contents import joined, listed_rooms, own_names_of
 from avlmaps.query.export import heat_colors, shades_of
 from avlmaps.query.words import VoxelNamer, keyframes_that_saw
 from avlmaps.view.layout import Layout, as_bytes
@@ -184,7 +184,7 @@ def _thing_labels(count: int, things: "Sequence[Thing]") -> tuple[tuple[str, ...
 def _room_labels(
     avlmap: "AVLMap", rooms: "Sequence[Room]", rows: Int[np.ndarray, " m"]
 ) -> tuple[tuple[str, ...], UInt8[np.ndarray, " m"]]:
-    names = numbered([room.name for room in rooms])[:_MOST]
+    names = tuple(map(joined, own_names_of(rooms)))[:_MOST]
     regions = avlmap.room_regions
     if not names or not len(rows) or regions is None:
         return names, np.zeros(len(rows), np.uint8)

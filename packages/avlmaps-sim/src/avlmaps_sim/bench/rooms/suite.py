@@ -264,8 +264,9 @@ def _scene(job: SceneJob) -> dict[str, Judged]:
 
 
 def rooms_by_walls(avlmap: "AVLMap", floor: Floor) -> list[Listed]:
-    """Return the rooms of a storey as a map lists them."""
-    return [Listed(room.name, floor.mask(room.outline), room.area_m2 or 0.0) for room in avlmap.rooms()]
+    """Return the rooms of a storey as a map lists them, an open plan under the name of its largest part."""
+    rooms = ((next(iter(room.parts), room.name), room) for room in avlmap.rooms())
+    return [Listed(name, floor.mask(room.outline), room.area_m2 or 0.0) for name, room in rooms]
 
 
 _COLUMNS = [
