@@ -123,6 +123,10 @@ def test_a_sentence_without_a_map_or_without_quotes_is_told_so(built: Path, run)
     for words, told in (
         (("query", "the sofa"), "the map comes first: avlmaps query MAP 'the sofa'"),
         (("query", built, "the", "red", "sofa"), f"put the sentence in quotes: avlmaps query {built} 'the red sofa'"),
+        (
+            ("query", built, "the", "sofa", "--top", "2"),
+            f"put the sentence in quotes: avlmaps query {built} 'the sofa' --top 2",
+        ),
         (("go", "the sofa"), "the map comes first, and there is none at 'the sofa'"),
     ):
         status, out, err = run(*words)

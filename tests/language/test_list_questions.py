@@ -128,6 +128,12 @@ def test_two_sounds_are_asked_for_one_at_a_time() -> None:
         read_list("when did the phone ring and the baby cry")
 
 
-def test_what_is_between_two_things_holds_both() -> None:
-    read = read_list("what is between the sofa and the tv?")
+@pytest.mark.parametrize("begins", ["what is ", "", "the thing ", "everything that is "])
+def test_what_is_between_two_things_holds_both(begins: str) -> None:
+    read = read_list(f"{begins}between the sofa and the tv?")
     assert read is not None and (read.name, read.other) == ("sofa", "tv")
+
+
+def test_the_things_of_a_room_are_counted_there() -> None:
+    read = read_list("how many things are in the kitchen?")
+    assert read is not None and (read.of, read.name, read.counts) == (Listed.CONTENTS, "kitchen", True)

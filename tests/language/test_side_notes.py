@@ -12,6 +12,9 @@ from avlmaps.language.questions import read_question
         ("the cabinet left of the window", "left of"),
         ("the chair behind the table", "behind"),
         ("where is the lamp in front of the sofa?", "in front of"),
+        ("the tv on the table", "on"),
+        ("the cup in the cabinet", "in"),
+        ("the chair facing the window", "facing"),
     ],
 )
 def test_a_question_with_a_side_says_that_near_is_meant(sentence: str, side: str) -> None:
@@ -21,6 +24,11 @@ def test_a_question_with_a_side_says_that_near_is_meant(sentence: str, side: str
 @pytest.mark.parametrize("sentence", ["the cabinet near the window", "where is the sofa?", "the table in the kitchen"])
 def test_a_question_without_one_has_no_such_note(sentence: str) -> None:
     assert not any("side" in note for note in read_question(sentence).notes)
+
+
+def test_a_place_in_a_room_is_the_room() -> None:
+    (note,) = read_question("the lamp at the end of the hallway").notes
+    assert note == "'at the end of' is read as 'in': the room counts, the place in it does not."
 
 
 def test_a_command_to_drive_to_a_side_uses_it() -> None:

@@ -114,8 +114,11 @@ def meant(words: Sequence[str], printed: str, verbs: Mapping[str, type[Verb]]) -
     if "sentence" in verbs[name].__dataclass_fields__:
         if sentence.startswith("Missing from") and plain and not Path(plain[0]).exists():
             return f"{name} needs a map and a sentence; the map comes first, and there is none at {plain[0][:80]!r}."
-        if "Unrecognized" in sentence and len(plain) > 2:
-            return f"put the sentence in quotes: avlmaps {name} {shlex.join([plain[0], ' '.join(plain[1:])])}"
+        before = list(takewhile(lambda word: word.startswith("-"), words[1:]))
+        run = list(takewhile(lambda word: not word.startswith("-"), words[1 + len(before) :]))
+        if "Unrecognized" in sentence and len(run) > 2 and Path(run[0]).exists():
+            quoted = [*before, run[0], " ".join(run[1:]), *words[1 + len(before) + len(run) :]]
+            return f"put the sentence in quotes: avlmaps {name} {shlex.join(quoted)}"
     return sentence
 
 

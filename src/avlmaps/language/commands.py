@@ -177,7 +177,7 @@ def _lost_sides(intents: Sequence[act.Intent], sentence: Sentence) -> tuple[str,
     # The side is where it drives or looks.
     if any(isinstance(step, act.Beside | act.Face | act.StopAt) for step in steps):
         return ()
-    return sentence.side_notes if any(target.near for intent in intents for target in act.targets_of(intent)) else ()
+    return sentence.side_notes(target for intent in intents for target in act.targets_of(intent))
 
 
 def _check_length(text: str) -> None:

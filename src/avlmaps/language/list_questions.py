@@ -121,7 +121,8 @@ def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
     change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(said["change"])), "")
     name, since = room or thing or said["seen"], said["visit"] + said["date"]
     how = "rooms" if said["names"] else how
-    return ListQuestion(of, name, since=since, change=change, how=how, other=said["other"])
+    counts = bool(said["counts"])
+    return ListQuestion(of, name, counts=counts, since=since, change=change, how=how, other=said["other"])
 
 
 def _heard(of: Listed, said: Mapping[str, str]) -> ListQuestion | None:

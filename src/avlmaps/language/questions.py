@@ -183,7 +183,7 @@ def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
     for one in targets:
         if one.pick not in (Pick.ANY, Pick.NEAREST) or one.number > 1:
             raise QueryError(f"A map cannot choose {phrase(replace(one, near=()))!r}; say what it is near.")
-    sides = sentence.side_notes if any(target.near for target in targets) else ()
+    sides = sentence.side_notes((*inquiry.of, *targets))
     notes = (*sentence.notes, *resolver.notes, *sides, *_from_nowhere(sentence, targets))
     return AskedSentence(Inquiry(inquiry.ask, targets), tuple(dict.fromkeys(notes)))
 

@@ -32,10 +32,14 @@ ASK = "This seems to be {language}. Commands and questions have to be in English
 _ANOTHER = "another language than English"
 _LATIN = "LATIN"
 _SEVERAL = 3  # words; fewer may be a name that English borrowed
-_SIDE = re.compile(
-    r"\b((?:left|right|north|south|east|west|in front) of|behind|opposite|"
-    r"across from|underneath|under|beneath|below|above|over)\b"
+# What says where beside a thing, or in a room, another is. A map knows how far it is, and whether it is in the room.
+_SIDE = (
+    r"\b((?:(?:at|on|to|in) the )?(?:left|right|north|south|east|west|front|far end|end|back|top|bottom|foot|head|edge|"
+    r"corner|middle|centre|center|other side|side) of|in front of|on top of|behind|opposite(?: to| of)?|across from|"
+    r"underneath|under|beneath|below|above|over|along|against|facing|outside{0}) "
+    r"(?:(?:the|a|an|my|our|this|that) )?{1}\b"
 )
+_ON_THINGS = "|on|onto|upon|in|inside|into"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,13 +85,15 @@ class Sentence:
         """One sentence for each misspelt word, and for each order that is read at another place."""
         return (*(f"'{said}' is read as '{meant}'." for said, meant in self.respelt.items()), *self.order_notes)
 
-    @property
-    def side_notes(self) -> tuple[str, ...]:
-        """One sentence for each side of a thing that it speaks of: what is near has none."""
-        sides = _SIDE.findall(" ".join(token.text for token in self.tokens))
-        return tuple(
-            f"'{side}' is read as 'near': distance counts, the side does not." for side in dict.fromkeys(sides)
-        )
+    def side_notes(self, targets: Iterable[Target]) -> tuple[str, ...]:
+        """One sentence for each relation of targets to what is near them that is read as a wider one."""
+        words, notes = " ".join(token.text for token in self.tokens), dict[str, None]()
+        for near in (near for target in targets for near in target.near if not near.is_file):
+            is_room = near.kind is TargetKind.AREA
+            read = "'in': the room counts, the place in it" if is_room else "'near': distance counts, the side"
+            sides = re.findall(_SIDE.format("" if is_room else _ON_THINGS, re.escape(near.name)), words)
+            notes |= dict.fromkeys(f"'{side}' is read as {read} does not." for side in sides)
+        return tuple(notes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,9 +18,10 @@ from avlmaps.maps.store.folder import stamp
 from avlmaps.maps.storeys import said_storeys as storeys_in_words
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
+from avlmaps.query.answer import fitting
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.factors import Factor, NearThings
-from avlmaps.query.goals import Goal, as_likely
+from avlmaps.query.goals import MOST_GOALS, Goal, as_likely
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.lists import at_storey, storeys_meant
 from avlmaps.query.sound_sources import no_sources
@@ -53,7 +54,6 @@ def kind_of(value: object) -> str:
 
 
 _SIDES = {"north": (0.0, 1.0), "south": (0.0, -1.0), "east": (1.0, 0.0), "west": (-1.0, 0.0)}  # of the level frame
-_MOST_GOALS = 30
 _MOST_LISTED = 9  # things that fit equally, in the sentence that asks which
 Heats = dict[tuple[object, ...], Heatmap]
 """The answers of one map, as it was opened, by the query."""
@@ -98,10 +98,10 @@ def things_in(heat: Heatmap, guess: bool = False) -> list[Destination]:
         GoalNotFoundError: there is none.
     """
     if heat.found:
-        found = [goal for goal in heat.goals(_MOST_GOALS) if goal.probability >= heat.found_at]
+        found = [goal for goal in heat.goals(MOST_GOALS) if goal.probability >= heat.found_at]
         return [_thing(heat, heat.lead, goal) for goal in found]
     for tried in _guesses(heat) if guess else ():
-        goals = tried.goals(_MOST_GOALS)
+        goals = tried.goals(MOST_GOALS)
         if goals:
             return [_thing(tried, tried.lead, goal) for goal in goals]
     raise GoalNotFoundError(explain_absence(heat, guess))
@@ -295,22 +295,23 @@ class Seeker:
 
     def _of_equal(self, things: list[Destination]) -> Destination:
         """Return the likeliest thing; of several that fit equally the one that was chosen."""
-        fitting = as_likely(things)
-        name = fitting[0].name
-        if len(fitting) > 1 and name not in self._meant and self._numbers:
+        equal = as_likely(things)
+        name = equal[0].name
+        if len(equal) > 1 and name not in self._meant and self._numbers:
             self._meant[name] = self._numbers.pop(0)
-        number = 1 if len(fitting) == 1 else self._meant.get(name, 0)
-        if 1 <= number <= len(fitting):
-            if len(fitting) > 1:
-                where = self._places_of(fitting[number - 1 : number])[0]
-                self.note(f"of {len(fitting)} places for {name} number {number} is meant: {where}")
-            return fitting[number - 1]
-        self.choices = self._places_of(fitting)
+        number = 1 if len(equal) == 1 else self._meant.get(name, 0)
+        if 1 <= number <= len(equal):
+            if len(equal) > 1:
+                where = self._places_of(equal[number - 1 : number])[0]
+                self.note(f"of {len(equal)} places for {name} number {number} is meant: {where}")
+            return equal[number - 1]
+        self.choices = self._places_of(equal)
         listed = "; ".join(f"{at}: {where}" for at, where in enumerate(self.choices[:_MOST_LISTED], 1))
-        more = f"; and {len(fitting) - _MOST_LISTED} more" if len(fitting) > _MOST_LISTED else ""
+        more = f"; and {len(equal) - _MOST_LISTED} more" if len(equal) > _MOST_LISTED else ""
+        several = f"{fitting(len(equal), sum(thing.found for thing in things))} {name} equally: {listed}{more}."
         raise SeveralFitError(
-            f"{len(fitting)} places fit {name} equally: {listed}{more}. Which one? Say the nearest, or what it is "
-            f"near, or choose one by its number ({option('choose', '1', python='(1,)')}).",
+            f"{several} Which one? Say the nearest, or what it is near, or choose one by its number "
+            f"({option('choose', '1', python='(1,)')}).",
             self.choices,
         )
 

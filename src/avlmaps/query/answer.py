@@ -34,7 +34,7 @@ class PartAnswer:
 
     part: Part  # the part
     peak: float  # its highest heat anywhere: at the map's voxels and at the places that the heat falls from
-    found: bool  # whether the map holds it: by itself, or since the whole is found
+    found: bool  # whether the map holds it, by itself
     understood: str = ""  # what the encoder could act on
     note: str = ""  # why it was not found, or what to know; ``""`` for nothing
     probability: float = 0.0  # that the map holds it
@@ -129,6 +129,7 @@ _MOST_NAMED = 3
 _ONE_PLACE_M = 0.5
 _HEAD = re.compile(r" (?:with|of|from|for|in|on) ")  # what is before it is the thing: "shelf with books"
 UNDERSTOOD_ONLY = "understood only"
+_PLURALS = {Modality.OBJECT: EntryKind.THING, Modality.AREA: EntryKind.ROOM}
 _PHOTO, _CLIP = "the place of the photo", "a sound like the clip"
 
 
@@ -138,8 +139,13 @@ def in_words(parts: Sequence[Part]) -> str:
     return " ".join([_named(lead), *(_context_words(part) for part in parts if part is not lead)])
 
 
-def found_text(parts: Sequence[PartAnswer], goal: Goal, count: int | None = None, alike: Sequence[Goal] = ()) -> str:
-    """Return where the first goal of an answer that is found is, how many there are, and which words were no help."""
+def found_text(
+    parts: Sequence[PartAnswer], goal: Goal, count: int | None = None, alike: Sequence[Goal] = (), of: int = 0
+) -> str:
+    """Return where the first goal of an answer that is found is, how many there are, and which words were no help.
+
+    ``alike`` of ``of`` goals that are found fit equally.
+    """
     spelt = [replace(one.part, query=_spelt(one)) for one in parts]
     if count is not None:
         text = f"Counted: {count}. The most likely is at {_likely(goal)}."
@@ -147,13 +153,22 @@ def found_text(parts: Sequence[PartAnswer], goal: Goal, count: int | None = None
         places = " and ".join(f"at {place_text(one.position)}" for one in alike[:_MOST_NAMED])
         more = f" and {len(alike) - _MOST_NAMED} more" if len(alike) > _MOST_NAMED else ""
         known = f"{places}{more}, probability {alike[0].probability:.2f}"
-        text = f"{len(alike)} places fit {in_words(spelt)} equally: {known}. {WHICH}"
+        lead = next(one.part for one in parts if one.part.role is Role.PRIMARY)
+        which = "" if _is(lead) == "are" else f" {WHICH}"  # of several things all may be meant
+        text = f"{fitting(len(alike), of)} {in_words(spelt)} equally: {known}.{which}"
     else:
         lead, sought = next(part for part in spelt if part.role is Role.PRIMARY), in_words(spelt)
         text = f"the most likely of {sought} is" if _is(lead) == "are" else f"{sought} is most likely"
         text = sentence_of(f"{text} at {_likely(goal)}")
-    halves = (one.note.split("; ")[0] for one in parts if one.note.startswith(UNDERSTOOD_ONLY))
+    halves = [one.note.split("; ")[0] for one in parts if one.note.startswith(UNDERSTOOD_ONLY)]
+    unsure = [one for one in parts if one.part.role is not Role.PRIMARY and not one.found]
+    halves += [f"{_not_found(one.part)} by itself: its probability is {one.probability:.2f}" for one in unsure]
     return " ".join([text, *map(sentence_of, halves)])
+
+
+def fitting(alike: int, found: int) -> str:
+    """Return how many places fit equally, as a sentence begins: of those that are found, where more are."""
+    return f"{alike} places fit" if found <= alike else f"{alike} of {found} places that are found fit"
 
 
 def _spelt(one: PartAnswer) -> str:
@@ -194,13 +209,16 @@ def _bare(part: Part) -> str:
     if part.is_file:
         return (_PHOTO if part.modality is Modality.IMAGE else _CLIP).split(" ", 1)[1]
     name = part.query.removeprefix("the ").removeprefix("a ").removeprefix("an ")
+    is_colour = not {*name.split()[-1:]}.isdisjoint(lexicon().colours) and lexicon().find(name) is None
+    if is_colour and part.modality is Modality.OBJECT:  # "something blue"
+        return f"{name} thing"
     return f"sound of {name}" if part.modality is Modality.SOUND else name
 
 
 def _is(part: Part) -> str:
-    last = _HEAD.split(part.query)[0].split()[-1:] if part.modality is Modality.OBJECT else []
-    entry = lexicon().find(last[0], EntryKind.THING) if last and singulars_of(last[0]) else None
-    return "is" if entry is None else "are"
+    last = _HEAD.split(part.query)[0].split()[-1:] if part.modality in _PLURALS else []
+    known = bool(last and singulars_of(last[0])) and lexicon().find(last[0], _PLURALS[part.modality]) is not None
+    return "are" if known else "is"
 
 
 def _named(part: Part) -> str:

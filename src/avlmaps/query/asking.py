@@ -23,7 +23,7 @@ from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import coordinates, option
 from avlmaps.perception.protocols import NamedPixelEncoder
-from avlmaps.query.answer import UNDERSTOOD_ONLY, Alternative, Answer, PartAnswer, absent_text, found_text, placed
+from avlmaps.query.answer import WHICH, Alternative, Answer, PartAnswer, absent_text, found_text, placed, sentence_of
 from avlmaps.query.contents import NOWHERE, own_names
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
 from avlmaps.query.goals import MOST_GOALS, Goal, alike
@@ -42,16 +42,19 @@ if TYPE_CHECKING:
 _MOST_ALIKE = 10  # goals that are looked at for others that fit as well
 # Each way to name a storey has one of these: floor, storey, story, stories, level, upstairs.
 _STOREY_STEMS = ("floor", "stor", "level", "stair")
-_AS_NEAR = "distance counts, the side does not."
+_READ_AS = re.compile("is read as '(?:near|in)': ")  # in notes
 _BETWEEN = re.compile(r"\bbetween\b", re.IGNORECASE)
 _NEAR = r"\b(?:near|next to|beside|by|close to)(?: the)?"
-# "There is no chair in the kitchen, right?"
+# "There is no chair in the kitchen, right?" and "no chairs in the kitchen, right?".
 _STATED = re.compile(
-    r"(?:so,? |and )?there (?P<verb>is|are)(?P<no>n't| not| no)?(?: any)? (?P<what>.+?),? "
+    r"(?:so,? |and )?(?:there (?P<verb>is|are)(?P<not>n't| not| no)?(?: any)?|(?P<bare>no|an?|some|any)) (?P<what>.+?)"
+    r"(?(bare),|,?) ?\b"
     r"(?:right|correct|yes|no|true|is (?:that|this) (?:right|so|true|correct)|isn't (?:it|there|that so)|is there|"
     r"are there|aren't there)[ ?.!]*",
     re.IGNORECASE,
 )
+_DENIES = re.compile(r"\b(?:no|not|none|without)\b|n't\b", re.IGNORECASE)
+_ANY = re.compile(r"\bany(?:where)?\b", re.IGNORECASE)
 _AND = " and "
 # A name that ends so is that of a file.
 _FILE = re.compile(r"\.(?:wav|flac|ogg|mp3|m4a|aac|opus|aiff?|png|jpe?g|webp|heic|heif|avif|tiff?|bmp)$", re.IGNORECASE)
@@ -319,16 +322,15 @@ def _of_numbers(asking: _Asking) -> Answer | None:
     count = answer.count or 0
     said = f"{count} of the {number} {what} are found" if count < number else f"{count} {what} are found"
     goals = answer.goals[: min(max(number, 1), MOST_GOALS)]
-    return replace(answer, goals=goals, found=count >= number, text=f"{said[:1].upper()}{said[1:]}. {answer.text}")
+    return replace(answer, goals=goals, found=count >= number, text=f"{sentence_of(said)} {answer.text}")
 
 
 def _of_claims(asking: _Asking) -> Answer | None:
     stated = _STATED.fullmatch(asking.asked.sentence.strip())
     if stated is None:
         return None
-    answer = _read(asking.but(sentence=f"{stated['verb'].lower()} there {stated['what']}"))
-    is_right = answer.found != bool(stated["no"])
-    return replace(answer, text=f"{'Yes' if is_right else 'No'}. {re.sub('^(Yes|No)[.] ', '', answer.text)}")
+    verb, no = stated["verb"] or "is", "no " if stated["not"] or (stated["bare"] or "").lower() == "no" else ""
+    return asking.but(sentence=f"{verb.lower()} there {no}{stated['what']}").answer()
 
 
 def _read(asking: _Asking) -> Answer:
@@ -359,12 +361,15 @@ def _read(asking: _Asking) -> Answer:
         best = replace(best, goals=_one_a_room(avlmap, best.goals))
     count = sum(goal.probability >= avlmap.settings.found_at for goal in best.goals) if counted else None
     text = found_text(best.parts, best.goals[0], count) if best.found and counted else best.text
-    if kind is Ask.EXISTS:
+    if kind is Ask.EXISTS or _ANY.search(asked.sentence):  # any will do
+        text = text.removesuffix(f" {WHICH}")
+    if kind is Ask.EXISTS and _DENIES.search(asked.sentence):  # a bare yes to "is there no chair" says nothing
+        text = f"There is {'one' if best.found else 'none'}: {text[:1].lower()}{text[1:]}"
+    elif kind is Ask.EXISTS:
         text = f"{'Yes' if best.found else 'No'}. {text}"
-    sides = " ".join(note for note in notes if note.endswith(_AS_NEAR)) if best.found else ""
     return replace(
         best, goals=best.goals[: asked.top], count=count, notes=(*notes, *best.notes),
-        alternatives=(*best.alternatives, *alternatives), text=f"{text} {sides}".rstrip(),
+        alternatives=(*best.alternatives, *alternatives), text=" ".join([text, *filter(_READ_AS.search, notes)]),
     )  # fmt: skip
 
 
@@ -426,7 +431,9 @@ def _related(sentence: str, question: Question) -> Question:
     ends = context if said else []
     if said and len(ends) > 2:
         ends = [part for part in ends if part.query.casefold() in sentence[said.end() :].casefold()]
-    named = dict(zip(map(id, ends), ENDS, strict=True)) if len(ends) == len(ENDS) else {}
+    if said and len(ends) != len(ENDS):
+        raise QueryError("Between what does it lie? Name two things, like: the chair between the sofa and the table.")
+    named = dict(zip(map(id, ends), ENDS, strict=False))
     rooms = "near" if question.lead.modality is Modality.AREA else ""
     near = {id(part): "near" for part in context if re.search(rf"{_NEAR} {re.escape(part.query)}\b", sentence, re.I)}
     return Question(tuple(replace(part, relation=(near | named).get(id(part), rooms)) for part in question.parts))
@@ -438,12 +445,18 @@ def _answered(avlmap: "AVLMap", question: Question, asked: Asked, *, counted: bo
     # Of what is counted in an area, the things that lists have in it count.
     heat, factors = _fused(avlmap, question, heats, counted=counted)
     several, found = tuple(heat.goals(max(asked.top, _MOST_ALIKE))), heat.found
+    if several and found and several[-1].probability >= heat.found_at:  # there may be more
+        several = tuple(heat.goals(MOST_GOALS))
     goals, equal = several[: asked.top], alike(several, heat.found_at)
+    count = sum(goal.probability >= heat.found_at for goal in several)
     said = (replace(part, at=factor.part.at) for part, factor in zip(question.parts, factors, strict=True))
     question = Question(tuple(said))
     parts = tuple(_part_answer(*both, heat) for both in zip(question.parts, factors, strict=True))
     alone = () if found or len(heats) == 1 else (_alone(question, heats),)
-    text = found_text(parts, goals[0], alike=equal) if found else absent_text(parts, goals, next(iter(alone), None))
+    if found:
+        text = found_text(parts, goals[0], alike=equal, of=count)
+    else:
+        text = absent_text(parts, goals, next(iter(alone), None))
     return Answer(
         goals, found, parts, heat=heat, probability=heat.probability, text=text, alternatives=alone,
         notes=avlmap.data.info.doubts, alike=len(equal) if found else 0,
@@ -485,10 +498,8 @@ def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
     elif isinstance(factor, NearThings):
         peak = float(factor.mask.any())
     own = best if factor.is_named else 0.0
-    if not whole.found or factor.found:
-        return PartAnswer(part, peak, factor.found, factor.understood, factor.note, own)
-    kept = [one for one in factor.note.split("; ") if part.is_file or one.startswith(UNDERSTOOD_ONLY)]
-    return PartAnswer(part, peak, True, factor.understood, "; ".join(kept), max(own, whole.probability))
+    is_found = factor.found or (whole.found and part.role is Role.PRIMARY)
+    return PartAnswer(part, peak, is_found, factor.understood, factor.note, own)
 
 
 def _alone(question: Question, heats: Sequence[Heatmap]) -> Alternative:
