@@ -380,21 +380,6 @@ class AVLMap:
         left of them. ``room``: those in a room or by its name, or in all rooms of a kind. ``QueryError``: there is no
         such room, or the map was not seen on such a day.
         """
-        found = self._things(names, least_confidence, structure, watch, at)
-        if room is not None:
-            if not isinstance(room, str):
-                regions = [one.region for one in self.where.rooms]
-                room = self.where.names[regions.index(room.region)] if room.region in regions else room.name
-            self.where.require(room)
-            inside = self.where.inside(room, [thing.position for thing in found])
-            found = [thing for thing, is_in in zip(found, inside, strict=True) if is_in]
-        with suppress(BackendError, MapError):  # rooms are not known without the model of views that the map has
-            return self.where.with_rooms(found)
-        return found
-
-    def _things(
-        self, names: Sequence[str] | None, least_confidence: float, structure: bool, watch: Watch, at: str | int | None
-    ) -> list[Thing]:
         if at is not None:
             from avlmaps.query.changes import Days, things_at
             from avlmaps.query.sound_sources import with_heard
@@ -402,12 +387,14 @@ class AVLMap:
             days = Days.of(self)
             found = things_at(self.space, days, at, names, least_confidence)
             every = found if names is None else things_at(self.space, days, at, None, least_confidence)
-            return with_heard(self, found, are_all=names is None, visit=days.visit_of(at), every=every)
-        seen = names
-        if names is not None and self.edited:
-            seen = [name for name in names if self.sees(name)]
-        found = self.unedited_things(seen, least_confidence, structure, watch)
-        return self.edited.things(found, names, least_confidence)
+            found = with_heard(self, found, are_all=names is None, visit=days.visit_of(at), every=every)
+        else:
+            seen = [name for name in names if self.sees(name)] if names is not None and self.edited else names
+            found = self.unedited_things(seen, least_confidence, structure, watch)
+            found = self.edited.things(found, names, least_confidence)
+        with suppress(BackendError, MapError):  # rooms are not known without the model of views that the map has
+            found = self.where.with_rooms(found)
+        return found if room is None else self.where.those_in(room, found)
 
     @checked(QueryError)
     def unedited_things(

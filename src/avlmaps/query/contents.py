@@ -407,6 +407,14 @@ class Whereabouts:
         """Return which points lie in one room or part by its own name, or in all of a kind."""
         return np.array([*self._meant(asked), False])[self.parts_at(np.array(points, np.float64))]
 
+    def those_in(self, room: "str | Room", things: "Sequence[Thing]") -> "list[Thing]":
+        """Return the things in a room, or in those that a word names. ``QueryError``: it names none."""
+        named = {one.region: name for name, one in zip(self.names, self.rooms, strict=True)}
+        asked = room if isinstance(room, str) else named.get(room.region, room.name)
+        self.require(asked)
+        inside = self.inside(asked, [thing.position for thing in things])
+        return [thing for thing, is_in in zip(things, inside, strict=True) if is_in]
+
     def has(self, asked: str) -> bool:
         """Return whether a word names a room of the map, or a part of one."""
         return any(self._meant(asked))
