@@ -96,13 +96,14 @@ def test_noise_is_reduced_before_the_encoder_but_not_in_the_clip(tmp_path: Path)
     np.testing.assert_allclose(written.samples, raw.heard[0].samples, atol=1e-4)
 
 
-def test_an_encoder_that_breaks_its_promise_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize("given", [np.zeros((0, 4), np.float32), np.full((2, 4), 3.0, np.float32)])
+def test_an_encoder_that_breaks_its_promise_is_named(tmp_path: Path, given: np.ndarray) -> None:
     class Broken(FakeEncoder):
         def encode(self, sound: object) -> np.ndarray:
-            return np.zeros((0, 4), np.float32)
+            return given
 
     track = track_of(tmp_path / "a.flac", quiet(1.0), tone(0.5), quiet(1.0))
-    with pytest.raises(BackendError, match=r"The sound model test/loudness returned features of \(0, 4\) for 0.5"):
+    with pytest.raises(BackendError, match=r"The sound model test/loudness returned features of \(\d, 4\) for 0.5"):
         detect_events(straight_walk(3.0, 0.5, track), Broken(), PLAIN, tmp_path / "clips")
 
 

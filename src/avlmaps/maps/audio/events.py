@@ -148,8 +148,7 @@ def _encoded(encoder: SoundEncoder, sound: Sound) -> Float32[np.ndarray, "window
     lengths = np.linalg.norm(feature, axis=-1) if feature.ndim == 2 else np.zeros(0)
     if not len(lengths) or feature.shape[1] != encoder.card.dim or not (np.abs(lengths - 1.0) <= _UNIT).all():
         raise BackendError(
-            f"The sound model {encoder.card.id} returned features of {feature.shape}, of lengths "
-            f"{lengths.min(initial=np.inf):.3g} to {lengths.max(initial=0.0):.3g}, for {sound.duration_s:.2f} s; its "
+            f"The sound model {encoder.card.id} returned features of {feature.shape} for {sound.duration_s:.2f} s; its "
             f"card promises finite ones of (windows, {encoder.card.dim}) and unit length."
         )
     return feature
