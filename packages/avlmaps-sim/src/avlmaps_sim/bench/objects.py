@@ -103,18 +103,16 @@ def measure(avlmap: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, 
     vocabulary = [word for word in avlmap.encoders.pixels.vocabulary if word not in STRUCTURE]
     words = sorted({same.get(word, word) for word in vocabulary} | (present - set(STRUCTURE)))
     answers = cache(lambda name, word: name == word or lexicon().is_a(name, word, EntryKind.THING))
-    said, held, best, reached = [], np.zeros(len(centres), bool), {}, {}
-    covered: dict[str, np.ndarray] = {}
+    said, held, best, covered = [], np.zeros(len(centres), bool), {}, dict[str, np.ndarray]()
+    reached = dict.fromkeys(present.intersection(words), np.inf)
     for word in words:
-        of_word = [number for number in seen if answers(name[number], word)]
         try:
             heat = avlmap.object(word, primary=True)
         except QueryError:  # the encoder was not trained to detect it
-            best[word] = (0.0, bool(of_word))
-            reached |= {word: np.inf} if word in present else {}
             continue
         factor = heat.factors[0]
         rows = np.flatnonzero(getattr(factor, "mask", np.zeros(len(centres), bool)))
+        of_word = [number for number in seen if answers(name[number], word)]
         held[:] = False
         for number in of_word:
             held[inside[number]] = True
