@@ -311,13 +311,9 @@ def _normal(value: Any, is_list: bool) -> Any:
         return [_normal(one, False) for one in value] if isinstance(value, list) else [value]
     if isinstance(value, dict) and value.keys() <= set("xyz"):
         value = [value[axis] for axis in "xyz" if axis in value]
-    if isinstance(value, list) and all(isinstance(one, int | float) or _is_number(one) for one in value):
+    if isinstance(value, list) and all(isinstance(x, float) or re.fullmatch(_NUMBER, str(x).strip()) for x in value):
         return ",".join(str(one).strip() for one in value)
     return value
-
-
-def _is_number(text: Any) -> bool:
-    return isinstance(text, str) and re.fullmatch(_NUMBER, text.strip()) is not None
 
 
 def schema_of(kind: type[Struct]) -> dict[str, Any]:
