@@ -41,7 +41,7 @@ def test_nothing_alive_is_driven_over(over: str, whom: str) -> None:
     "command",
     ["drive over to the sofa", "go via the hall to the bedroom", "go through the kids' room", "go under the table",
      "go two metres at 2 o'clock", "go to the sofa after you visit the bed", "enter the kitchen by the back door",
-     "keep going until you get to the fridge", "go to the dog bed", "the cat is under the car, go to the car"],
+     "go to the dog bed", "the cat is under the car, go to the car"],
 )  # fmt: skip
 def test_what_a_reading_has_is_driven(command: str) -> None:
     assert read_command(command).stops is None

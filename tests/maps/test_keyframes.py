@@ -168,7 +168,8 @@ class Brightness:
     card = ModelCard("fake/brightness", 2, "CC0-1.0", "0" * 64)
 
     def encode(self, frames: list[Frame]) -> np.ndarray:
-        return np.array([[frame.rgb.mean(), 1.0] for frame in frames], np.float32)
+        angle = np.array([frame.rgb.mean() / 255.0 for frame in frames], np.float32)
+        return np.stack([np.sin(angle), np.cos(angle)], axis=1)
 
     def encode_words(self, words: list[str]) -> np.ndarray:
         return np.zeros((len(words), 2), np.float32)
@@ -200,7 +201,7 @@ def test_a_profile_with_views_gives_area_features_and_one_without_keypoints_none
     frame = RoomWalk().frame(0)
     seen = describe_keyframe(frame, Encoders("bare", views="brightness"))
     keyframes = concat([seen, seen])
-    np.testing.assert_allclose(keyframes.view, [[frame.rgb.mean(), 1.0]] * 2, rtol=1e-5)
+    np.testing.assert_allclose(np.arcsin(keyframes.view[:, 0]), [frame.rgb.mean() / 255.0] * 2, rtol=1e-3)
     assert keyframes.place.shape == (2, 0)
     np.testing.assert_array_equal(keyframes.offsets, [0, 0, 0])
 
