@@ -135,8 +135,8 @@ class _Frames(CalibrationDataReader):
     def __init__(self, looked_at: Iterable[tuple[np.ndarray, np.ndarray]]) -> None:
         self._left = iter(looked_at)
 
-    def get_next(self) -> dict[str, np.ndarray] | None:
-        return next(({"geometry": geometry, "colour": colour} for geometry, colour in self._left), None)
+    def get_next(self) -> dict[str, np.ndarray]:
+        return next(({"geometry": geometry, "colour": colour} for geometry, colour in self._left), {})
 
 
 def quicken(graph: onnx.GraphProto) -> None:

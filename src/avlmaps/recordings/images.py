@@ -370,8 +370,8 @@ def depth_in_colour(depth_m: Float32[np.ndarray, "hd wd"], rig: Rig) -> tuple[Pi
     camera = rig.rgb.resized(max(1, round(rig.rgb.width * shrink)), max(1, round(rig.rgb.height * shrink)))
     row, column = np.nonzero(depth_m > 0.0)
     z = depth_m[row, column]
-    x = ((np.arange(depth_m.shape[1]) + 0.5 - rig.depth.cx) / rig.depth.fx).astype(np.float32)[column] * z
-    y = ((np.arange(depth_m.shape[0]) + 0.5 - rig.depth.cy) / rig.depth.fy).astype(np.float32)[row] * z
+    x = np.asarray((np.arange(depth_m.shape[1]) + 0.5 - rig.depth.cx) / rig.depth.fx, np.float32)[column] * z
+    y = np.asarray((np.arange(depth_m.shape[0]) + 0.5 - rig.depth.cy) / rig.depth.fy, np.float32)[row] * z
     towards = rig.rgb_from_depth[:3].astype(np.float32)
     seen = nearest_depth(np.stack([a * x + b * y + c * z + d for a, b, c, d in towards]), camera)
     seen[np.isinf(seen)] = 0.0
