@@ -14,9 +14,10 @@ LISTS = Path(__file__).parent / "commands"
 NO_ORDERS = {
     "asked": ["sofa?"], "postponed": ["postpone the drive to the sofa"],
     "reported": ["Go to the bed, he says to me."],
-    "quoted": ["Anna said 'go to the bed' and left", 'the note said: "go to the kitchen"'],
-    "other": ["Alexa, go to the kitchen", "let him go to the bed"],
-    "wished": ["I wish you could go to the bed"], "threatened": ["go to the bed and I will unplug you"],
+    "quoted": ["Anna said 'go to the bed' and left", 'the note said: "go to the kitchen"',
+               "the poster: go to the kitchen"],
+    "other": ["Alexa, go to the kitchen", "let him go to the bed", "turn left, mommy"],
+    "wished": ["I wish you could go to the bed"], "threatened": ["go to the bed and I will hate you"],
     "unsure": ["cancel the visit to the sofa", "imagine going to the kitchen", "my brother went to the kitchen",
                "I may send you to the kitchen later", "Granddad keeps yelling go to the shed",
                "Go to the sink one more time and off come your wheels"],

@@ -244,3 +244,12 @@ def test_an_array_that_is_no_rgb_picture_is_refused(heard: AVLMap, picture: np.n
 def test_heat_is_not_multiplied_by_words(heard: AVLMap) -> None:
     with pytest.raises(TypeError):
         _ = heard.object("chair") * "3"
+
+
+def test_heat_times_a_number_in_place_is_another_heat(heard: AVLMap) -> None:
+    heat = before = heard.object("chair")
+    heat *= 2.0
+    assert type(heat) is type(2.0 * before)
+    np.testing.assert_allclose(np.asarray(heat), np.asarray(2.0 * before))
+    with pytest.raises(TypeError):
+        np.multiply(before, 2.0, out=before)

@@ -70,6 +70,8 @@ class Heat(NDArrayOperatorsMixin, ABC):
         """Compute a function of NumPy on the numbers; times one of NumPy's numbers it is a heat."""
         if ufunc is np.multiply and method == "__call__" and isinstance(inputs[0], Real) and not of_numpy:
             return self * inputs[0]
+        if any(isinstance(one, Heat) for one in of_numpy.get("out", ())):
+            return NotImplemented  # a heat does not change
         return getattr(ufunc, method)(*(one.values if isinstance(one, Heat) else one for one in inputs), **of_numpy)
 
     def __len__(self) -> int:
@@ -127,6 +129,11 @@ class Heat(NDArrayOperatorsMixin, ABC):
 
     def __sub__(self, other: object) -> Any:
         return self + -1.0 * other if isinstance(other, Heat) else super().__sub__(other)
+
+    def _anew(self, other: object) -> Any:
+        return NotImplemented  # ``heat *= 2`` names another heat
+
+    __iadd__ = __isub__ = __imul__ = __itruediv__ = __ifloordiv__ = __imod__ = __ipow__ = _anew
 
     def __neg__(self) -> "Blend":
         return -1.0 * self

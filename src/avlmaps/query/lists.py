@@ -337,7 +337,7 @@ def _contents(lists: _Lists) -> Answer:
     where, things = lists.avlmap.where, lists.things()
     inside = where.inside(name, [thing.position for thing in things])
     goals = [_thing_goal(thing) for thing, is_in in zip(things, inside, strict=True) if is_in]
-    number = f"{len(goals)} things: " if lists.question.counts and goals else ""
+    number = f"{len(goals)} thing{'s' * (len(goals) > 1)}: " if lists.question.counts and goals else ""
     text = f"In {the_room(name)}: {number}{counted([goal.name for goal in goals])}."
     text = text if where.has(name) else _no_room(name)
     return lists.answer(goals, text, subject, count=len(goals))
