@@ -252,4 +252,4 @@ def test_heat_times_a_number_in_place_is_another_heat(heard: AVLMap) -> None:
     assert type(heat) is type(2.0 * before)
     np.testing.assert_allclose(np.asarray(heat), np.asarray(2.0 * before))
     with pytest.raises(TypeError):
-        np.multiply(before, 2.0, out=before)
+        np.multiply(before, 2.0, **{"out": before})  # pyright: ignore[reportCallIssue, reportArgumentType]
