@@ -60,7 +60,7 @@ class Entry:
 
 
 def _paper(table: str, ours: str, label: str, beside: str = "") -> Figure:
-    form = "**{R@1 < 0.5 m %} %** of {tasks} within 0.5 m ({+R@1 < 0.5 m %}), {R@1 < 1 m %} within 1 m"
+    form = "**{R@1 < 0.5 m %} %** of {tasks} within 0.5 m ({+R@1 < 0.5 m %})"
     if beside:
         form += f"; {beside} {{{beside} | *|R@1 < 0.5 m %}}, chance {{chance|R@1 < 0.5 m %}}"
     return Figure(label, table, ours, form, (*EYES, *{"Table IV": EARS, "Table V": PHOTOS}.get(table, ())))
@@ -241,7 +241,7 @@ def page(measured: Mapping[str, Any], shipped: Mapping[str, str]) -> str:
         found = measured[entry.name]
         for number, figure in enumerate(entry.figures):
             when = f"{weights_of(found, shipped, figure.of)}, {found['date']}{_homes(found)}"
-            command = "" if number else f"`{found['command']}`"
+            command = "" if number else f"`{found['command'].removesuffix(' --out OUT')}`"
             lines.append(f"| {figure.label} | {shown(figure, found)} | {when} | {command} |")
     missing = [entry.name for entry in ENTRIES if entry.name not in measured]
     told = [f"\nNot measured with these weights, so without a row: {', '.join(missing)}."] if missing else []
