@@ -11,7 +11,7 @@ from walled_rooms import storeys_at, two_rooms, two_rooms_index
 
 from avlmaps.perception.protocols import ModelCard, RoomContents, read_room_contents
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.contents import own_names
+from avlmaps.query.contents import Room, Whereabouts, own_names, parts_of
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.lists import extreme_shares
@@ -385,3 +385,16 @@ def test_the_largest_room_is_the_same_from_everywhere() -> None:
     for goal in answer.goals:
         near = m.ask("which is the largest room?", near=goal.position)
         assert (near.goals, near.text) == (answer.goals, answer.text) and "order of its own" in near.notes[-1]
+
+
+def test_an_open_plan_is_named_by_its_parts_also_where_one_of_them_has_a_number() -> None:
+    def room(*kinds: str) -> Room:
+        names = tuple((kind, 0.9) for kind in kinds)
+        return Room(" and ".join(kinds), 0.9, (0.0, 0.0, 0.0), 1, np.zeros((1, 3)), names, kinds if kinds[1:] else ())
+
+    where = object.__new__(Whereabouts)
+    where.rooms = (room("living room", "kitchen"), room("living room"))
+    where.parts = parts_of(where.rooms)
+    where.names = ("living room 1 and kitchen", "living room 2")
+    asked = ("living room and kitchen", "the living room 1 and kitchen", "kitchen", "living room 2", "living room")
+    assert list(map(where.numbers_of, asked)) == [[0], [0], [0], [1], [0, 1]]

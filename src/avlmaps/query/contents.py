@@ -422,8 +422,8 @@ class Whereabouts:
     def _meant(self, asked: str) -> list[bool]:
         # Which parts a word means: one by its own name, those of a room by its, or all of a kind.
         word, kind = _plain(asked), self._kind(asked)
-        own = [{part.name.casefold(), self.names[part.room].casefold()} - {part.kind.casefold()} for part in self.parts]
-        named = [word in names for names in own]
+        called = ((part, {part.name, self.names[part.room], self.rooms[part.room].name}) for part in self.parts)
+        named = [word in {name.casefold() for name in names - {part.kind}} for part, names in called]
         return named if any(named) else [kind(part.kind) for part in self.parts]
 
     def require(self, asked: str) -> None:

@@ -228,7 +228,7 @@ class Editor:
         if numbers[0] < 0:
             raise QueryError(f"There is no room at {room!r}; `avlmaps rooms` lists them.")
         found, name = where.rooms[numbers[0]], where.names[numbers[0]]
-        if found.parts and not is_place(room) and plain_name(room) != name:
+        if found.parts and not is_place(room) and plain_name(room) not in (name, found.name):
             raise QueryError(f"{room!r} is a part of {name!r}: an open plan is corrected as a whole, by that name.")
         spot = EditedSpot(name=found.name, middle=found.position, corners=tuple(map(plain_point, found.outline)))
         return spot.anchored(self._map.data.keyframes)
