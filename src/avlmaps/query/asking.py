@@ -363,9 +363,8 @@ def _read(asking: _Asking) -> Answer:
     text = found_text(best.parts, best.goals[0], count) if best.found and counted else best.text
     if kind is Ask.EXISTS or _ANY.search(asked.sentence):  # any will do
         text = text.removesuffix(f" {WHICH}")
-    if kind is Ask.EXISTS and _DENIES.search(asked.sentence):  # a bare yes to "is there no chair" says nothing
-        text = f"There is {'one' if best.found else 'none'}: {text[:1].lower()}{text[1:]}"
-    elif kind is Ask.EXISTS:
+    # A bare yes to "is there no chair" says nothing, and what was not found may be there.
+    if kind is Ask.EXISTS and not _DENIES.search(asked.sentence):
         text = f"{'Yes' if best.found else 'No'}. {text}"
     return replace(
         best, goals=best.goals[: asked.top], count=count, notes=(*notes, *best.notes),

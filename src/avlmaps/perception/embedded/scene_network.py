@@ -329,7 +329,7 @@ class PairedNetworks:
         self._first, self._second = first, second
         self.notes: Notes = first.notes
         if more := sorted(set(second.notes.categories) - set(first.notes.categories)):
-            raise ValueError(f"The second network has {', '.join(more)}, which the first lacks; swap them.")
+            raise ValueError(f"The second network knows {len(more)} kinds that the first lacks, such as {more[0]}.")
         if second.notes.rooms != first.notes.rooms:
             raise ValueError("The two networks know different kinds of room; train them with one list.")
         self._column = np.array([first.notes.categories.index(name) for name in second.notes.categories])
