@@ -304,7 +304,7 @@ def test_each_voxel_has_the_colour_of_its_room_and_a_question_its_things() -> No
     left, right = labels.voxels[x < 2.8, 1], labels.voxels[x > 3.2, 1]
     assert np.median(left) != np.median(right) and {*np.unique(left)} == {np.median(left)}
     where = m.where
-    assert where.areas_m2() == pytest.approx([8.6, 8.6], abs=1.0)
+    assert [room.area_m2 for room in where.rooms] == pytest.approx([8.6, 8.6], abs=1.0)
     np.testing.assert_array_equal(where.inside("kitchen", np.r_[LEFT, RIGHT]), [True, False])
 
 

@@ -3,7 +3,7 @@
 import sys
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from math import isfinite, radians
+from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -271,8 +271,6 @@ def read_start(words: str | None) -> "GroundPose | None":
         return None
     try:
         x_m, y_m, heading_deg = (float(word) for word in words.split(","))
-        if not all(isfinite(value) for value in (x_m, y_m, heading_deg)):
-            raise ValueError
         return GroundPose(x_m, y_m, radians(heading_deg))
     except ValueError:
         raise UsageError(f"--start takes x,y,heading in metres and degrees, such as 1.5,2,90; not {words!r}.") from None

@@ -67,18 +67,14 @@ def _main(words: list[str]) -> None:
     try:
         verb = read_command(words)
     except (BackendError, output.UsageError) as error:  # BackendError: the verb is of a package that is not installed
-        if _wants_json(words):
+        # The line may not be readable: its words alone say whether JSON is wanted.
+        if "--json" in (words[: words.index("--")] if "--" in words else words):
             _emit_error(output.kind_of(error), str(error))
         _complain(error, 1)
         if isinstance(error, output.UsageError) and error.help:
             sys.stderr.write(f"For all of it: {error.help}\n")
         sys.exit(2 if isinstance(error, output.UsageError) else 1)
     sys.exit(_run(verb))
-
-
-def _wants_json(words: Sequence[str]) -> bool:
-    """Return whether a command line holds --json; decided before it is read, since it may not be readable."""
-    return "--json" in (words[: words.index("--")] if "--" in words else words)
 
 
 def _run(verb: "Verb") -> int:

@@ -50,17 +50,13 @@ def _as_flag(given: Any) -> bool | None:
     return bool(given) if type(given) in (bool, np.bool_) else None
 
 
-def _as_text(given: Any) -> str | None:
-    return given if isinstance(given, str) else None
-
-
 # By what a parameter or a field is declared as: what it must be, and how that is read.
 _ROWS: dict[Any, tuple[str, Callable[[Any], Any]]] = {
     float: ("a number", as_number),
     int: ("a whole number", as_whole),
     Sequence[str]: ("a list of words", as_words),
     tuple[str, ...]: ("a list of words", as_words),
-    str: ("text", _as_text),
+    str: ("text", lambda given: given if isinstance(given, str) else None),
 }
 _OR_NONE: dict[Any, tuple[str, Callable[[Any], Any]]] = {kind | None: row for kind, row in _ROWS.items()}
 _KINDS = _ROWS | _OR_NONE | {bool: ("True or False", _as_flag)}

@@ -18,7 +18,6 @@ from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts, clean, coun
 from avlmaps.maps.fusion.sensor import FusionSettings, SensorModel
 from avlmaps.maps.plan import strip_folder
 from avlmaps.maps.store import manifest
-from avlmaps.maps.store.map_data import GIVEN_FEATURES
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.recordings.types import Recording
 
@@ -85,13 +84,6 @@ def walked_info(walk: Trajectory, fused: int, begins_s: float) -> manifest.Recor
         frames=fused,
         duration_s=float(np.ptp(walk.stamps_s)),
         begins_s=begins_s,
-    )
-
-
-def given_model(dim: int) -> manifest.ModelInfo:
-    """Return the card of features that came without an encoder."""
-    return manifest.ModelInfo(
-        backend=GIVEN_FEATURES, id="features", dim=dim, licence="unknown", checksum="", prompts=()
     )
 
 

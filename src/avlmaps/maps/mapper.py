@@ -33,8 +33,8 @@ from avlmaps.maps.perceived import encode_pixels, require_unit
 from avlmaps.maps.plan import BUILD_VERSION, models_of
 from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings
-from avlmaps.maps.store.manifest import BadFrame, Counts, MapBounds, MapInfo, Removed, RigInfo, Timings
-from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.store.manifest import BadFrame, Counts, MapBounds, MapInfo, ModelInfo, Removed, RigInfo, Timings
+from avlmaps.maps.store.map_data import GIVEN_FEATURES, MapData
 from avlmaps.maps.store.tables import key_of
 from avlmaps.maps.types import Submaps, Voxels
 from avlmaps.perception.encoders import Encoders
@@ -443,7 +443,9 @@ class Mapper:
         took = Timings.now(dict(zip(ends, np.diff([self.began_s, *ends.values()]).tolist(), strict=True)))
         models, name, settings = models_of(self.encoders), self.encoders.name, self.settings
         if self._sums.dim and Kind.PIXELS.value not in models:
-            models[Kind.PIXELS.value] = finish.given_model(self._sums.dim)
+            models[Kind.PIXELS.value] = ModelInfo(
+                backend=GIVEN_FEATURES, id="features", dim=self._sums.dim, licence="unknown", checksum="", prompts=()
+            )
         odd = tuple(finish.feature_doubts(voxels, keyframes, sounds, models))
         known = *self._told, *self._found, *self._at_the_end, *finish.carving_doubts(removed, len(voxels)), *odd
         self._at_the_end += odd if final else ()

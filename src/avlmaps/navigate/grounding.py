@@ -83,11 +83,6 @@ def _name(factor: Factor) -> str:
     return f"{'the source of ' if factor.part.at == 'source' else ''}{factor.part.query!r}"
 
 
-def tells_one(heat: Heatmap) -> bool:
-    """Return whether a heatmap says which instance is meant, rather than only its name."""
-    return len(heat.factors) > 1 or not isinstance(heat.lead, NearThings)
-
-
 def things_in(heat: Heatmap, guess: bool = False) -> list[Destination]:
     """Return the distinct things that a heatmap asks for, best first; at least one, and all of them found.
 
@@ -355,7 +350,7 @@ class Seeker:
         if not heat.found:
             likely_by = f"{things[0].probability:.2f}, below {heat.found_at:.2f}"
             self.note(f"the probability of {things[0].name} is {likely_by}; this is the best guess")
-        return things, tells_one(heat)
+        return things, len(heat.factors) > 1 or not isinstance(heat.lead, NearThings)
 
     def _rooms(self, heat: Heatmap) -> list[Destination]:
         """Return all rooms of the map where a heatmap asks for rooms of any kind; else none."""

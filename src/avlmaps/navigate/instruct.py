@@ -169,7 +169,7 @@ def instruct(
         files = readable or offered_by(command)
         robot = Robot(avlmap, held, settings, files, lambda line: tell(f"  {line}"), pause or brake.pause, heats)
         run = _Run(command, translator, robot, budget, brake, tell)
-        for doubt in avlmap.doubts_of_drives:
+        for doubt in (*avlmap.data.info.doubts, *avlmap.edited.unheeded):
             run.note(doubt)
         run.through(translation)
     run.judge()

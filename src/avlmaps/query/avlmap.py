@@ -54,7 +54,7 @@ _LEAST_EDITED = 0.2  # a person may name what the map is not certain of
 # What serves answers, lists and fronts, rather than a person.
 _INSIDE = ("as_edited_now", "forget_edits", "things_to_edit", "unedited_things", "things_in_rooms", "require_model",
            "has", "room_votes", "room_field", "room_regions", "where", "source_map", "sees", "heat",
-           "closest_words", "doubts_of_drives", "doubts_of_things")  # fmt: skip
+           "closest_words", "doubts_of_things")  # fmt: skip
 
 
 class AVLMap:
@@ -190,7 +190,7 @@ class AVLMap:
         return heat
 
     def _object_heat(self, word: str, primary: bool, vocabulary: Sequence[str] | None = None) -> Heatmap:
-        part, heat = Part(Modality.OBJECT, word, _role(primary)), self.settings.heat
+        part, heat = Part(Modality.OBJECT, word, role_of(primary)), self.settings.heat
         if (factor := self.edited.pinned(part, heat)) is None and self.edited.is_room(word):
             return self.area(word, primary)
         factor = factor or self.edited.object_factor(part, heat, lambda: self._names.heat(part, vocabulary))
@@ -201,7 +201,7 @@ class AVLMap:
         """Return the heat of an area, such as a kitchen; or of one room by its number, such as bathroom 2."""
         from avlmaps.query.rooms import area_factor
 
-        part = Part(Modality.AREA, word, _role(primary))
+        part = Part(Modality.AREA, word, role_of(primary))
         encoder = self.encoders.views
         self.require_model(Kind.VIEWS)
         settings, own = self.settings, part_named(self, word)
@@ -218,7 +218,7 @@ class AVLMap:
         ``at``: ``robot`` or ``source``; by default as ``settings.sounds.at`` says, else ``robot``. ``QueryError``: the
         text is empty, or the map does not know where its sounds came from.
         """
-        return self._sound_heat(Part(Modality.SOUND, text, _role(primary)), self.sound_scores(text), at)
+        return self._sound_heat(Part(Modality.SOUND, text, role_of(primary)), self.sound_scores(text), at)
 
     @checked(QueryError)
     def sound_clip(self, clip: str | Path | Sound, primary: bool = False, *, at: HeardAt | None = None) -> Heatmap:
@@ -234,7 +234,7 @@ class AVLMap:
             name, sound = "a clip", modalities.require_audible(clip, "that was given")
         else:
             name, sound = str(clip), modalities.read_clip(user_path(clip))
-        part = Part(Modality.SOUND, name, _role(primary), is_file=True)
+        part = Part(Modality.SOUND, name, role_of(primary), is_file=True)
         heard, scores = self.data.sounds, np.zeros(0)
         if len(heard):
             self.require_model(Kind.SOUNDS)
@@ -271,7 +271,7 @@ class AVLMap:
         the map's own. ``QueryError``: the picture is missing, no picture, or does not fit the camera.
         """
         called = str(picture) if isinstance(picture, str | Path) else "a picture"
-        part = Part(Modality.IMAGE, called, _role(primary), is_file=True)
+        part = Part(Modality.IMAGE, called, role_of(primary), is_file=True)
         located = self._located(_photo(picture, intrinsics), intrinsics, _GUESS_FROM)
         factor = modalities.image_factor(self.space, located, part, self.settings.heat)
         return Heatmap.of(factor, self.settings.found_at)
@@ -467,11 +467,6 @@ class AVLMap:
         return last_seen(Days.of(self), name, means(name), self.where.name_of)
 
     @property
-    def doubts_of_drives(self) -> tuple[str, ...]:
-        """What is doubtful about the map for a robot: why it may be wrong, and areas that it no longer forbids."""
-        return (*self.data.info.doubts, *self.edited.unheeded)
-
-    @property
     def doubts_of_things(self) -> tuple[str, ...]:
         """Why a list of its things may be wrong, one sentence each."""
         why = "The map was made without a model for things, so that it names none."
@@ -618,7 +613,8 @@ def _read_only(array: np.ndarray) -> np.ndarray:
     return view
 
 
-def _role(primary: bool) -> Role:
+def role_of(primary: bool) -> Role:
+    """Return the role of a part of a query."""
     return Role.PRIMARY if primary else Role.CONTEXT
 
 

@@ -342,7 +342,7 @@ class Whereabouts:
         """Number of storeys; 1 where they are not known."""
         return 1 if self._plan is None else len(self._plan.storeys)
 
-    def floors_of(self, points: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+    def floors_of(self, points: Sequence[Sequence[float]] | np.ndarray) -> Int[np.ndarray, " m"]:
         """Return the storey of each point (metres, recording frame), counted from 0, the lowest."""
         points = np.asarray(points, np.float64).reshape(-1, 3)
         return np.zeros(len(points), np.int64) if self._plan is None else self._plan.storeys_of(points)
@@ -399,10 +399,6 @@ class Whereabouts:
         named = self.names_at([thing.position for thing in things])
         return [replace(thing, room=name) for thing, name in zip(things, named, strict=True)]
 
-    def areas_m2(self) -> Float[np.ndarray, " r"]:
-        """Return the floor area of each room; none for a map without a floor plan."""
-        return np.array([room.area_m2 for room in self.rooms], np.float64)
-
     def inside(self, asked: str, points: Sequence[Sequence[float]] | np.ndarray) -> Bool[np.ndarray, " m"]:
         """Return which points lie in one room or part by its own name, or in all of a kind."""
         return np.array([*self._meant(asked), False])[self.parts_at(np.array(points, np.float64))]
@@ -421,10 +417,14 @@ class Whereabouts:
 
     def _meant(self, asked: str) -> list[bool]:
         # Which parts a word means: one by its own name, those of a room by its, or all of a kind.
-        word, kind = _plain(asked), self._kind(asked)
+        word, kinds = _plain(asked), [part.kind for part in self.parts]
         called = ((part, {part.name, self.names[part.room], self.rooms[part.room].name}) for part in self.parts)
         named = [word in {name.casefold() for name in names - {part.kind}} for part, names in called]
-        return named if any(named) else [kind(part.kind) for part in self.parts]
+        if any(named):
+            return named
+        if word == UNKNOWN and word in kinds:  # else "the room" is any room
+            return [kind == word for kind in kinds]
+        return [kind.casefold() == word or lexicon().is_a(kind, word, EntryKind.ROOM) for kind in kinds]
 
     def require(self, asked: str) -> None:
         """Raise ``QueryError`` where a word names no room; the sentence lists those that there are."""
@@ -443,12 +443,6 @@ class Whereabouts:
         meant = [part for part, is_meant in zip(self.parts, self._meant(asked), strict=True) if is_meant]
         called = [part for part in meant if part.name.casefold() == _plain(asked)]
         return sorted({part.room for part in called or meant})
-
-    def _kind(self, asked: str) -> Callable[[str], bool]:
-        word = _plain(asked)
-        if word == UNKNOWN and word in (part.kind for part in self.parts):  # else "the room" is any room
-            return lambda kind: kind == word
-        return lambda kind: kind.casefold() == word or lexicon().is_a(kind, word, EntryKind.ROOM)
 
     @cached_property
     def numbered(self) -> dict[str, str]:

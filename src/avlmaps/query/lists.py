@@ -99,7 +99,7 @@ def _thing_goal(thing: "Thing") -> Goal:
 
 def _rooms_by_size(lists: _Lists) -> Answer:
     where, first = lists.avlmap.where, lists.question.first
-    areas = where.areas_m2()
+    areas = np.array([room.area_m2 for room in where.rooms], np.float64)
     if not len(areas):
         raise QueryError("The map does not know the sizes of rooms: it has no floor plan, or no model of views.")
     order = np.argsort(areas if first else -areas, kind="stable")

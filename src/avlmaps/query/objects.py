@@ -477,7 +477,8 @@ class _Search:
         uncertain = self._uncertain(settings)
         guess = best_guesses(uncertain, voxel_size_m)
         if isinstance(self.voxels.encoder, NamedPixelEncoder) and guess.best < settings.guess_below:
-            weaker = self._uncertain(settings.for_guess())
+            score, least = settings.score_for_guess, settings.least_for_guess
+            weaker = self._uncertain(replace(settings, score_in_company=score, least_score_in_company=least))
             weaker_guess = best_guesses(weaker, voxel_size_m)
             if len(weaker_guess):
                 uncertain, guess = weaker, weaker_guess
@@ -493,7 +494,7 @@ class _Search:
         return segment(self.voxels, self.word, self._scored(1.0)) if self.searched is None else self.searched
 
     def _uncertain(self, settings: ObjectSettings) -> Instances:
-        scored = self._scored(settings.share_in_company)
+        scored = self._scored(min(1.0, settings.score_in_company))  # 1: a voxel must win over its best rival
         voxels = replace(self.voxels, settings=settings)
         return self._coloured(segment(voxels, self.word, scored, self._confident))
 

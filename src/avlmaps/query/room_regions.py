@@ -320,11 +320,6 @@ class RoomRegions:
             count += found.count
         return cls(plan, tuple(grids), tuple(labels), count, np.concatenate(beside))
 
-    @property
-    def neighbours(self) -> Int[np.ndarray, " r"]:
-        """Of each room, the number of rooms that one can see into through its openings."""
-        return np.bincount(self.beside.reshape(-1), minlength=self.count)
-
     @cached_property
     def areas_m2(self) -> Float[np.ndarray, " r"]:
         """Floor area of each room."""

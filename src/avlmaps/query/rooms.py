@@ -201,7 +201,8 @@ class RoomField:
         nats = np.zeros((len(parts), len(self.kinds)))
         np.add.at(nats, part[floor], np.log(np.maximum(own[floor], _LEAST_SHARE)))
         nats /= np.maximum(np.bincount(part, floor, len(parts)), 1.0)[:, None]
-        fewest = np.minimum(regions.neighbours[parts // len(self.kinds)], len(_PASSAGE_ODDS) - 1)
+        neighbours = np.bincount(regions.beside.reshape(-1), minlength=regions.count)
+        fewest = np.minimum(neighbours[parts // len(self.kinds)], len(_PASSAGE_ODDS) - 1)
         passage = _among(self.kinds, _PASSAGES)
         whole = np.exp(_LOOKS * nats) * np.where(passage, np.array(_PASSAGE_ODDS)[fewest][:, None], 1.0)
         share = self.share.copy()
@@ -247,7 +248,7 @@ class Rooms:
         """Return how likely each place is each kind of room; ``share``: how likely each view shows each of them."""
         settings = self.settings
         mass = np.zeros((len(self.plan), len(kinds) + 1))
-        np.add.at(mass, self._place_cells, np.c_[share, np.ones(len(share))])
+        np.add.at(mass, self.plan.cells_of(self._places), np.c_[share, np.ones(len(share))])
         per_view = 2.0 * np.pi * (settings.views_m / CELL_M) ** 2  # a view in the open has this weight at its place: 1
         spread = self.plan.spread(mass, settings.views_m) * np.float32(per_view)
         views = spread[:, -1:]
@@ -263,10 +264,6 @@ class Rooms:
         if key not in self._votes:
             self._votes[key] = self._count_votes(key)
         return self._votes[key]
-
-    @cached_property
-    def _place_cells(self) -> Int[np.ndarray, " k"]:
-        return self.plan.cells_of(self._places)
 
     @cached_property
     def _named_voxels(self) -> NamedVoxels | None:
@@ -517,7 +514,9 @@ def area_factor(
     anchors = area_anchors(keyframes, settings)
     view = np.asarray(keyframes.view)
     kinds: RoomField | None = None
-    if rooms is None or not settings.by_room or not len(keyframes):
+    # Stretched cosines are no probabilities to vote with.
+    by_room = settings.extent == "rooms" and settings.score == "posterior"
+    if rooms is None or not by_room or not len(keyframes):
         posterior, scores = area_scores(view, encoder, part.query, settings)
         weights = np.zeros(0)
     else:

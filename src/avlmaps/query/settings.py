@@ -65,15 +65,6 @@ class ObjectSettings:
     join_m: float = 0.3
     """Pieces over one another with no larger gap in height are one thing (the legs and the back of a chair)."""
 
-    @property
-    def share_in_company(self) -> float:
-        """The part of its best rival's score from which a voxel counts where the query has context; 1: it must win."""
-        return min(1.0, self.score_in_company)
-
-    def for_guess(self) -> "ObjectSettings":
-        """Return the settings under which weaker voxels count."""
-        return replace(self, score_in_company=self.score_for_guess, least_score_in_company=self.least_for_guess)
-
 
 @dataclass(frozen=True, slots=True)
 class RoomSettings:
@@ -111,11 +102,6 @@ class AreaSettings:
     link_m: float = 1.0  # keyframes closer than this to a better one belong to its area
     rooms: RoomSettings = field(default_factory=RoomSettings)
     """Of ``rooms``: the weights of views and things, and how far they reach."""
-
-    @property
-    def by_room(self) -> bool:
-        """Whether places rather than keyframes are scored; stretched cosines are no probabilities to vote with."""
-        return self.extent == "rooms" and self.score == "posterior"
 
 
 @dataclass(frozen=True, slots=True)

@@ -124,12 +124,9 @@ class Microphones:
     def __len__(self) -> int:
         return len(self.position_m)
 
-    @property
-    def in_camera_m(self) -> Float[np.ndarray, "m 3"]:
-        return poses.apply(self.camera_from_robot, self.position_m)
-
     def in_world_m(self, world_from_camera: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "n m 3"]:
-        turned = np.einsum("nij,mj->nmi", world_from_camera[:, :3, :3], self.in_camera_m)
+        in_camera_m = poses.apply(self.camera_from_robot, self.position_m)
+        turned = np.einsum("nij,mj->nmi", world_from_camera[:, :3, :3], in_camera_m)
         return turned + world_from_camera[:, None, :3, 3]
 
     def take(self, channels: Sequence[int]) -> "Microphones":

@@ -104,8 +104,8 @@ class RecordingWriter:
                 f"No depth of frame {frame.name} can be written: its median is {middle_m:,.0f}, which looks like "
                 "millimetres; depth_m is in metres."
             )
-        _write_picture(self.path / "rgb" / f"{frame.name}.{self.colour}", frame.rgb[..., ::-1])
-        _write_picture(self.path / "depth" / f"{frame.name}.png", raw)
+        write_picture(self.path / "rgb" / f"{frame.name}.{self.colour}", frame.rgb[..., ::-1])
+        write_picture(self.path / "depth" / f"{frame.name}.png", raw)
         self._log(frame.name, frame.stamp_s, frame.world_from_camera)
 
     def add_files(
@@ -267,7 +267,8 @@ def _triple(vector: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
     return float(vector[0]), float(vector[1]), float(vector[2])
 
 
-def _write_picture(path: Path, picture: np.ndarray) -> None:
+def write_picture(path: Path, picture: np.ndarray) -> None:
+    """Write a picture as OpenCV has it, by the ending of its path: PNG or JPEG."""
     import cv2
 
     # Level 1: a third larger than the default and five times as fast.

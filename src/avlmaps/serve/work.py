@@ -5,14 +5,13 @@ What cannot be answered raises an ``AvlmapsError``; ``lanes.described`` gives it
 
 import tempfile
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict, TypeVar
 
 import msgspec
 import numpy as np
-from jaxtyping import Float
 
 from avlmaps.core.camera import Pinhole, intrinsics_of
 from avlmaps.core.motion import GroundPose
@@ -267,8 +266,8 @@ _MOST_KINDS, _MOST_HEARD = 12, 2
 def describe_building(task: WorkInput, query: NoQuery) -> dict[str, Any]:
     avlmap, lists = task.map.avlmap, lists_of(task)
     where, things = lists.avlmap.where, lists.things()
-    floors = where.floors_of(_places([room.position for room in where.rooms]))
-    thing_floors = where.floors_of(_places([thing["position"] for thing in things]))
+    floors = where.floors_of([room.position for room in where.rooms])
+    thing_floors = where.floors_of([thing["position"] for thing in things])
     level = avlmap.space.level(avlmap.points) if len(avlmap.space) else np.zeros((1, 3))
     return {
         "map": task.map.name,
@@ -316,7 +315,7 @@ def tool_rooms(task: WorkInput, query: requests.RoomsToolQuery) -> dict[str, Any
     lists = lists_of(task)
     where = lists.avlmap.where
     count = Counter(where.parts[one.part].room for one in selection.things_with_rooms(lists, Wanted()) if one.part >= 0)
-    floors = where.floors_of(_places([room.position for room in where.rooms]))
+    floors = where.floors_of([room.position for room in where.rooms])
     if query.floor is not None and not 0 <= query.floor < where.floor_count:
         raise RequestError(f"There is no floor {query.floor}; the map has {where.floor_count}, counted from 0.")
     wanted = range(len(where.rooms))
@@ -341,7 +340,7 @@ def tool_rooms(task: WorkInput, query: requests.RoomsToolQuery) -> dict[str, Any
 def tool_sounds(task: WorkInput, query: requests.SoundsToolQuery) -> dict[str, Any]:
     lists, names = lists_of(task), {name.casefold() for name in query.name}
     where, sounds = lists.avlmap.where, lists.sounds()
-    rooms = where.names_at(_places([sound["position"] for sound in sounds]))
+    rooms = where.names_at([sound["position"] for sound in sounds])
     rows = [
         {
             "name": _first_name(sound),
@@ -372,10 +371,6 @@ def _kinds(names: Iterable[str]) -> dict[str, int]:
 
 def _first_name(sound: schema.SoundAnswer) -> str:
     return sound["names"][0] if sound["names"] else "sound"
-
-
-def _places(positions: Sequence[Sequence[float]]) -> Float[np.ndarray, "m 3"]:
-    return np.array(positions, np.float64).reshape(-1, 3)
 
 
 def seen_last(task: WorkInput, query: requests.LastSeenQuery) -> Any:

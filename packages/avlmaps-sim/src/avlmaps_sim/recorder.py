@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
@@ -23,7 +23,7 @@ from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.channels import ChannelSound
 from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.microphones import LEVEL_CAMERA_FROM_ROBOT, Microphones, microphones_named
-from avlmaps.recordings.writer import RecordingWriter
+from avlmaps.recordings.writer import RecordingWriter, write_picture
 from avlmaps_sim.coverage import FloorCoverage, coverage_of_walk, require_floor
 from avlmaps_sim.hearing.schedule import ScheduleRule, Sounding, candidates, schedule
 from avlmaps_sim.hearing.sound_library import Recorded, Synthesised
@@ -344,26 +344,16 @@ class _Artist:
         if self._settings.sensor != "clean":
             rgb, depth_m = self.sensor.spoil(view, camera, np.random.default_rng([self._seed, index]), shift)
         colour, depth, semantic = self.files(name)
-        _write_png(colour, rgb[..., ::-1])
-        _write_png(depth, _millimetres(depth_m))
+        write_picture(colour, rgb[..., ::-1])
+        write_picture(depth, _millimetres(depth_m))
         if self._settings.semantic:
-            _write_png(semantic, (view.instance + 1).astype(np.uint16))
+            write_picture(semantic, (view.instance + 1).astype(np.uint16))
         return index
 
 
 def _millimetres(depth_m: Float[np.ndarray, "h w"]) -> np.ndarray:
     raw = np.rint(depth_m.astype(np.float64) * 1000.0)
     return np.where((raw > 0) & (raw <= 65534), raw, 0).astype(np.uint16)
-
-
-def _write_png(path: Path, picture: UInt8[np.ndarray, "..."] | np.ndarray) -> None:
-    import cv2
-
-    options = [cv2.IMWRITE_PNG_COMPRESSION, 1] if path.suffix == ".png" else [cv2.IMWRITE_JPEG_QUALITY, 95]
-    done, content = cv2.imencode(path.suffix, np.ascontiguousarray(picture), options)
-    if not done:
-        raise RecordingError(f"{path} could not be encoded; its picture is {picture.dtype} of {picture.shape}.")
-    path.write_bytes(content.tobytes())
 
 
 _artist: list[_Artist] = []

@@ -262,13 +262,9 @@ def unknown_offset(
     The loudness is integrated out. Distances are from each measurement to each candidate; at ``reverberant_m`` a level
     is that of the reverberant field, inf for ratios.
     """
-    rest = measured_db[:, None] - against_1_m_db(distance_m, reverberant_m)
+    against_1_m_db = 10.0 * np.log10(1.0 / np.maximum(distance_m, _NEAREST_M) ** 2 + 1.0 / reverberant_m**2)
+    rest = measured_db[:, None] - against_1_m_db
     return -0.5 * ((rest - rest.mean(axis=0)) ** 2).sum(axis=0) / noise_db**2
-
-
-def against_1_m_db(distance_m: Float[np.ndarray, "*k"], reverberant_m: float = np.inf) -> Float[np.ndarray, "*k"]:
-    """Return by how much a sound is louder at each distance than its direct sound is at 1 m."""
-    return 10.0 * np.log10(1.0 / np.maximum(distance_m, _NEAREST_M) ** 2 + 1.0 / reverberant_m**2)
 
 
 MOST_MICROPHONES = 8  # more choices than can be tried beyond

@@ -6,7 +6,7 @@ files go. So a kill at any instant leaves the old map or the new one.
 
 import re
 import shutil
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
@@ -193,7 +193,7 @@ def write(path: Path, data: MapData) -> MapInfo:
     with explain_write_errors(path):
         path.mkdir(parents=True, exist_ok=True)
         for section, arrays in _sections(data).items():
-            name = _free_name(section, taken)
+            name = section + SUFFIX if section + SUFFIX not in taken else f"{section}.2{SUFFIX}"
             write_arrays(path / name, arrays)
             files[name] = FileInfo.of(path / name)
         for number, clip in enumerate(data.sounds.clips):
@@ -374,10 +374,6 @@ def _sections(data: MapData) -> dict[str, dict[str, np.ndarray]]:
     sounds |= {} if data.sources is None else fields_of(data.sources, _SOURCES)
     voxels |= {_FOUND + name: array for name, array in data.findings.items()}
     return dict(zip(SECTIONS, (voxels, keyframes, sounds), strict=True))
-
-
-def _free_name(section: str, taken: Container[str]) -> str:
-    return section + SUFFIX if section + SUFFIX not in taken else f"{section}.2{SUFFIX}"
 
 
 def _listed(path: Path) -> frozenset[str]:

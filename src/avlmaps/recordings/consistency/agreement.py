@@ -74,11 +74,6 @@ class Sample:
         return replace(self, pairs=self.pairs[chosen], follows=self.follows[chosen])
 
 
-def draw_sample(recording: Recording) -> Sample:
-    """Choose frames by their poses and read them; frames that cannot be read are left out."""
-    return draw_pairs(recording, *choose_pairs(recording.world_from_camera))
-
-
 def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Bool[np.ndarray, " p"]) -> Sample:
     """Read the frames of pairs; those with a frame that cannot be read are left out."""
     index = np.unique(pairs) if len(pairs) else np.arange(min(len(recording), 1))

@@ -160,7 +160,7 @@ class Evidence:
         """Draw a sample and compare its pairs; RecordingError where none of its frames can be read."""
         if len(recording) == 0:
             raise RecordingError(f"{recording.path} has no frames with a pose; there is nothing to check.")
-        sample = agreement.draw_sample(recording)
+        sample = agreement.draw_pairs(recording, *agreement.choose_pairs(recording.world_from_camera))
         surfaces = agreement.Surfaces.of(sample.depth_m)
         following, distant = sample.only(sample.follows), sample.only(~sample.follows)
         after = agreement.compare(following, surfaces, sample.world_from_camera)

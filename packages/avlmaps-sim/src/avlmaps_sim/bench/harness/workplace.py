@@ -18,6 +18,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
+from avlmaps.days.surfaces import packed, unpacked
 from avlmaps.maps.grid import GridSpec, index_ends
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query.avlmap import AVLMap
@@ -36,7 +37,6 @@ from avlmaps_sim.truth import OBJECTS, HeardEvent, Truth, read_truth
 
 _SPACING_M = 0.02
 _FOR_THINGS = 4.0  # a thing's points count more than a wall's, as the eye takes a picture for a picture
-_OFFSET = 1 << 20  # makes voxel indices positive
 _TRIANGLES = 1_000  # at once: their points stay in the cache
 _STEP_U, _STEP_V = 0.7548776662466927, 0.5698402909980532  # 1/p and 1/p², p³ = p + 1: the evenest steps in the plane
 
@@ -81,8 +81,7 @@ class TrueVoxels:
     @property
     def index(self) -> Int[np.ndarray, "m 3"]:
         """The voxels, as the grid counts them."""
-        axes = (self.key >> 42, (self.key >> 21) & (2 * _OFFSET - 1), self.key & (2 * _OFFSET - 1))
-        return np.stack(axes, axis=1) - _OFFSET
+        return unpacked(self.key)
 
     def _at(self, index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
         if not len(self.key):
@@ -94,12 +93,6 @@ class TrueVoxels:
 
 _STEPS = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _NEIGHBOURS = _STEPS[np.argsort(np.abs(_STEPS).sum(axis=1), kind="stable")][1:]  # those that share a face first
-
-
-def packed(index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
-    """Return each voxel's index as one number that rises with it."""
-    shifted = np.asarray(index, np.int64) + _OFFSET
-    return (shifted[:, 0] << 42) | (shifted[:, 1] << 21) | shifted[:, 2]
 
 
 def _spread(corners: Float[np.ndarray, "t 3 3"], spacing_m: float) -> tuple[np.ndarray, np.ndarray]:

@@ -23,6 +23,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import apply
 from avlmaps.core.progress import progress
 from avlmaps.core.question import Modality, Part, Role
+from avlmaps.days.surfaces import packed
 from avlmaps.perception.protocols import ViewEncoder
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
@@ -38,7 +39,6 @@ from avlmaps_sim.bench.harness.factors import (
     true_regions,
     true_things,
 )
-from avlmaps_sim.bench.harness.workplace import packed
 from avlmaps_sim.bench.indexing.tasks import Task
 from avlmaps_sim.truth import Truth
 

@@ -12,7 +12,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.core.registry import Kind
-from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.avlmap import AVLMap, role_of
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities import Photo, read_picture
 from avlmaps_sim.bench.harness.factors import (
@@ -82,7 +82,7 @@ class Perceived(AVLMap):
         sense = self._senses.sounds
         makers: dict[str, Callable[[], Heatmap]] = {
             "ours": lambda: self._scene.avlmap.sound(text, primary, at=at),
-            "weak": lambda: self._scene.weak().heat(self._category(text), _role(primary)),
+            "weak": lambda: self._scene.weak().heat(self._category(text), role_of(primary)),
             "true": lambda: self._true_sound(text, primary),
             "none": lambda: self._nothing(Modality.SOUND, text, primary),
         }
@@ -100,7 +100,7 @@ class Perceived(AVLMap):
         name, sense = Path(picture).name, self._senses.images
         makers: dict[str, Callable[[], Heatmap]] = {
             "ours": lambda: self._scene.avlmap.image(picture, intrinsics, primary),
-            "weak": lambda: alike_keyframe(self._scene.avlmap, read_picture(Path(picture)), name, _role(primary)),
+            "weak": lambda: alike_keyframe(self._scene.avlmap, read_picture(Path(picture)), name, role_of(primary)),
             "true": lambda: self._places(Modality.IMAGE, name, primary, [self._scene.photos[name][None, :3, 3]]),
             "none": lambda: self._nothing(Modality.IMAGE, name, primary),
         }
@@ -122,7 +122,7 @@ class Perceived(AVLMap):
         return self._scene.heats[key]
 
     def _true_object(self, word: str, primary: bool) -> Heatmap:
-        part = Part(Modality.OBJECT, word, _role(primary))
+        part = Part(Modality.OBJECT, word, role_of(primary))
         own = [i for i, thing in enumerate(self._scene.truth.objects) if thing.category == _plain(word)]
         falloff = self.settings.heat.falloff_per_m(part.role)
         return Heatmap.of(true_things(self.space, part, falloff, self._scene.label, own))
@@ -145,7 +145,7 @@ class Perceived(AVLMap):
         return Heatmap.of(true_regions(self.space, Part(Modality.AREA, _plain(word)), own))
 
     def _places(self, modality: Modality, query: str, primary: bool, tracks: Sequence[np.ndarray]) -> Heatmap:
-        part = Part(modality, query, _role(primary), modality is Modality.IMAGE)
+        part = Part(modality, query, role_of(primary), modality is Modality.IMAGE)
         return Heatmap.of(true_places(self.space, part, self.settings.heat.falloff_per_m(part.role), tracks))
 
     def _nothing(self, modality: Modality, query: str, primary: bool) -> Heatmap:
@@ -153,10 +153,6 @@ class Perceived(AVLMap):
             raise QueryError(f"The {modality} {query!r} means nothing to a robot without that sense; name another.")
         part = Part(modality, query, Role.CONTEXT, modality is Modality.IMAGE)
         return Heatmap.of(VoxelHeat(self.space, part, np.ones(len(self.space), np.float32)))
-
-
-def _role(primary: bool) -> Role:
-    return Role.PRIMARY if primary else Role.CONTEXT
 
 
 def _plain(words: str) -> str:
