@@ -176,10 +176,6 @@ class Evidence:
         known = self.sample.depth_m[self.sample.depth_m > 0.0]
         return float(np.median(known)) if known.size else float("nan")
 
-    @cached_property
-    def of_program(self) -> bool:
-        return is_of_program(self.recording)
-
     @property
     def judged(self) -> bool:
         return agreement.can_be_judged(self.after)
@@ -273,7 +269,7 @@ def _cameras(evidence: Evidence) -> Iterator[tuple[Pinhole, str, str, str]]:
     for what, camera in (("colour", rig.rgb), ("depth", rig.depth))[: 1 if rig.registered else 2]:
         size, given = f"{camera.width}x{camera.height}", option("intrinsics", "fx,fy,cx,cy")
         fit = f"Give those of a {size} picture with {given}, or of another size as fx,fy,cx,cy@WxH."
-        fit = f"Give the camera of a {size} picture." if evidence.of_program else fit
+        fit = f"Give the camera of a {size} picture." if is_of_program(evidence.recording) else fit
         yield camera, "of the cameras" if rig.registered else f"of the {what} camera", size, fit
 
 
@@ -328,7 +324,7 @@ def _depth(evidence: Evidence) -> Iterator[Said]:
     (low, high), median_m, smooth = SUSPICIOUS_DEPTH_M, evidence.median_m, evidence.surfaces.smooth_share
     if np.isfinite(median_m) and not low <= median_m <= high:
         unit = f"{option('depth-unit', 'METRES')} says what one stored unit is (0.001: millimetres)"
-        remedy = f"Check its unit: {'depth_m is in metres' if evidence.of_program else unit}."
+        remedy = f"Check its unit: {'depth_m is in metres' if is_of_program(evidence.recording) else unit}."
         sure = not _IMPOSSIBLE_DEPTH_M[0] <= median_m <= _IMPOSSIBLE_DEPTH_M[1]
         yield Said(f"The depth is {median_m:.3g} m in the middle; rooms have {low:g} to {high:g} m.", remedy, sure)
     if smooth < _LEAST_SMOOTH and evidence.sample.depth_m.shape[2] >= _FEWEST_COLUMNS:
