@@ -136,7 +136,8 @@ def _sounds_by_time(lists: _Lists) -> Answer:
     numbers = sorted(range(len(sounds)), key=lambda number: sounds[number].onset_s * (1.0 if first else -1.0))
     goals = [_sound_goal(sounds[number]) for number in numbers]
     onset_s = sounds[numbers[0]].onset_s
-    text = placed(f"the {which} sound is the {goals[0].name} at {onset_s:.1f} s, heard", goals[0])
+    named = f"is {'' if goals[0].probability >= avlmap.settings.found_at else 'perhaps '}the {goals[0].name}"
+    text = placed(f"the {which} sound {named} at {onset_s:.1f} s, heard", goals[0])
     if lists.at != "source":
         return lists.answer(goals, text)
     if not avlmap.source_map.is_located(numbers[0]):
@@ -151,9 +152,8 @@ def _sounds_by_time(lists: _Lists) -> Answer:
         )
         for one in found
     ]
-    text = f"the {which} sound is the {goals[0].name} at {onset_s:.1f} s; it comes from a place"
     things = ", ".join(f"the {name} ({share:.2f})" for name, _, share in found[0].things)
-    told = placed(text, goals[0])
+    told = placed(f"the {which} sound {named} at {onset_s:.1f} s; it comes from a place", goals[0])
     return lists.answer(goals, f"{told} It may be {things}." if things else told)
 
 
