@@ -9,10 +9,9 @@ import numpy as np
 from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.perception.cache import encode_batch
-from avlmaps.perception.protocols import PixelEncoder
+from avlmaps.perception.protocols import UNIT_WITHIN, PixelEncoder
 from avlmaps.recordings.types import Frame
 
-_UNIT = 0.02
 _LOOKED_AT = slice(None, None, 8)  # rows and columns of an encoder's grid: one that is wrong is wrong in most
 
 
@@ -78,7 +77,7 @@ def require_unit(features: np.ndarray, who: str, frame: Frame) -> None:
             f"{who} NaN or infinite features for {frame.name} (in {int((~np.isfinite(lengths)).sum())} of "
             f"{lengths.size} cells); they must be finite, and zero where there is nothing to say."
         )
-    off = (lengths > _UNIT) & (np.abs(lengths - 1.0) > _UNIT)
+    off = (lengths > UNIT_WITHIN) & (np.abs(lengths - 1.0) > UNIT_WITHIN)
     if off.any():
         raise BackendError(
             f"{who} features of length {lengths[off].min():.3g} to {lengths[off].max():.3g} for {frame.name}; each has "
@@ -92,6 +91,6 @@ def as_row(found: Any, dim: int, who: str, frame: Frame) -> Float32[np.ndarray, 
     row = array.reshape(-1) if array.ndim in (1, 2) else array
     if array.dtype.kind != "f" or row.shape != (dim,) or not np.isfinite(row).all():
         raise BackendError(f"{who} gave {array.dtype} of {array.shape} for {frame.name}; it is {dim} finite numbers.")
-    if abs((length := float(np.linalg.norm(row))) - 1.0) > _UNIT:
+    if abs((length := float(np.linalg.norm(row))) - 1.0) > UNIT_WITHIN:
         raise BackendError(f"{who} gave a feature of length {length:.3g} for {frame.name}; divide it by its length.")
     return row.astype(np.float32)

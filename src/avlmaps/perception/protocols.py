@@ -19,6 +19,7 @@ from avlmaps.recordings.types import Frame
 
 TABLE = "room_contents.csv"
 FURNISHED = Path(__file__).parent
+UNIT_WITHIN = 0.02  # by as much the length of a feature may differ from one
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -221,8 +221,8 @@ def _names(lists: _Lists) -> Answer:
     else:
         goals = list(map(_thing_goal, lists.things()))
     named = [goal.name for goal in goals] if where is None else [room.name for room in where.rooms]
-    many = "is 1" if len(named) == 1 else f"are {len(named) or 'no'}"
-    text = f"There {many} {kind[:-1] if len(named) == 1 else kind}{f': {counted(named)}' if named else ''}."
+    many = f"is 1 {kind[:-1]}" if len(named) == 1 else f"are {len(named) or 'no'} {kind}"
+    text = f"There {many}{f': {counted(named)}' if named else ''}."
     return lists.answer(goals, text, count=len(named))
 
 

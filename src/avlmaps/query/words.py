@@ -21,7 +21,7 @@ from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.lexicon import EntryKind, lexicon, noun_of
 from avlmaps.core.machine import usable_cores
 from avlmaps.core.registry import Kind
-from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder, ViewEncoder
+from avlmaps.perception.protocols import UNIT_WITHIN, NamedPixelEncoder, PixelEncoder, ScaledEncoder, ViewEncoder
 from avlmaps.query.settings import ObjectSettings
 
 if TYPE_CHECKING:
@@ -145,9 +145,6 @@ def margins(
     return score - np.maximum(rival, np.float32(least)), first_mute & second_mute & (second_word >= 0)
 
 
-_UNIT = 0.02  # by as much a length may differ from one, as in features of pixels
-
-
 def encoded_words(encoder: PixelEncoder | ViewEncoder, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
     """Return a row for each word, zero for one that is not known. ``BackendError``: the encoder gave others."""
     what = f"encode_words of the encoder {encoder!r}"
@@ -159,7 +156,7 @@ def encoded_words(encoder: PixelEncoder | ViewEncoder, words: Sequence[str]) -> 
         raise BackendError(f"{what} failed on {len(words)} words with {type(fault).__name__}: {fault}") from fault
     card, lengths = getattr(encoder, "card", None), np.linalg.norm(rows, axis=-1)
     dim = (card is not None and card.dim) or rows.shape[-1]
-    is_unit = (lengths <= _UNIT) | (np.abs(lengths - 1.0) <= _UNIT)
+    is_unit = (lengths <= UNIT_WITHIN) | (np.abs(lengths - 1.0) <= UNIT_WITHIN)
     if rows.shape != (len(words), dim) or not is_unit.all():  # NaN is neither
         least, most = lengths.min(initial=np.inf), lengths.max(initial=0.0)
         raise BackendError(

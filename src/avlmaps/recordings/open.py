@@ -27,13 +27,11 @@ from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import level_faults, with_microphones
 from avlmaps.recordings.corrections import Corrections, corrected, uncorrected
 from avlmaps.recordings.faults import Fault, listed, report, unfit
-from avlmaps.recordings.formats.file_recording import FileRecording
+from avlmaps.recordings.formats.file_recording import LOOKED_AT, FileRecording
 from avlmaps.recordings.microphones import microphones_named
 from avlmaps.recordings.types import Recording
 
 ENTRY_POINT_GROUP = "avlmaps.formats"
-# A folder of a million files must not be listed to be recognised.
-LOOKED_AT = 2000
 # A sound track that covers a smaller share of the frames is worth a notice.
 _LEAST_SHARED = 0.5
 _HERE = "avlmaps.recordings.formats"

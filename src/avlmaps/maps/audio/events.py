@@ -17,11 +17,10 @@ from avlmaps.maps.audio.background import denoise, is_swell, noise_profile
 from avlmaps.maps.audio.segmentation import Segment, frames_of_track, segment, split_at_changes
 from avlmaps.maps.settings import HearingSettings, SoundChangeSettings
 from avlmaps.maps.types import HeardSounds
-from avlmaps.perception.protocols import FrameSoundEncoder, SoundEncoder
+from avlmaps.perception.protocols import UNIT_WITHIN, FrameSoundEncoder, SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 
 _NEAR_M = 1e-4  # places nearer than this are one
-_UNIT = 0.02
 _EDGE_S = 0.05  # quiet is only what is this far from a sound
 
 
@@ -146,7 +145,7 @@ def _encoded(encoder: SoundEncoder, sound: Sound) -> Float32[np.ndarray, "window
     given = Sound(sound.samples.copy(), sound.rate_hz)  # an encoder may write into what it is given
     feature = np.asarray(encoder.encode(given), np.float32)
     lengths = np.linalg.norm(feature, axis=-1) if feature.ndim == 2 else np.zeros(0)
-    if not len(lengths) or feature.shape[1] != encoder.card.dim or not (np.abs(lengths - 1.0) <= _UNIT).all():
+    if not len(lengths) or feature.shape[1] != encoder.card.dim or not (np.abs(lengths - 1.0) <= UNIT_WITHIN).all():
         raise BackendError(
             f"The sound model {encoder.card.id} returned features of {feature.shape} for {sound.duration_s:.2f} s; its "
             f"card promises finite ones of (windows, {encoder.card.dim}) and unit length."

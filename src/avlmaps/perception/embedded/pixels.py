@@ -109,7 +109,7 @@ SMALLEST_LOG_AREA, LARGEST_LOG_AREA = -4.0, 0.7
 
 
 class EmbeddedPixels(NamedEncoder):
-    """Distinguishes 151 things of homes and offices by their shape, helped a little by colour."""
+    """Distinguishes a hundred and fifty things of homes and offices by their shape, helped a little by colour."""
 
     _names = "categories"
 

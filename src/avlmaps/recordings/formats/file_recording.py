@@ -38,7 +38,7 @@ _FILMS = (".mp4", ".mov", ".mkv", ".webm", ".avi", ".m4v")
 # Samples without a header, under any name; of what is called audio or sound all is meant to be heard but these texts.
 _RAW = (".pcm", ".s16", ".s16le", ".f32", ".f32le")
 _TEXTS = (".json", ".jsonl", ".csv", ".txt", ".md", ".xml", ".yaml", ".yml", ".html")
-_LOOKED_AT = 2000  # files of a folder beside the pictures
+LOOKED_AT = 2000  # files of a folder: one of a million must not be listed to be recognised
 _NUMBER = re.compile(r"([0-9]+(?:\.[0-9]+)?)")
 
 
@@ -360,7 +360,7 @@ def open_audio(folder: Path, start_s: float = 0.0, films: bool = True) -> AudioT
         return None
     below = [sub for sub in sorted(folder.iterdir()) if sub.is_dir() and not sub.name.startswith(".")]
     below.sort(key=lambda sub: sub.name.casefold() not in _TRACKS)
-    places = [sorted(folder.iterdir()), *(sorted(islice(sub.iterdir(), _LOOKED_AT)) for sub in below)]
+    places = [sorted(folder.iterdir()), *(sorted(islice(sub.iterdir(), LOOKED_AT)) for sub in below)]
     named, others = next((found for files in places if any(found := _sounds(files))), ((), ()))
     if named:
         return AudioTrack.open(named[0], start_s=start_s)
