@@ -368,12 +368,12 @@ def depth_in_colour(depth_m: Float32[np.ndarray, "hd wd"], rig: Rig) -> tuple[Pi
         return rig.rgb.resized(depth_m.shape[1], depth_m.shape[0]), depth_m
     shrink = min(1.0, rig.depth.fx / rig.rgb.fx, rig.depth.fy / rig.rgb.fy)
     camera = rig.rgb.resized(max(1, round(rig.rgb.width * shrink)), max(1, round(rig.rgb.height * shrink)))
-    row, column = np.nonzero(depth_m > 0.0)
-    z = depth_m[row, column]
-    x = np.asarray((np.arange(depth_m.shape[1]) + 0.5 - rig.depth.cx) / rig.depth.fx, np.float32)[column] * z
-    y = np.asarray((np.arange(depth_m.shape[0]) + 0.5 - rig.depth.cy) / rig.depth.fy, np.float32)[row] * z
-    towards = rig.rgb_from_depth[:3].astype(np.float32)
-    seen = nearest_depth(np.stack([a * x + b * y + c * z + d for a, b, c, d in towards]), camera)
+    x = np.asarray((np.arange(depth_m.shape[1]) + 0.5 - rig.depth.cx) / rig.depth.fx, np.float32)
+    y = np.asarray((np.arange(depth_m.shape[0]) + 0.5 - rig.depth.cy) / rig.depth.fy, np.float32)[:, None]
+    a, b, c, d = rig.rgb_from_depth[:3].astype(np.float32).T[..., None, None]
+    points = a * x + (b * y + c)
+    points *= np.where(depth_m > 0.0, depth_m, np.float32(np.nan))
+    seen = nearest_depth((points + d).reshape(3, -1), camera)
     seen[np.isinf(seen)] = 0.0
     return camera, seen
 

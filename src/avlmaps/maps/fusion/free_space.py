@@ -56,12 +56,13 @@ def free_views(frames: Sequence[Frame], sensor: SensorModel) -> FreeViews:
 
 def clear_blocks(depth_m: Float32[np.ndarray, "h w"], size: int, sensor: SensorModel) -> UInt16[np.ndarray, "r c"]:
     """Return how far every ray of each block of pixels is free, millimetres rounded down; 0 where one has no depth."""
-    z = np.asarray(depth_m, np.float64)
-    free = np.where(z > 0.0, (z - sensor.clear_sigmas * sensor.sigma_m(z)) * 1000.0, 0.0)
-    rows, columns = -(-z.shape[0] // size), -(-z.shape[1] // size)
-    spare = (0, rows * size - z.shape[0]), (0, columns * size - z.shape[1])
-    whole = np.pad(free, spare, constant_values=_FARTHEST_MM).reshape(rows, size, columns, size)
-    return np.clip(np.nan_to_num(whole.min(axis=(1, 3)), nan=0.0), 0.0, _FARTHEST_MM).astype(np.uint16)
+    rows, columns = (-(-side // size) for side in depth_m.shape)
+    spare = (0, rows * size - depth_m.shape[0]), (0, columns * size - depth_m.shape[1])
+    lines = np.pad(depth_m, spare, mode="edge").reshape(rows, size, -1)
+    # As the error grows with depth, so a ray's free part is concave: least at a block's nearest or farthest pixel.
+    z = np.array([end(end(lines, 1).reshape(rows, columns, size), 2) for end in (np.min, np.max)], np.float64)
+    free = np.where(z[0] > 0.0, (z - sensor.clear_sigmas * sensor.sigma_m(z)).min(axis=0) * 1000.0, 0.0)
+    return np.clip(np.nan_to_num(free, nan=0.0), 0.0, _FARTHEST_MM).astype(np.uint16)
 
 
 class ThroughCounts:

@@ -307,8 +307,8 @@ def _padded(picture: Float32[np.ndarray, "c h w"], multiple: int) -> Float32[np.
     return np.pad(picture, ((0, 0), (0, -h % multiple), (0, -w % multiple)))
 
 
-def _softmax(score: Any) -> Float32[np.ndarray, "..."]:
-    e = np.exp(score - score.max(axis=-1, keepdims=True))
+def _softmax(score: Float32[np.ndarray, "..."]) -> Float32[np.ndarray, "..."]:  # in its place
+    e = np.exp(np.subtract(score, score.max(axis=-1, keepdims=True), out=score), out=score)
     return np.divide(e, e.sum(axis=-1, keepdims=True), out=e)
 
 
