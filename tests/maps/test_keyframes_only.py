@@ -51,6 +51,13 @@ def test_only_keyframes_are_encoded_and_every_frame_adds_its_surfaces(tmp_path: 
     assert with_feature[0].sum() > 0.5 * with_feature[1].sum()
 
 
+def test_a_camera_that_hardly_moves_shows_the_encoder_few_frames(tmp_path: Path) -> None:
+    walk = Walk()
+    walk.world_from_camera[:, 0, 3] *= 0.2  # 2 cm a frame; the encoder sees one in 5 cm, and every keyframe
+    build_map(walk, tmp_path / "slow", EVERY, SETTINGS, cache=NO_CACHE, progress=False)
+    assert {*select_keyframes(walk, SETTINGS.keyframes).tolist()} <= {*SEEN} and 8 <= len(SEEN) <= len(walk) - 8
+
+
 @given(st.sets(st.integers(0, 21)), st.sets(st.integers(0, 21), max_size=3), st.integers(1, 5))
 def test_frames_come_in_their_order_and_the_chosen_with_features(chosen: set[int], bad: set[int], batch: int) -> None:
     class Batched(SlowPixels):

@@ -93,10 +93,8 @@ def map_span(plan: BuildPlan, start: Start, frames: Iterable[EncodedFrame], file
 
 def spans_of_frames(plan: BuildPlan, start: Start, spans: Sequence[Span]) -> Generator[EncodedFrame]:
     """Yield the frames of stretches with their features, decoded and encoded ahead, each in a thread of its own."""
-    encoders = plan.encoders
-    encoder = encoders.pixels if Kind.PIXELS in encoders else None
-    chosen = plan.keyframes if encoders.keyframes_only else None
-    return encode_frames(plan.recording, [range(*span) for span in spans], encoder, chosen, start.ground)
+    encoder = plan.encoders.pixels if Kind.PIXELS in plan.encoders else None
+    return encode_frames(plan.recording, [range(*span) for span in spans], encoder, plan.looks, start.ground)
 
 
 def _map_frames(plan: BuildPlan, start: Start, workers: Workers | None) -> None:

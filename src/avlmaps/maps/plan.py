@@ -11,14 +11,17 @@ from avlmaps.core.files import sampled_digest
 from avlmaps.core.progress import say
 from avlmaps.core.wording import option
 from avlmaps.maps.keyframes import keyframes_by_motion
-from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.settings import BuildSettings, KeyframeSettings
 from avlmaps.maps.store.folder import MANIFEST, PARTS, is_map_or_free, read_info, remove_parts, sweep
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo
 from avlmaps.maps.store.tables import SUFFIX, key_of
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.types import LARGEST_BUDGET_BYTES, Recording
 
-BUILD_VERSION = 8  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
+BUILD_VERSION = 9  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
+
+# How far the camera goes between two frames that a pixel encoder is given (training/pixels/README.md).
+LOOKS = KeyframeSettings(translation_m=0.05, rotation_deg=3.5)
 
 Span = tuple[int, int, int]  # (first, last + 1, step) of frames
 
@@ -34,6 +37,7 @@ class BuildPlan:
     models: dict[str, ModelInfo]  # by module
     key: str  # hash of all ingredients
     keyframes: frozenset[int]  # numbers of frames
+    looks: frozenset[int]  # those that are given to the pixel encoder; the others add their surfaces and colours
 
     def spans(self) -> dict[Path, Span]:
         """Return the stretches of frames that are fused one after the other, by the files of what they bring."""
@@ -57,8 +61,9 @@ def make_plan(recording: Recording, path: Path, encoders: Encoders, settings: Bu
     key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), encoders.name, models, settings)
     numbers = np.arange(0, len(recording), settings.frames.step)
     stamps_s, poses = recording.stamps_s[numbers], recording.world_from_camera[numbers]
-    keyframes = numbers[keyframes_by_motion(stamps_s, poses, settings.keyframes)]
-    return BuildPlan(recording, path, encoders, settings, models, key, frozenset(keyframes.tolist()))
+    limits = settings.keyframes, settings.keyframes if encoders.keyframes_only else LOOKS
+    keyframes, looks = (frozenset(numbers[keyframes_by_motion(stamps_s, poses, one)].tolist()) for one in limits)
+    return BuildPlan(recording, path, encoders, settings, models, key, keyframes, keyframes | looks)
 
 
 def require_place(path: Path, overwrite: bool) -> None:

@@ -346,9 +346,7 @@ class PairedNetworks:
         other = np.zeros_like(seen.category)
         other[..., self._column] = second.category
         share = share_of_second(seen.category, other, seen.known)
-        return replace(
-            seen, category=mixed(seen.category, other, share), room=mixed(seen.room, second.room, share)
-        )  # fmt: skip
+        return replace(seen, category=mixed(seen.category, other, share), room=mixed(seen.room, second.room, share))
 
 
 def share_of_second(
