@@ -20,8 +20,7 @@ from avlmaps.recordings.types import LARGEST_BUDGET_BYTES, Recording
 
 BUILD_VERSION = 9  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
 
-# How far the camera goes between two frames that a pixel encoder is given (training/pixels/README.md).
-LOOKS = KeyframeSettings(translation_m=0.05, rotation_deg=3.5)
+LOOKS = KeyframeSettings(translation_m=0.05, rotation_deg=3.5)  # how far apart frames are that an encoder is given
 
 Span = tuple[int, int, int]  # (first, last + 1, step) of frames
 

@@ -109,7 +109,6 @@ def level_axes(up_in_camera: Float[np.ndarray, "3"]) -> tuple[Float[np.ndarray, 
 
 # Without ground a camera is taken to be upright and as high as people and robots mostly hold it.
 _USUAL_HEIGHT_M = 1.3
-# Names of the weights that ship.
 DEFAULT_WEIGHTS: Final = "scene_encoder"
 SYNTHETIC_WEIGHTS: Final = "scene_encoder_synthetic"
 
@@ -122,7 +121,6 @@ class Augmentation:
     mirrored: bool = False
 
 
-# As maps see each of their many frames.
 PLAIN = Augmentation()
 _ACROSS = 4  # the channel of geometry that changes its sign in a mirror: the normal along right
 
@@ -313,8 +311,7 @@ def _softmax(score: Float32[np.ndarray, "..."]) -> Float32[np.ndarray, "..."]:  
 
 
 # Agreement at which the second network begins to count, and from which on both count the same; in between its share
-# grows evenly. Chosen on real frames of the development split and on frames of simulated homes with artists' furniture
-# (training/pixels/README.md).
+# grows evenly (training/pixels/README.md).
 NO_SAY, SAME_SAY = 0.75, 0.95
 
 
