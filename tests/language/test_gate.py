@@ -29,7 +29,8 @@ ORDERS = [
     "why don't you go to the kitchen?", "I was wondering if you could go to the sofa", "Go to the bed, I say",
     "go to the book: then turn left",
 ]  # fmt: skip
-HELD_OUT = [("gate_held_out", 90, 10), ("gate_hand_held_out", 180, 14), ("gate_aimed_held_out", 162, 40)]
+HELD_OUT = [("gate_held_out", 90, 10), ("gate_hand_held_out", 180, 14), ("gate_aimed_held_out", 162, 40),
+            ("gate_hands_hij_held_out", 272, 42)]  # fmt: skip
 ROWS = [(kind, text) for kind, texts in NO_ORDERS.items() for text in texts]
 
 
@@ -64,7 +65,7 @@ def test_no_model_is_asked_to_write_a_danger(text: str) -> None:
 
 @pytest.mark.parametrize(("file", "caught", "asked"), HELD_OUT)
 def test_sentences_that_the_network_never_saw_are_told_apart(file: str, caught: int, asked: int) -> None:
-    """Of 100, 200 and 182 no orders at least so many are told; of 60, 200 and 180 orders at most so many asked back."""
+    """Of 100, 200, 181, 322 no orders so many are told at least; of 60, 200, 180, 308 orders asked back at most."""
     with (LISTS / f"{file}.tsv").open(encoding="utf-8", newline="") as rows:
         closed = [row["is"] for row in csv.DictReader(rows, delimiter="\t") if no_order(row["sentence"]) is not None]
     assert closed.count("no") >= caught and closed.count("order") <= asked
