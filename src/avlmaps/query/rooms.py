@@ -278,8 +278,9 @@ class Rooms:
         np.add.at(counted, self.plan.voxel_cells[named.rows], nats)
         per_cell = 2.0 * np.pi * (settings.things_m / CELL_M) ** 2
         near = self.plan.spread(counted, settings.things_m) * np.float32(settings.thing_weight * per_cell)
-        strongest = np.abs(near).max(axis=1, keepdims=True)
-        return (near / (1.0 + strongest / settings.most_nats)).astype(np.float32)
+        # Behind the likeliest kind: what a bathroom lacks says nothing of whether a kitchen is a living room.
+        behind = near.max(axis=1, keepdims=True) - near
+        return (-behind / (1.0 + behind / settings.most_nats)).astype(np.float32)
 
 
 def voting_rows(index: Int[np.ndarray, "n 3"], products: int) -> tuple[Int[np.ndarray, " m"], int]:
