@@ -3,7 +3,7 @@
 import json
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -127,7 +127,13 @@ def meanings(row: Mapping[str, Any]) -> "list[tuple[Intent, ...] | Inquiry | Non
         found = (_listed(one) if one["ask"] == "list" else _inquiry(one) for one in readings if not _by_rows(one))
         asks_room = _WHICH_ROOM.search(row["say"]) is not None
         return [_of_room(one) if asks_room else one for one in found]
-    return [tuple(intent_of(one) for one in each) for each in (row["intents"], *row.get("also", ()))]
+    # What is done at each of several places is written behind the visit; `claims.at_each` puts it inside.
+    every = (row["intents"], *row.get("also", ()))
+    return [tuple(intent_of(step) for one in each for step in (one, *_at_each(one))) for each in every]
+
+
+def _at_each(said: Mapping[str, Any]) -> Sequence[Any]:
+    return said.get("body", ()) if said["do"] == "visit_each" else ()
 
 
 def _of_room(asked: Inquiry | None) -> Inquiry | None:
