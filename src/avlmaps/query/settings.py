@@ -78,8 +78,7 @@ class RoomSettings:
     thing_weight: float = 2.0
     """Weight of the things' votes, in nats a square metre of their surface; 0 lets views vote alone."""
     most_nats: float = 6.0
-    """All things at a place never speak for one kind of room before another by more than this, since voxels side by
-    side are one thing."""
+    """All things at a place speak for one kind of room before another by less: voxels side by side are one thing."""
 
 
 @dataclass(frozen=True, slots=True)
