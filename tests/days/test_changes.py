@@ -9,7 +9,8 @@ import pytest
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
-from avlmaps.language.list_questions import Listed, read_list
+from avlmaps.language.list_questions import Listed, list_question, read_list
+from avlmaps.language.questions import read_question
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.life import Life, Stay
 from avlmaps.maps.store.manifest import RecordingInfo, RigInfo, Visit
@@ -161,7 +162,7 @@ def test_things_of_a_day_are_meant_by_other_words_as_well(names: list[str] | Non
     ],
 )
 def test_questions_about_days_are_read(sentence: str, of: Listed, name: str, change: str, since: str) -> None:
-    read = read_list(sentence)
+    read = read_list(sentence) or list_question(read_question(sentence).inquiry)
     assert read is not None
     assert (read.of, read.name, read.change, read.since) == (of, name, change, since)
 

@@ -18,7 +18,7 @@ ROWS = read_list(LISTS / "kinds.jsonl")
 KINDS = sorted({str(row["kind"]) for row in ROWS})
 QUICK = {"or and not", "purposes", "stop", "direction", "paths", "third person", "parts", "languages", "left out"}
 # Of each kind, at most so many are asked back or harmless, and so many misread; 0 and 0 of the others.
-SHORT = {"roboticist": (5, 1), "other voices": (1, 1), "states": (0, 1), "parts": (2, 0), "open names": (1, 0),
+SHORT = {"roboticist": (5, 1), "other voices": (1, 1), "states": (0, 1), "parts": (2, 0), "open names": (1, 0), "purposes": (1, 0),
          "order in time": (1, 0), "dictation": (1, 0), "who and sounds": (1, 1), "possessives and pointing": (1, 0),
          }  # fmt: skip
 THINGS = st.sampled_from(["oven", "lamp", "washing machine", "heater", "tv", "printer"])
@@ -51,7 +51,7 @@ def is_refused(question: str) -> bool:
     room=ROOMS,
     asks=st.sampled_from([
         "is the {} in the {} on", "is the {} in the {} broken", "did I leave the {} in the {} on",
-        "did you switch off the {} in the {}", "is there more than one {} in the {}", "is there only one {} in the {}",
+        "did you switch off the {} in the {}", "is there only one {} in the {}",
         "does every {} in the {} work", "can the baby touch the {} in the {}", "where should I put the {} in the {}",
     ]),
 )  # fmt: skip

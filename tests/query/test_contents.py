@@ -139,7 +139,7 @@ def test_a_wall_hides_what_an_open_plan_shows_and_who_asks_for_sounds_is_told_so
     def thing(name: str, x: float) -> Thing:
         return Thing(name, 0.9, (x, 1.5, 0.5), (0.4, 0.4, 0.4), (0, 0, 0), np.zeros(0, np.int64), np.zeros((0, 3)))
 
-    def told(walled: bool, of: Listed, how: str = "") -> list[str]:
+    def told(walled: bool, question: ListQuestion) -> list[str]:
         plan = FloorPlan.of(two_rooms(0.0, walled), storeys_at(0.0))
         assert plan is not None
         lists = {"space": plan.space, "things": lambda: there, "sounds": lambda: heard}
@@ -147,16 +147,16 @@ def test_a_wall_hides_what_an_open_plan_shows_and_who_asks_for_sounds_is_told_so
         avlmap: Any = SimpleNamespace(
             **lists, where=rooms, room_votes=SimpleNamespace(plan=plan), settings=QuerySettings(), has=bool
         )
-        answer = answer_list(avlmap, ListQuestion(of, "sofa", how=how), 9, lambda words: sofa)
+        answer = answer_list(avlmap, question, 9, lambda words: sofa)
         return [goal.name for goal in answer.goals]
 
     heard = [SoundEvent((f"dog {x}",), (0.9,), x, 9.0, (x, 1.5, 0.5), np.zeros((0, 3)), Path()) for x in (2.2, 3.8)]
     there = [thing("sink", 3.5), thing("chair", 1.9), thing("window", 3.0)]
     part = PartAnswer(Part(Modality.OBJECT, "sofa", Role.PRIMARY), 1.0, True)
     sofa = Answer((Goal((2.5, 1.5, 0.5), 0.8, (0.4, 0.4, 0.4), {}, 0.8),), True, (part,))
-    assert told(True, Listed.BESIDE) == ["window", "chair"] and told(True, Listed.HEARD, "near") == ["dog 2.2"]
-    assert told(False, Listed.BESIDE) == ["window", "chair", "sink"]
-    assert told(False, Listed.HEARD, "near") == ["dog 2.2", "dog 3.8"]
+    beside, near = ListQuestion(Listed.BESIDE, "sofa"), ListQuestion(Listed.HEARD, how="near", other="sofa")
+    assert told(True, beside) == ["window", "chair"] and told(True, near) == ["dog 2.2"]
+    assert told(False, beside) == ["window", "chair", "sink"] and told(False, near) == ["dog 2.2", "dog 3.8"]
 
 
 @pytest.mark.parametrize(

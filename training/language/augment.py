@@ -173,7 +173,7 @@ def _changed(meaning: Any, change: Any) -> Any:
         return replace(change(target), near=tuple(deep(near) for near in target.near))
 
     if isinstance(meaning, Inquiry):
-        return Inquiry(meaning.ask, tuple(deep(target) for target in meaning.of))
+        return replace(meaning, of=tuple(deep(target) for target in meaning.of))
     return meaning if meaning is None else tuple(on_targets(intent, deep) for intent in meaning)
 
 

@@ -20,7 +20,7 @@ from avlmaps.language.learned.decision import Weighed, decided, is_same
 from avlmaps.language.learned.reader import LearnedReader, Read, ReadingLimits
 from avlmaps.language.questions import asked, by_name
 from avlmaps.language.sentence import Attachments, Sentence
-from avlmaps_sim.bench.language import OUTCOMES, judge_intents, judge_question, read_list
+from avlmaps_sim.bench.language import OUTCOMES, judge_intents, judge_question, read_list, told
 
 FOLDS = (
     HELD_OUT,
@@ -74,7 +74,7 @@ def outcome(one: Heard, limits: ReadingLimits) -> str:
     if "question" in one.row:
         try:
             found = by_name(one.sentence) or asked(one.sentence, one.question, limits)
-            got: Any = found.inquiry.to_json()
+            got: Any = told(found.inquiry)
         except QueryError:
             got = _REFUSED
         return judge_question(got, one.row)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from avlmaps.language.intents import Inquiry, Intent, Pick, Target, TargetKind
-from avlmaps.language.learned.linear import ROWS, Amount, Grammar, MalformedError, Pointable, Row, Slot, Symbol
+from avlmaps.language.learned.linear import LEAST, ROWS, Amount, Grammar, MalformedError, Pointable, Row, Slot, Symbol
 
 _ALIKE = 0.01
 
@@ -40,7 +40,8 @@ def line_of_question(inquiry: Inquiry | None, at: Pointers) -> list[Symbol]:
     """
     if inquiry is None:
         return ["refuse", "end"]
-    return [f"ask_{inquiry.ask}", *(symbol for target in inquiry.of for symbol in _target(target, at)), "end"]
+    least = [_amount(float(inquiry.number), LEAST, at)] if inquiry.ask.is_numbered and inquiry.number > 1 else []
+    return [f"ask_{inquiry.ask}", *least, *(symbol for target in inquiry.of for symbol in _target(target, at)), "end"]
 
 
 def is_written_well(line: Sequence[Symbol], can: Pointable, *, is_question: bool) -> bool:

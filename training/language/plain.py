@@ -5,7 +5,7 @@ Writers seldom write what is plain. A reader that has seen few plain lists of go
 
 import random
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from training.language.augment import Names
@@ -66,6 +66,15 @@ _OPPOSITE = {
     Ask.SMALLEST_ROOM: (Ask.LARGEST_ROOM, "large", ("smallest", "tiniest")),
     Ask.LAST_SOUND: (Ask.FIRST_SOUND, "early", ("last", "latest", "most recent")),
 }
+_THING, _PLACE, _SOUND = (TargetKind.OBJECT,), (TargetKind.AREA, TargetKind.OBJECT), (TargetKind.SOUND,)
+_RELATED = {
+    Ask.WHEN: [("when", Ask.WHEN, _SOUND), ("seen", Ask.WHEN, _THING), ("often", Ask.HOW_MANY, _SOUND)],
+    Ask.HEARD: [("heard", Ask.HEARD, _PLACE)], Ask.BEFORE: [("before", Ask.BEFORE, _SOUND)],
+    Ask.AFTER: [("before", Ask.AFTER, _SOUND)], Ask.BETWEEN: [("between", Ask.BETWEEN, _THING)],
+    Ask.MOST: [("most", Ask.MOST, _THING)],
+    **{ask: [(str(ask), ask, _THING)] for ask in (Ask.ROOMS_WITH, Ask.AT_LEAST)},
+}  # fmt: skip
+_NUMBERS = ("one", "two", "three", "four", "five", "six")
 _ALL = {"rooms": ("rooms", "areas"), "sounds": ("sounds", "noises", "sound events"), "things": ("things", "objects")}
 
 
@@ -201,6 +210,8 @@ class _Maker:
         elif name in _ALL:
             written = Ask.ROOMS if ask == name else Ask.COUNT_ROOMS
             filled |= {"all": self.draw.choice(_ALL[name]), "each": name.removesuffix("s")}
+        if ask is not None and ask in _RELATED:
+            return self._related(_RELATED[ask])
         (room, area), (thing, object_) = self._of(TargetKind.AREA), self._of(TargetKind.OBJECT)
         if ask is Ask.ROOM_OF and self.draw.random() < 0.3:
             thing, object_ = self._of(TargetKind.SOUND)
@@ -208,9 +219,33 @@ class _Maker:
         text = self.draw.choice(_SAID["questions"][written or "refuse"])
         if "{all}" in text and "hear" in text and name != "sounds":
             return self._listed()
-        text = self.draw.choice(_SAID["questions"]["polite"]) + text.format(**filled, room=room, thing=thing)
-        text += self.draw.choice(("", "", "?", " ?", "."))
-        return Example(text, None if ask is None else Inquiry(ask, of), True, VOICE)
+        return self._asked(text.format(**filled, room=room, thing=thing), None if ask is None else Inquiry(ask, of))
+
+    def _related(self, choices: Sequence[tuple[str, Ask, Sequence[TargetKind]]]) -> Example:
+        """Return a question of sounds in time, of two things, or of a number of things."""
+        (written, ask, kinds), number = self.draw.choice(choices), self.draw.randint(2, 6)
+        (thing, target), (other, second), (room, area) = map(
+            self._of, (*(self.draw.choice(kinds) for _ in "12"), TargetKind.AREA)
+        )
+        text = self.draw.choice(_SAID["questions"][written])
+        words, more = (
+            ("two", "three", "four", "five", "six")[number - 2],
+            ("one", "two", "three", "four", "five")[number - 2],
+        )
+        least = (f"at least {words}", f"at least {number}", f"{words} or more", f"more than {more}", words)
+        said = {key: self.draw.choice(each) for key, each in _FILLED.items()} | {
+            "thing": thing, "other": other, "room": room, "early": str(ask), "many": plural_of(target.name),
+            "by": "in" if target.kind is TargetKind.AREA else self.draw.choice(("near", "next to", "by", "around")),
+            "number": self.draw.choice(least),
+        }  # fmt: skip
+        of = target.with_near(area) if "{room}" in text else target
+        return self._asked(
+            text.format(**said), Inquiry(ask, (of, second) if ask.of_two else (of,), number if ask.is_numbered else 1)
+        )
+
+    def _asked(self, text: str, meant: Inquiry | None) -> Example:
+        text = self.draw.choice(_SAID["questions"]["polite"]) + text + self.draw.choice(("", "", "?", " ?", "."))
+        return Example(text, meant, True, VOICE)
 
     def _condition(self) -> Example:
         """Return a command whose steps depend on whether the map has a thing, or on what no map says."""

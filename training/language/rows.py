@@ -40,6 +40,7 @@ ROOT = Path(__file__).parents[2]
 BLIND = ROOT / "packages/avlmaps-sim/src/avlmaps_sim/bench/data/language"
 LISTS = ROOT / "tests/language/commands"
 VOICES = Path(__file__).parent / "data"
+_WHICH_PLACE = re.compile(r"\b(?:rooms?|where|which|\w+where|zones|places)\b", re.IGNORECASE)
 _WHICH_ROOM = re.compile(r"\b(?:which|what) room\b", re.IGNORECASE)
 
 
@@ -124,7 +125,9 @@ def meanings(row: Mapping[str, Any]) -> "list[tuple[Intent, ...] | Inquiry | Non
         readings = [one for one in (row["question"], *row.get("also", ())) if isinstance(one, dict)]
         # Some lists are older than the lists of a map: what they refuse is answered now.
         readings.sort(key=lambda one: one["ask"] != "list")
-        found = (_listed(one) if one["ask"] == "list" else _inquiry(one) for one in readings if not _by_rows(one))
+        found = (
+            _listed(one, row["say"]) if one["ask"] == "list" else _inquiry(one) for one in readings if _is_read(one)
+        )
         asks_room = _WHICH_ROOM.search(row["say"]) is not None
         return [_of_room(one) if asks_room else one for one in found]
     # What is done at each of several places is written behind the visit; `claims.at_each` puts it inside.
@@ -152,14 +155,20 @@ def _inquiry(said: Mapping[str, Any]) -> Inquiry | None:
 _LISTED = {told: ask for ask, told in LISTED.items()}
 
 
-def _listed(said: Mapping[str, Any]) -> Inquiry:
-    ((key, of),) = ((key, of) for key, of in said.items() if key != "ask")
-    return Inquiry(_LISTED[key, ""], (target_of(of),)) if (key, "") in _LISTED else Inquiry(_LISTED[key, of], ())
+def _listed(said: Mapping[str, Any], say: str) -> Inquiry:
+    if "at_least" in said:  # older lists write both alike
+        target = target_of(said["of"])
+        ask = Ask.ROOMS_WITH if _WHICH_PLACE.search(say) and not target.near else Ask.AT_LEAST
+        return Inquiry(ask, (target,), int(said["at_least"]))
+    ((key, of),) = ((key, of) for key, of in said.items() if key not in ("ask", "number"))
+    ask = _LISTED.get((key, "")) or _LISTED[key, of]
+    targets = () if ask.of_map else tuple(map(target_of, of if isinstance(of, list) else [of]))
+    return Inquiry(ask, targets, int(said.get("number", 1)))
 
 
-def _by_rows(said: Mapping[str, Any]) -> bool:
-    """Return whether rows of `list_questions.toml` read a question, not the networks."""
-    return said["ask"] == "list" and not {key for key, _ in _LISTED} & set(said)
+def _is_read(said: Mapping[str, Any]) -> bool:
+    """Return whether the networks read a question, not rows of `list_questions.toml`."""
+    return said["ask"] != "list" or bool({"at_least", *(key for key, _ in _LISTED)} & set(said))
 
 
 def examples_of(path: Path) -> Iterator[Example]:

@@ -1,6 +1,7 @@
 """The weights that ship, as networks that learn further: `export` backwards."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import torch
 from onnx import numpy_helper
 from training.language.network import Network, Size
 
+from avlmaps.language.learned.linear import SYMBOLS
+
 
 def unfolded(folder: Path) -> tuple[list[Network], dict[str, int]]:
     """Return the networks of a folder that `export.write` wrote, and their vocabulary.
@@ -16,11 +19,19 @@ def unfolded(folder: Path) -> tuple[list[Network], dict[str, int]]:
     Raises:
         ValueError: a weight of another shape, or none, is found.
     """
-    told = json.loads((folder / "reader.json").read_text(encoding="utf-8"))["vocabulary"]
-    arrays = {**_arrays(folder / "words.onnx"), **_arrays(folder / "step.onnx")}
+    facts = json.loads((folder / "reader.json").read_text(encoding="utf-8"))
+    told, arrays = facts["vocabulary"], {**_arrays(folder / "words.onnx"), **_arrays(folder / "step.onnx")}
+    for name in [one for one in arrays if one.startswith("decoders.") and ".symbol" in one]:
+        arrays[name] = _of_symbols(arrays[name], facts["symbols"])
     count = len({name.split(".")[1] for name in arrays})
     networks = [_network(arrays, number, Size(len(told))) for number in range(count)]
     return networks, {word: at for at, word in enumerate(told, start=1)}
+
+
+def _of_symbols(rows: np.ndarray, known: Sequence[str]) -> np.ndarray:
+    """Return the rows of today's symbols: one that the weights did not know begins as the mean of the questions."""
+    asks = rows[[at for at, symbol in enumerate(known) if symbol.startswith("ask_")]].mean(0)
+    return np.stack([rows[known.index(symbol)] if symbol in known else asks for symbol in SYMBOLS])
 
 
 def _network(arrays: dict[str, np.ndarray], number: int, size: Size) -> Network:

@@ -385,6 +385,14 @@ class Ask(StrEnum):
     COUNT_ROOMS = "count_rooms"
     COUNT_SOUNDS = "count_sounds"
     COUNT_THINGS = "count_things"
+    WHEN = "when"  # a sound was heard, or a thing last seen
+    HEARD = "heard"  # which sounds, in a room or near a thing
+    BEFORE = "before"
+    AFTER = "after"
+    BETWEEN = "between"
+    ROOMS_WITH = "rooms_with"  # at least a number of things
+    AT_LEAST = "at_least"
+    MOST = "most"  # the room with the most things
 
     @property
     def is_listed(self) -> bool:
@@ -394,15 +402,29 @@ class Ask(StrEnum):
     @property
     def of_map(self) -> bool:
         """Whether no target is asked about."""
-        return self.is_listed and self not in (Ask.ROOM_OF, Ask.CONTENTS, Ask.BESIDE)
+        return str(self).endswith(("_room", "_sound", "rooms", "sounds", "things"))
+
+    @property
+    def of_two(self) -> bool:
+        """Whether two targets are compared."""
+        return self in (Ask.BEFORE, Ask.AFTER, Ask.BETWEEN)
+
+    @property
+    def is_numbered(self) -> bool:
+        """Whether a number of things is asked about."""
+        return self in (Ask.ROOMS_WITH, Ask.AT_LEAST)
 
 
 @dataclass(frozen=True, slots=True)
 class Inquiry:
-    """A question to the map: of several targets ("where can I sit?") any answers it, of the whole map none is given."""
+    """A question to the map: of several targets ("where can I sit?") any answers it, of the whole map none is given.
+
+    ``number`` is the least of ``ROOMS_WITH`` and ``AT_LEAST``.
+    """
 
     ask: Ask
     of: tuple[Target, ...]
+    number: int = 1
 
     def to_json(self) -> dict[str, Any]:
         """Return the question as JSON has it."""

@@ -5,15 +5,15 @@ The networks read those for which they have symbols, rows of `list_questions.tom
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cache
 from itertools import dropwhile
 
-from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
-from avlmaps.language.intents import Ask, Inquiry, TargetKind
+from avlmaps.core.words import plural_of, singulars_of
+from avlmaps.language.intents import Ask, Inquiry, Target, TargetKind
 from avlmaps.language.lexer import without_spoken_end
 from avlmaps.language.names import mended, sounding_forms
 from avlmaps.language.sentence import OwnName, stand_ins
@@ -37,7 +37,9 @@ class Listed(StrEnum):
     NAMES = "all rooms, sounds or things"
     CHANGES = "what is new, gone or moved"
     LAST_SEEN = "where a thing was last seen"
-    HEARD = "when, where and how often a sound was heard"
+    HEARD = "when and how often a sound was heard, or which sounds were"
+    ROOMS_WITH = "rooms with a number of things"
+    AT_LEAST = "whether there are so many"
     USUAL = "what is usually somewhere, or where a thing usually is"
 
 
@@ -52,9 +54,10 @@ class ListQuestion:
     since: str = ""  # the day after which changes count, as it was said; "" for the first
     change: str = ""  # ``new``, ``gone`` or ``moved``; "" for any change
     # Of ``USUAL`` ``on``, ``in`` or ``near`` the name ("": where it usually is); of ``HEARD`` ``before`` or ``after``
-    # another sound, ``in`` the room or ``near`` the thing of that name; of ``BESIDE`` ``rooms`` where these are sought.
+    # another sound, ``in`` a room or ``near`` a thing; of ``BESIDE`` ``rooms`` where these are sought.
     how: str = ""
-    other: str = ""  # the other sound, or the other of two things between which all are sought
+    other: str = ""  # the other sound, the room or thing where sounds were heard, or the other of two things
+    number: int = 0  # of ``AT_LEAST`` and ``ROOMS_WITH``; 0: the room with the most
 
 
 _ASKED = {
@@ -65,6 +68,14 @@ _ASKED = {
     Ask.ROOM_OF: ListQuestion(Listed.ROOM_OF),
     Ask.CONTENTS: ListQuestion(Listed.CONTENTS),
     Ask.BESIDE: ListQuestion(Listed.BESIDE),
+    Ask.BETWEEN: ListQuestion(Listed.BESIDE),
+    Ask.HEARD: ListQuestion(Listed.HEARD),
+    Ask.BEFORE: ListQuestion(Listed.HEARD, how="before"),
+    Ask.AFTER: ListQuestion(Listed.HEARD, how="after"),
+    Ask.WHEN: ListQuestion(Listed.LAST_SEEN),
+    Ask.MOST: ListQuestion(Listed.ROOMS_WITH),
+    Ask.ROOMS_WITH: ListQuestion(Listed.ROOMS_WITH),
+    Ask.AT_LEAST: ListQuestion(Listed.AT_LEAST),
     **{Ask(name): ListQuestion(Listed.NAMES, name) for name in ("rooms", "sounds", "things")},
     **{Ask(f"count_{name}"): ListQuestion(Listed.NAMES, name, counts=True) for name in ("rooms", "sounds", "things")},
 }
@@ -72,17 +83,39 @@ _ASKED = {
 
 def list_question(inquiry: Inquiry) -> ListQuestion | None:
     """Return the question to the lists that the networks read; None for another one."""
-    if not inquiry.ask.is_listed:
+    ask, of = inquiry.ask, inquiry.of
+    hears = [one.kind is TargetKind.SOUND for one in of]
+    if ask in (Ask.WHEN, Ask.HOW_MANY) and hears == [True]:
+        return _heard(of[0].name, of[0].near, counts=ask is Ask.HOW_MANY)
+    if not ask.is_listed:
         return None
-    listed = _ASKED[inquiry.ask]
-    if not inquiry.of:
+    listed = _ASKED[ask]
+    if not of:
         return listed
-    about = inquiry.of[0]
-    if about.kind is TargetKind.IMAGE and inquiry.ask is Ask.ROOM_OF:
+    if ask is Ask.HEARD:
+        return _heard("", of[:1])
+    if of[0].kind is TargetKind.IMAGE and ask is Ask.ROOM_OF:
         return replace(listed, name="this photo")
-    if about.is_file or len(inquiry.of) > 1:
+    if any(one.is_file for one in of) or len(of) != 1 + ask.of_two:
         return None
-    return replace(listed, name=f"sound of {about.name}" if about.kind is TargetKind.SOUND else phrase(about)[4:])
+    if listed.of is Listed.HEARD:
+        plain = all(hears) and not any(one.near for one in of)
+        return replace(listed, name=of[0].name, other=of[1].name) if plain else None
+    if listed.of in (Listed.AT_LEAST, Listed.ROOMS_WITH):
+        of = (replace(of[0], name=of[0].name if singulars_of(of[0].name) else plural_of(of[0].name)),)
+    said = [f"sound of {one.name}" if one.kind is TargetKind.SOUND else phrase(one)[4:] for one in of]
+    name = of[0].name if listed.of is Listed.LAST_SEEN else said[0]
+    number = inquiry.number if ask.is_numbered else 0
+    return replace(listed, name=name, other=said[1] if ask.of_two else "", number=number)
+
+
+def _heard(name: str, near: Sequence[Target], *, counts: bool = False) -> ListQuestion | None:
+    if len(near) > 1 or any(one.kind not in (TargetKind.AREA, TargetKind.OBJECT) for one in near):
+        return None
+    how = ["in" if one.kind is TargetKind.AREA else "near" for one in near]
+    return ListQuestion(
+        Listed.HEARD, name, counts=counts, how="".join(how), other="".join(phrase(one)[4:] for one in near)
+    )
 
 
 _TABLE = "list_questions"
@@ -96,18 +129,15 @@ def _rows() -> Sequence[tuple[Listed, re.Pattern[str]]]:
 
 
 def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
-    """Return the question to the lists that a sentence is; None where it is another one.
-
-    Raises a QueryError where it asks for several sounds at once.
-    """
+    """Return the question to the lists that rows read; None where they read none."""
     stand = stand_ins(text, own)
     if stand.own:
         read = read_list(stand.text)
         return None if read is None else replace(read, name=stand.back(read.name), other=stand.back(read.other))
     plain = _plain(text)
     matched = ((of, found.groupdict("")) for of, says in _rows() if (found := says.fullmatch(plain)))
-    questions = ((_heard if of is Listed.HEARD else _listed)(of, defaultdict(str, said)) for of, said in matched)
-    return next(filter(None, questions), None)
+    questions = (_listed(of, defaultdict(str, said)) for of, said in matched)
+    return next(filter(None, questions), None) or _numbered(plain)
 
 
 def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
@@ -125,42 +155,20 @@ def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
     return ListQuestion(of, name, counts=counts, since=since, change=change, how=how, other=said["other"])
 
 
-def _heard(of: Listed, said: Mapping[str, str]) -> ListQuestion | None:
-    room = mended(said["room"]) or said["room"]
-    if room:
-        return None if lexicon().find(room, EntryKind.ROOM) is None else ListQuestion(of, room, how="in")
-    if said["thing"]:
-        return ListQuestion(of, said["thing"], how="near")
-    name, other = f"{said['heard'] or said['sounded']} {said['sounding']}".strip(), said["other"]
-    if pattern(_TABLE, "tail").search(f"{name} {other}") is not None:  # "... near the buffet" is read by the networks
-        return None
-    verbs = said["sounded"] or other  # "when did the phone ring", and no "when did the parcel come"
-    if verbs and not all(map(_sounds, filter(None, (name, other)))):
-        return None
-    first, both, second = name.partition(" and ")
-    if both and _sounds(first) and _sounds(second):
-        raise QueryError(f"Ask for one sound at a time: for {first}, then for {second.removeprefix('the ')}.")
-    return ListQuestion(of, name, counts=bool(said["counts"]), how=said["how"], other=other)
-
-
-def _sounds(name: str) -> bool:
-    return bool(sounding_forms().keys() & set(name.split())) or lexicon().head(name, EntryKind.SOUND) is not None
-
-
 def _how_of(said: str) -> str:
     if not said:
         return ""
     return "on" if said.startswith("on") else "in" if pattern(_TABLE, "in").fullmatch(said) else "near"
 
 
-def said_number(text: str) -> tuple[int, str] | None:
-    """Return how many of what a phrase names: "two chairs in the kitchen" is 2 and "chairs in the kitchen"."""
-    plain = pattern(_TABLE, "where").sub("", _plain(text)).removeprefix("the ")
+def _numbered(plain: str) -> ListQuestion | None:
+    # "Two chairs in the kitchen" asks whether there are so many.
+    plain = pattern(_TABLE, "where").sub("", plain).removeprefix("the ")
     found = re.fullmatch(rf"({'|'.join(NUMBERS)}|[2-9]|[1-9]\d) ([a-z][^.?!]*)", plain)
     name = "" if found is None else pattern(_TABLE, "tail").sub("", found[2]).strip()
     if found is None or all(lexicon().head(name, kind) is None for kind in (EntryKind.THING, EntryKind.ROOM)):
         return None
-    return NUMBERS.get(found[1]) or int(found[1]), found[2]
+    return ListQuestion(Listed.AT_LEAST, found[2], number=NUMBERS.get(found[1]) or int(found[1]))
 
 
 def said_alternatives(text: str) -> tuple[str, ...]:

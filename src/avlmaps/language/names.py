@@ -54,16 +54,12 @@ def is_other_form(word: str, other: str) -> bool:
 
 @cache
 def may_name(name: str) -> bool:
-    """Return whether the head of a name is an English word that can name a thing: "footstool" is, "tabel" is not."""
+    """Return whether the head of a name is spelt as English words are: "footstool" is, "tabel" is not."""
     words = name.lower().split()
     while len(words) > 1 and (words[-1] in WORDS or words[-1].isdigit()):
         words.pop()
     head = words[-1] if words else ""
-    if len(words) > 1 and head in _verbs() and _is_spelt(head) and may_name(words[-2]):
-        return True
-    if len(head) < _SHORTEST_NOUN or head in listed("never") or head in _verbs():
-        return False
-    return head not in _adjectives() and not head.endswith("ly") and _is_spelt(head)
+    return len(head) >= _SHORTEST_NOUN and head not in _adjectives() and _is_spelt(head)
 
 
 def _is_spelt(word: str) -> bool:
@@ -169,12 +165,6 @@ def class_words() -> frozenset[str]:
     """Return all words of the classes; none of them is a misspelt name."""
     classes = load_word_classes().words.values()
     return frozenset(word for phrases in classes for phrase in phrases for word in phrase.split())
-
-
-@cache
-def _verbs() -> frozenset[str]:
-    classes = ("GO", "DIRECT", "TURN", "MANIPULATE", "HARM", "FLYING", "FACE", "GREETING", "NEGATION", "IF", "FILLER")
-    return frozenset(phrase for name in classes for phrase in load_word_classes().words[name] if " " not in phrase)
 
 
 @cache

@@ -185,7 +185,7 @@ def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
             raise QueryError(f"A map cannot choose {phrase(replace(one, near=()))!r}; say what it is near.")
     sides = sentence.side_notes((*inquiry.of, *targets))
     notes = (*sentence.notes, *resolver.notes, *sides, *_from_nowhere(sentence, targets))
-    return AskedSentence(Inquiry(inquiry.ask, targets), tuple(dict.fromkeys(notes)))
+    return AskedSentence(replace(inquiry, of=targets), tuple(dict.fromkeys(notes)))
 
 
 FROM_NOWHERE = "No position is known to count"

@@ -23,7 +23,7 @@ from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import coordinates, option
 from avlmaps.perception.protocols import NamedPixelEncoder
-from avlmaps.query.answer import WHICH, Alternative, Answer, PartAnswer, absent_text, found_text, placed, sentence_of
+from avlmaps.query.answer import WHICH, Alternative, Answer, PartAnswer, absent_text, found_text, placed
 from avlmaps.query.contents import NOWHERE, own_names
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
 from avlmaps.query.goals import MOST_GOALS, Goal, alike
@@ -308,21 +308,7 @@ def _about(asking: _Asking, words: str) -> Answer:
     if asked.image is not None and asked.clip is None and speaks_of_photo(words):
         photo = Part(Modality.IMAGE, asked.image, is_file=True)
         return _answered(asking.avlmap, Question.of([photo]), asked)
-    return _read(asking.but(sentence=words, primary=None))
-
-
-def _of_numbers(asking: _Asking) -> Answer | None:
-    from avlmaps.language.list_questions import said_number
-
-    numbered = said_number(asking.asked.sentence)
-    if numbered is None:
-        return None
-    number, what = numbered
-    answer = _read(asking.but(sentence=f"how many {what} are there", top=MOST_GOALS))
-    count = answer.count or 0
-    said = f"{count} of the {number} {what} are found" if count < number else f"{count} {what} are found"
-    goals = answer.goals[: min(max(number, 1), MOST_GOALS)]
-    return replace(answer, goals=goals, found=count >= number, text=f"{sentence_of(said)} {answer.text}")
+    return _read(asking.but(sentence=words, primary=None, top=MOST_GOALS))
 
 
 def _of_claims(asking: _Asking) -> Answer | None:
@@ -372,7 +358,7 @@ def _read(asking: _Asking) -> Answer:
     )  # fmt: skip
 
 
-KINDS: tuple[_Kind, ...] = (_of_storeys, _of_both, _of_parts, _of_sources, _of_lists, _of_numbers, _of_claims, _read)
+KINDS: tuple[_Kind, ...] = (_of_storeys, _of_both, _of_parts, _of_sources, _of_lists, _of_claims, _read)
 """The kinds of question, in the order in which they are tried."""
 
 

@@ -158,38 +158,39 @@ def _sounds_by_time(lists: _Lists) -> Answer:
 
 
 def _heard(lists: _Lists) -> Answer:
-    # When, where and how often a sound was heard, which came first, or what was heard in a room or near a thing.
+    # When and how often a sound was heard, which came first, or what was heard in a room or near a thing.
     question, sounds = lists.question, sorted(lists.avlmap.sounds(), key=lambda sound: sound.onset_s)
-    if question.how in ("in", "near"):
-        goals, fits = list(map(_sound_goal, sounds)), list[int]()
-        if question.how == "in" and goals:
-            fits = np.flatnonzero(lists.avlmap.where.inside(question.name, [goal.position for goal in goals])).tolist()
-        elif goals:
-            subject = lists.ask(question.name)
-            if not subject.found:
-                return replace(subject, goals=())
-            fits = sorted(number for _, number in _near(lists, subject.goals[0], goals, _HEARD_M))
-        told = ", ".join(f"{goals[number].name} at {sounds[number].onset_s:.1f} s" for number in fits)
-        where = f"{question.how} {the_room(question.name)}"
-        text = f"{where.capitalize()} were heard: {told}." if told else f"No sound was heard {where}."
-        return lists.answer([goals[number] for number in fits], text, count=len(fits))
-    found = [sound for sound in sounds if _is_called(sound, question.name)]
-    goals = [_sound_goal(sound) for sound in found]
-    if not found:
+    name, how, other = question.name, question.how, question.other
+    found = [sound for sound in sounds if not name or _is_called(sound, name)]
+    if name and not found:
         names = counted([_sound_goal(sound).name for sound in sounds]) if sounds else "none"
-        return lists.answer([], f"No {question.name} was heard; the map's sounds: {names}.", count=0)
-    if question.how:
-        others = [sound for sound in sounds if _is_called(sound, question.other)]
+        return lists.answer([], f"No {name} was heard; the map's sounds: {names}.", count=0)
+    where, goals = "", list(map(_sound_goal, found))
+    if how in ("in", "near"):
+        subject, fits = lists.ask(other) if how == "near" and goals else None, list[int]()
+        if subject is not None and not subject.found:
+            return replace(subject, goals=())
+        if subject is not None:
+            fits = sorted(number for _, number in _near(lists, subject.goals[0], goals, _HEARD_M))
+        elif goals:
+            fits = np.flatnonzero(lists.avlmap.where.inside(other, [goal.position for goal in goals])).tolist()
+        found, goals, where = [found[n] for n in fits], [goals[n] for n in fits], f" {how} {the_room(other)}"
+        if not found:
+            return lists.answer([], f"No {name or 'sound'} was heard{where}.", count=0)
+    if not name:
+        told = ", ".join(f"{goal.name} at {sound.onset_s:.1f} s" for goal, sound in zip(goals, found, strict=True))
+        return lists.answer(goals, f"{where[1:].capitalize()} were heard: {told}.", count=len(found))
+    if how in ("before", "after"):
+        others = [sound for sound in sounds if _is_called(sound, other)]
         if not others:
-            return lists.answer([], f"No {question.other} was heard.")
-        one, other = found[0].onset_s, others[0].onset_s
-        is_so = one < other if question.how == "before" else one > other
-        text = f"{'Yes' if is_so else 'No'}: {question.name} at {one:.1f} s, {question.other} at {other:.1f} s."
-        return lists.answer(goals, text)
+            return lists.answer([], f"No {other} was heard.")
+        one, second = found[0].onset_s, others[0].onset_s
+        is_so = one < second if how == "before" else one > second
+        return lists.answer(goals, f"{'Yes' if is_so else 'No'}: {name} at {one:.1f} s, {other} at {second:.1f} s.")
     rooms = [f" in the {room}" if (room := lists.avlmap.where.name_of(sound.position)) else "" for sound in found]
     times = [f"at {sound.onset_s:.1f} s{room}" for sound, room in zip(found, rooms, strict=True)]
     often = "once" if len(found) == 1 else f"{len(found)} times"
-    text = f"{goals[0].name.capitalize()} was heard {often}: {', '.join(times)}."
+    text = f"{goals[0].name.capitalize()} was heard{where} {often}: {', '.join(times)}."
     return lists.answer(goals, text, count=len(found))
 
 
@@ -316,6 +317,30 @@ class _Box:
         return bool((np.abs(self.middle - other.middle) <= np.minimum(self.size, other.size) / 2.0).all())
 
 
+def _at_least(lists: _Lists) -> Answer:
+    number, what = lists.question.number, lists.question.name
+    answer = lists.ask(f"how many {what} are there")
+    count = answer.count or 0
+    said = f"{count} of the {number} {what} are found" if count < number else f"{count} {what} are found"
+    goals = answer.goals[: max(number, 1)]
+    return replace(answer, goals=goals, found=count >= number, text=f"{sentence_of(said)} {answer.text}")
+
+
+def _rooms_with(lists: _Lists) -> Answer:
+    question, where = lists.question, lists.avlmap.where
+    subject = lists.ask(f"how many {question.name} are there")
+    sure = [goal for goal in subject.goals if goal.probability >= lists.avlmap.settings.found_at]
+    inside = where.rooms_of(np.array([goal.position for goal in sure], np.float64).reshape(-1, 3)).tolist()
+    often = Counter(number for number in inside if number != NOWHERE).most_common()
+    least = question.number or max((count for _, count in often), default=1)
+    rooms = [(number, count) for number, count in often if count >= least]
+    goals = [_room_goal(where, number) for number, _ in rooms]
+    told = ", ".join(f"{the_room(goal.name)} ({count})" for goal, (_, count) in zip(goals, rooms, strict=True))
+    which = f"with {least} or more" if question.number else "with the most"
+    text = f"Rooms {which} {question.name}: {told or 'none is known'}."
+    return lists.answer(goals, text, count=len(rooms))
+
+
 def _room_of(lists: _Lists) -> Answer:
     subject = lists.ask(lists.question.name)
     if not subject.found:
@@ -404,6 +429,8 @@ ANSWERS: Mapping[Listed, Callable[[_Lists], Answer]] = {
     Listed.CHANGES: _changes,
     Listed.LAST_SEEN: _last_seen,
     Listed.HEARD: _heard,
+    Listed.AT_LEAST: _at_least,
+    Listed.ROOMS_WITH: _rooms_with,
     Listed.USUAL: _usual,
 }
 """What answers each kind of list."""

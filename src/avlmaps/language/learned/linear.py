@@ -111,6 +111,8 @@ ASKS = {f"ask_{ask}": ask for ask in intents.Ask}
 KINDS = tuple(str(kind) for kind in intents.TargetKind)
 PICKS = {f"pick_{pick}": pick for pick in Pick if pick}
 NUMBERS = {f"number_{number}": number for number in range(2, 7)}  # "the second nearest", "third from the left"
+LEAST = Amount("n", {symbol: float(number) for symbol, number in zip(NUMBERS, range(2, 7), strict=True)}, optional=True)
+"""At least so many: "more than one" is two."""
 STOPS = tuple(row.symbols[0] for row in ROWS if row.intent in (intents.Refuse, intents.Clarify))  # they end a line
 STARTS = tuple(dict.fromkeys(row.symbols[0] for row in ROWS if row.symbols[0] not in STOPS))
 SYMBOLS = (
@@ -237,12 +239,19 @@ class Grammar:
 
     def _question(self) -> Reading[Inquiry | None]:
         symbol = yield from self._see(Open(frozenset((*ASKS, "refuse", "purpose"))))
-        targets: list[Target] = []
+        targets, number = list[Target](), None
         asks = ASKS.get(str(symbol))
-        yield from self._see(_END if asks is None or asks.of_map else self.kinds)
+        if asks is not None and asks.is_numbered:
+            yield from self._see(self._begin((LEAST, Slot.TARGET), _END))
+            number = yield from self._field(LEAST, self.kinds, is_last=False)
+        else:
+            yield from self._see(_END if asks is None or asks.of_map else self.kinds)
         while self.next != "end":
-            targets.append((yield from self._target(self.kinds | _END)))
-        return None if asks is None else Inquiry(asks, tuple(targets))
+            further = asks is not None and (not asks.is_listed or (asks.of_two and not targets))
+            last = asks is None or not asks.of_two or bool(targets)
+            after = (self.kinds if further else Open()) | (_END if last else Open())
+            targets.append((yield from self._target(after)))
+        return None if asks is None else Inquiry(asks, tuple(targets), number or 1)
 
     def _intent(self, after: Open) -> Reading[Intent]:
         """Read an intent that begins with the next symbol; ``after`` is what may follow it."""

@@ -16,7 +16,7 @@ from typing import Any
 from avlmaps.core.errors import LanguageError, QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.words import singulars_of, stem_of
-from avlmaps.language.intents import Ask
+from avlmaps.language.intents import Ask, Inquiry, Target
 from avlmaps.language.list_questions import Listed
 from avlmaps.language.sentence import Attachments
 from avlmaps_sim.bench.harness.figures import wilson
@@ -33,9 +33,12 @@ LISTED = {
     Ask.FIRST_SOUND: ("sounds", "first"), Ask.LAST_SOUND: ("sounds", "last"),
     **{Ask(name): ("names", name) for name in ("rooms", "sounds", "things")},
     **{Ask(f"count_{name}"): ("counts", name) for name in ("rooms", "sounds", "things")},
-    Ask.CONTENTS: ("in", ""), Ask.BESIDE: ("near", ""), Ask.ROOM_OF: ("room_of", ""),
+    Ask.CONTENTS: ("in", ""), Ask.BESIDE: ("near", ""),
+    **{ask: (str(ask), "") for ask in (
+        Ask.ROOM_OF, Ask.WHEN, Ask.HEARD, Ask.BEFORE, Ask.AFTER, Ask.BETWEEN, Ask.MOST, Ask.ROOMS_WITH,
+    )},
 }  # fmt: skip
-"""How lists write the questions to a map's lists that the networks read: a key, and its value where no target is."""
+"""How lists write the questions to a map's lists: a key, and its value where no target is."""
 Row = Mapping[str, Any]
 
 
@@ -101,7 +104,7 @@ def _asked(sentence: str, given: Attachments) -> dict[str, Any]:
 
     ``QueryError``: the sentence is not understood.
     """
-    from avlmaps.language.list_questions import read_list, said_alternatives, said_number
+    from avlmaps.language.list_questions import read_list, said_alternatives
     from avlmaps.language.questions import read_question
     from avlmaps.language.said_places import asks_how_many_storeys, said_storeys
 
@@ -112,21 +115,26 @@ def _asked(sentence: str, given: Attachments) -> dict[str, Any]:
         return {"ask": "list", "storey": storeys[0].said or storeys[0].rest}
     if storeys:
         return {**_asked(storeys[0].rest, given), "storey": storeys[0].said}
-    listed, numbered = read_list(sentence), said_number(sentence)
+    listed = read_list(sentence)
+    if listed is not None and listed.of is not Listed.AT_LEAST:
+        return {"ask": "list", "near": {"object": listed.name}}
     if listed is not None:
-        is_heard = listed.of is Listed.HEARD
-        told = {"heard": listed.name, "how": listed.how} if is_heard else {"near": {"object": listed.name}}
-        return {"ask": "list", **{key: value for key, value in told.items() if value}}
-    if numbered is not None:
-        number, what = numbered
-        of = read_question(f"how many {what} are there", given).inquiry.to_json()["of"]
-        return {"ask": "list", "at_least": number, "of": of[0]}
+        of = read_question(f"how many {listed.name} are there", given).inquiry.to_json()["of"]
+        return {"ask": "list", "at_least": listed.number, "of": of[0]}
     inquiries = [read_question(words, given).inquiry for words in said_alternatives(sentence) or (sentence,)]
-    read = [inquiry.to_json() for inquiry in inquiries]
-    key, value = LISTED.get(inquiries[0].ask, ("", ""))
-    if key:
-        return {"ask": "list", key: value or read[0]["of"][0]}
-    return {"ask": read[0]["ask"], "of": [target for one in read for target in one["of"]]}
+    return told(inquiries[0], [target for one in inquiries for target in one.of])
+
+
+def told(inquiry: Inquiry, targets: Sequence[Target] = ()) -> dict[str, Any]:
+    """Return an inquiry as lists write it; ``targets``: instead of its own."""
+    ask, of = inquiry.ask, [one.to_json() for one in targets or inquiry.of]
+    key, value = LISTED.get(ask, ("", ""))
+    if ask is Ask.AT_LEAST:
+        return {"ask": "list", "at_least": inquiry.number, "of": of[0]}
+    if not key:
+        return {"ask": str(ask), "of": of}
+    number = {"number": inquiry.number} if ask is Ask.ROOMS_WITH else {}
+    return {"ask": "list", key: value or (of if ask.of_two else of[0]), **number}
 
 
 def _answered(got: Mapping[str, Any], wanted: Any) -> str:
@@ -138,6 +146,8 @@ def _answered(got: Mapping[str, Any], wanted: Any) -> str:
         wanted = {"ask": "where", "of": wanted["either"]}
     if wanted["ask"] != "list" and got["ask"] == "list":
         got = _plainly(got, wanted["ask"])
+    if "at_least" in wanted and "rooms_with" in got:  # older lists write both alike
+        got = {"ask": "list", "at_least": got["number"], "of": got["rooms_with"]}
     if got["ask"] == wanted["ask"] == "list":
         return "right" if _listed(got) == _listed(wanted) else "misread"
     if got["ask"] != wanted["ask"]:
@@ -162,7 +172,10 @@ def _without_storey(target: Any, said: str) -> Any:
 
 
 def _listed(asked: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: _target(value) if isinstance(value, dict) else value for name, value in asked.items()}
+    told = {
+        name: [_target(one) for one in value] if isinstance(value, list) else value for name, value in asked.items()
+    }
+    return {name: _target(value) if isinstance(value, dict) else value for name, value in told.items()}
 
 
 def _outcome(got: Sequence[Any], wanted: Sequence[Any]) -> str:
