@@ -1,7 +1,7 @@
 """Fit the gate's own layer and write it: python -m training.language.gate MODEL, the folder of all-MiniLM-L6-v2.
 
 It stands on the three layers of `gate.onnx`, which stay as they are, since the reader learnt from their states. Needs
-torch, onnx, onnxruntime and safetensors; nine minutes of one core.
+torch, onnx and safetensors; nine minutes of one core.
 """
 
 import sys
@@ -11,11 +11,12 @@ from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 
+import onnx
 import torch
-from onnxruntime.quantization import QuantType, quantize_dynamic
 from safetensors.torch import load_file
 from torch import Tensor, nn
 from training.language.gate.sentences import filled, of_hands, of_lists
+from training.language.gate.weights import stored_in_bytes
 
 from avlmaps.language.learned.english import WIDTH, english
 
@@ -123,7 +124,7 @@ def main(folder: str) -> None:
             judge.eval(), (torch.zeros(1, 12, WIDTH),), graph, input_names=["states"], output_names=["logit"],
             dynamic_axes={"states": {1: "n"}}, opset_version=17, dynamo=False,
         )  # fmt: skip
-        quantize_dynamic(graph, str(OUT / "order.onnx"), weight_type=QuantType.QInt8, per_channel=True)
+        onnx.save(stored_in_bytes(onnx.load(graph)), OUT / "order.onnx")
 
 
 if __name__ == "__main__":
