@@ -198,7 +198,7 @@ def test_an_order_that_cannot_be_counted_is_asked_back(said: str) -> None:
 
 
 def test_a_number_chooses_one_of_several_meanings() -> None:
-    command = "circle the desk, then chair, then back to the start"
+    command = "go to the box in the attic near the sound of dripping close to the sofa"
     with pytest.raises(UnclearError, match="Which one, or none of these") as caught:
         command_to_program(command)
     for number, choice in enumerate(caught.value.choices, 1):

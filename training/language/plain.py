@@ -219,6 +219,7 @@ class _Maker:
         text = self.draw.choice(_SAID["questions"][written or "refuse"])
         if "{all}" in text and "hear" in text and name != "sounds":
             return self._listed()
+        filled["many"] = plural_of(object_.name)
         return self._asked(text.format(**filled, room=room, thing=thing), None if ask is None else Inquiry(ask, of))
 
     def _related(self, choices: Sequence[tuple[str, Ask, Sequence[TargetKind]]]) -> Example:
@@ -255,6 +256,15 @@ class _Maker:
             has = self.draw.choice(said["cannot"]).format(b=thing.name, room=self._of(TargetKind.AREA)[0])
             text = self.draw.choice((f"{has}, {do}", f"{has} {do}", f"{do} {has}", f"{has} {do}, otherwise {other}"))
             return self._example(text, (Refuse(RefusalReason.CONDITION),))
+        if self.draw.random() < 0.15:
+            has = self.draw.choice(said["placed" if words["where"] and self.draw.random() < 0.3 else "has"]).format(
+                **words
+            )
+            never = self.draw.choice(said["forbids"]).format(b=words["b"])
+            end = self.draw.choice(("", "", "", f"{self.draw.choice(said['else'])}{other}", f". {do}"))
+            return self._example(
+                f"{has}{self.draw.choice((', ', ' ', ', then '))}{never}{end}", (Refuse(RefusalReason.NEGATION),)
+            )
         own, placed = self.draw.random() < 0.6, words["where"] and self.draw.random() < 0.4
         if own:
             do, one = self._with(thing, self.draw.choice(said["one"]).format(b=thing.name))
