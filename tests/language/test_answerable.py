@@ -18,7 +18,8 @@ ROWS = read_list(LISTS / "kinds.jsonl")
 KINDS = sorted({str(row["kind"]) for row in ROWS})
 QUICK = {"or and not", "purposes", "stop", "direction", "paths", "third person", "parts", "languages", "left out"}
 # Of each kind, at most so many are asked back or harmless, and so many misread; 0 and 0 of the others.
-SHORT = {"roboticist": (5, 1), "other voices": (1, 1), "states": (0, 1), "parts": (1, 1), "open names": (1, 0), "purposes": (1, 0),
+SHORT = {"roboticist": (5, 1), "other voices": (1, 1), "states": (0, 1), "parts": (1, 1), "open names": (1, 0),
+         "purposes": (1, 0),
          "order in time": (1, 0), "dictation": (1, 0), "who and sounds": (1, 1), "possessives and pointing": (1, 0),
          }  # fmt: skip
 THINGS = st.sampled_from(["oven", "lamp", "washing machine", "heater", "tv", "printer"])
@@ -156,3 +157,25 @@ def test_a_count_of_something_else_than_is_sought_is_refused(thing: str, other: 
 def test_what_is_chosen_by_its_position_is_asked_back_unless_it_is_an_order(thing: str, side: str) -> None:
     assert is_refused(f"the {side} {thing}")
     assert (read_command(f"go to the {side} {thing}").stops is None) is (side == "leftmost")
+
+
+@settings(max_examples=8, deadline=None)
+@given(
+    said=st.sampled_from([
+        "fewer than three", "at most two", "exactly two", "only two", "no more than two", "just one", "less than 4",
+    ]),
+    thing=THINGS,
+)  # fmt: skip
+def test_another_number_than_at_least_so_many_is_refused(said: str, thing: str) -> None:
+    assert is_refused(f"which rooms have {said} {thing}s?")
+    assert is_refused(f"are there {said} {thing}s?")
+    assert all(is_refused(f"which room has the {most} {thing}s?") for most in ("fewest", "least", "second most"))
+
+
+@pytest.mark.parametrize("text", [
+    "did the dog bark while the rain fell", "did the dog bark before or after the phone rang",
+    "what was the first sound in the bedroom", "how many sounds were heard in the kitchen",
+    "what is between the second chair and the sofa",
+])  # fmt: skip
+def test_what_no_list_compares_or_restricts_is_refused(text: str) -> None:
+    assert is_refused(text)

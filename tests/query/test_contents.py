@@ -1,11 +1,14 @@
 """Listing what a map holds: things, sounds and rooms against a furnished map whose contents are known."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from query_fakes import (
     FakePixels,
     FakeSounds,
@@ -22,6 +25,7 @@ from walled_rooms import storeys_at, two_rooms
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Role
+from avlmaps.language.intents import Target, TargetKind
 from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.perception.embedded.pixels import EmbeddedPixels, features_of
 from avlmaps.query.answer import Answer, PartAnswer
@@ -154,7 +158,8 @@ def test_a_wall_hides_what_an_open_plan_shows_and_who_asks_for_sounds_is_told_so
     there = [thing("sink", 3.5), thing("chair", 1.9), thing("window", 3.0)]
     part = PartAnswer(Part(Modality.OBJECT, "sofa", Role.PRIMARY), 1.0, True)
     sofa = Answer((Goal((2.5, 1.5, 0.5), 0.8, (0.4, 0.4, 0.4), {}, 0.8),), True, (part,))
-    beside, near = ListQuestion(Listed.BESIDE, "sofa"), ListQuestion(Listed.HEARD, how="near", other="sofa")
+    near_sofa = Target(TargetKind.SOUND, near=(Target(TargetKind.OBJECT, "sofa"),))
+    beside, near = ListQuestion(Listed.BESIDE, "sofa"), ListQuestion(Listed.HEARD, sounds=(near_sofa,))
     assert told(True, beside) == ["window", "chair"] and told(True, near) == ["dog 2.2"]
     assert told(False, beside) == ["window", "chair", "sink"] and told(False, near) == ["dog 2.2", "dog 3.8"]
 
@@ -178,3 +183,73 @@ def test_a_thing_whose_name_holds_sound_is_a_thing(
     monkeypatch.setattr("avlmaps.query.lists.answer_list", answered)
     furnished.ask(sentence)
     assert asked_for == [of]
+
+
+EVENTS = st.lists(
+    st.tuples(st.sampled_from(["dog bark", "glass breaking", "rain"]), st.floats(0.0, 99.0),
+              st.sampled_from([0.4, 0.9]), st.booleans()),
+    max_size=9, unique_by=lambda one: one[1],
+)  # fmt: skip
+
+
+def answered(events: Sequence[tuple[str, float, float, bool]], keeps: bool | None = None, **question: Any) -> Answer:
+    """Answer a question in a map of these sounds, some in the hall on the right; `keeps`: only those there, or not."""
+    sounds = [
+        SoundEvent((name,), (sure,), at, at + 0.5, (float(right), 0.0, 0.0), np.zeros((0, 3)), Path())
+        for name, at, sure, right in events
+    ]
+    rooms: Any = [SimpleNamespace(position=(float(right), 0.0, 0.0), confidence=0.9) for right in (False, True)]
+    where = SimpleNamespace(
+        rooms=rooms, names=("kitchen", "hall"), require=str, name_of=lambda at: ("kitchen", "hall")[int(at[0])],
+        rooms_of=lambda at: at[:, 0].astype(int),
+        inside=lambda name, at: np.array([place[0] == (name == "hall") for place in at], bool),
+    )  # fmt: skip
+    avlmap: Any = SimpleNamespace(sounds=lambda: sounds, where=where, settings=QuerySettings())
+    whole = answer_list(avlmap, ListQuestion(**question), 99, lambda words: Answer((), False, ()))
+    assert whole.again is not None
+    return whole if keeps is None else whole.again(lambda at: bool(at[0]) is keeps)
+
+
+def sound(name: str, *rooms: str) -> Target:
+    return Target(TargetKind.SOUND, name, tuple(Target(TargetKind.AREA, room) for room in rooms))
+
+
+@given(EVENTS, st.sampled_from([None, True, False]), st.sampled_from(["before", "after"]))
+def test_which_came_first_agrees_with_every_pair(
+    events: list[tuple[str, float, float, bool]], keeps: bool | None, how: str
+) -> None:
+    here = [one for one in events if keeps is None or one[3] is keeps]
+    dogs, glass = ([one for one in here if one[0] == name] for name in ("dog bark", "glass breaking"))
+    asked = (sound("dog bark"), sound("glass breaking"))
+    answer = answered(events, keeps, of=Listed.HEARD, how=how, sounds=asked)
+    pairs = [(a, b) for a in dogs for b in glass if (a[1] < b[1] if how == "before" else a[1] > b[1])]
+    assert answer.found == any(min(a[2], b[2]) > 0.5 for a, b in pairs)
+    if dogs and glass:
+        said = "No" if not pairs else "Yes" if answer.found else "Perhaps"
+        assert answer.text.startswith(f"{said}: dog bark ")
+        assert not pairs or any(f"at {a[1]:.1f} s, glass" in answer.text for a, _ in pairs)
+
+
+@given(EVENTS, st.sampled_from([None, True, False]), st.integers(1, 4), st.sampled_from([(), ("hall",), ("kitchen",)]))
+def test_how_often_at_least_and_in_which_rooms_agree(
+    events: list[tuple[str, float, float, bool]], keeps: bool | None, number: int, rooms: tuple[str, ...]
+) -> None:
+    said = (sound("dog bark", *rooms),)
+    often = answered(events, keeps, of=Listed.HEARD, sounds=said)
+    dogs = [one for one in events if one[0] == "dog bark" and (keeps is None or one[3] is keeps)]
+    dogs = [one for one in dogs if not rooms or one[3] == (rooms == ("hall",))]
+    assert (often.count or 0) == len(dogs) and often.found == any(one[2] > 0.5 for one in dogs)
+    assert [goal.position[0] == 1.0 for goal in often.goals] == [one[3] for one in sorted(dogs, key=lambda one: one[1])]
+    enough = answered(events, keeps, of=Listed.AT_LEAST, number=number, sounds=said)
+    assert enough.count == len(dogs) and enough.found == (sum(one[2] > 0.5 for one in dogs) >= number)
+    assert enough.text.startswith("No") == (len(dogs) < number)
+    those = answered(events, keeps, of=Listed.ROOMS_WITH, number=number, sounds=said)
+    in_rooms = [sum(one[3] is right for one in dogs) for right in (False, True)]
+    assert those.count == sum(count >= number for count in in_rooms)
+    most = answered(events, keeps, of=Listed.ROOMS_WITH, number=0, sounds=said)
+    assert most.count == (in_rooms.count(max(in_rooms)) if any(in_rooms) else 0)
+
+
+def test_one_sound_under_two_names_is_no_order() -> None:
+    with pytest.raises(QueryError, match=r"The sound at 4\.0 s is meant by both names"):
+        answered([("dog bark", 4.0, 0.9, True)], of=Listed.HEARD, how="after", sounds=(sound("dog bark"), sound("dog")))

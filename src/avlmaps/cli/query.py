@@ -105,7 +105,7 @@ class Query(Asking, InFrame, MapVerb):
             told = shown_in(told, self.frame, avlmap)
         notes = [f"{more} more found; {option('top', str(self.top + more))} lists them too."] if more else []
         if not any(part["modality"] == Modality.SOUND for part in told["parts"]):
-            notes += idle(self, ["at"], "no sound is named")
+            notes += idle(self, ["at"], "no place is sought by a sound")
         if "plot" not in told:
             notes += idle(self, ["plot"], "the answer has no heat to draw")
         return {**told, "notes": [*told.get("notes", ()), *notes]} if notes else told

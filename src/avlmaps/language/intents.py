@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import msgspec
 
 from avlmaps.core.question import HeardAt
-from avlmaps.language.word_classes import table
+from avlmaps.language.word_classes import table, word_list
 
 
 class TargetKind(StrEnum):
@@ -386,7 +386,7 @@ class Ask(StrEnum):
     COUNT_SOUNDS = "count_sounds"
     COUNT_THINGS = "count_things"
     WHEN = "when"  # a sound was heard, or a thing last seen
-    HEARD = "heard"  # which sounds, in a room or near a thing
+    HEARD = "heard"  # which sounds, in a room or near something
     BEFORE = "before"
     AFTER = "after"
     BETWEEN = "between"
@@ -402,11 +402,11 @@ class Ask(StrEnum):
     @property
     def of_map(self) -> bool:
         """Whether no target is asked about."""
-        return str(self).endswith(("_room", "_sound", "rooms", "sounds", "things"))
+        return str(self) in word_list("list_questions", "of_map")
 
     @property
     def of_two(self) -> bool:
-        """Whether two targets are compared."""
+        """Whether it is about two targets."""
         return self in (Ask.BEFORE, Ask.AFTER, Ask.BETWEEN)
 
     @property
@@ -428,4 +428,5 @@ class Inquiry:
 
     def to_json(self) -> dict[str, Any]:
         """Return the question as JSON has it."""
-        return {"ask": str(self.ask), "of": [one.to_json() for one in self.of]}
+        number = {"number": self.number} if self.ask.is_numbered else {}
+        return {"ask": str(self.ask), "of": [one.to_json() for one in self.of], **number}

@@ -1,16 +1,17 @@
-"""Questions that a map answers from its lists rather than by heat: rooms by size, sounds by time, what is where.
+"""Questions that a map answers from its lists, not by heat: rooms by size, sounds by time, counts, what is where.
 
 The networks read those for which they have symbols, rows of `list_questions.toml` the others. Nothing here knows a map.
 """
 
 import re
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cache
 from itertools import dropwhile
 
+from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.words import plural_of, singulars_of
 from avlmaps.language.intents import Ask, Inquiry, Target, TargetKind
@@ -19,11 +20,6 @@ from avlmaps.language.names import mended, sounding_forms
 from avlmaps.language.sentence import OwnName, stand_ins
 from avlmaps.language.verbalise import phrase
 from avlmaps.language.word_classes import filled, pattern, table, words_of
-
-NUMBERS = {
-    "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10,
-    "a pair of": 2, "a couple of": 2, "a dozen": 12,
-}  # fmt: skip
 
 
 class Listed(StrEnum):
@@ -36,9 +32,9 @@ class Listed(StrEnum):
     ROOM_OF = "room of a thing or a photo"
     NAMES = "all rooms, sounds or things"
     CHANGES = "what is new, gone or moved"
-    LAST_SEEN = "where a thing was last seen"
-    HEARD = "when and how often a sound was heard, or which sounds were"
-    ROOMS_WITH = "rooms with a number of things"
+    LAST_SEEN = "where or when a thing was last seen"
+    HEARD = "when and how often a sound was heard, which sounds were, or which of two came first"
+    ROOMS_WITH = "rooms with a number of things or of events of a sound"
     AT_LEAST = "whether there are so many"
     USUAL = "what is usually somewhere, or where a thing usually is"
 
@@ -50,72 +46,60 @@ class ListQuestion:
     of: Listed
     name: str = ""  # of the room or thing; for ``NAMES`` of the list; for ``ROOM_OF`` words, as a query has them
     first: bool = False  # the smallest or first, instead of the largest or last
-    counts: bool = False  # whether only the number is sought
+    counts: bool = False  # of ``CONTENTS``, whether only the number is sought
     since: str = ""  # the day after which changes count, as it was said; "" for the first
     change: str = ""  # ``new``, ``gone`` or ``moved``; "" for any change
-    # Of ``USUAL`` ``on``, ``in`` or ``near`` the name ("": where it usually is); of ``HEARD`` ``before`` or ``after``
-    # another sound, ``in`` a room or ``near`` a thing; of ``BESIDE`` ``rooms`` where these are sought.
+    # Of ``USUAL`` ``on``, ``in`` or ``near`` the name ("": where it usually is); of ``HEARD`` whether the first sound
+    # came ``before`` or ``after`` the second; of ``BESIDE`` ``rooms`` where these are sought.
     how: str = ""
-    other: str = ""  # the other sound, the room or thing where sounds were heard, or the other of two things
-    number: int = 0  # of ``AT_LEAST`` and ``ROOMS_WITH``; 0: the room with the most
-
-
-_ASKED = {
-    Ask.LARGEST_ROOM: ListQuestion(Listed.ROOM_BY_SIZE),
-    Ask.SMALLEST_ROOM: ListQuestion(Listed.ROOM_BY_SIZE, first=True),
-    Ask.FIRST_SOUND: ListQuestion(Listed.SOUND_BY_TIME, first=True),
-    Ask.LAST_SOUND: ListQuestion(Listed.SOUND_BY_TIME),
-    Ask.ROOM_OF: ListQuestion(Listed.ROOM_OF),
-    Ask.CONTENTS: ListQuestion(Listed.CONTENTS),
-    Ask.BESIDE: ListQuestion(Listed.BESIDE),
-    Ask.BETWEEN: ListQuestion(Listed.BESIDE),
-    Ask.HEARD: ListQuestion(Listed.HEARD),
-    Ask.BEFORE: ListQuestion(Listed.HEARD, how="before"),
-    Ask.AFTER: ListQuestion(Listed.HEARD, how="after"),
-    Ask.WHEN: ListQuestion(Listed.LAST_SEEN),
-    Ask.MOST: ListQuestion(Listed.ROOMS_WITH),
-    Ask.ROOMS_WITH: ListQuestion(Listed.ROOMS_WITH),
-    Ask.AT_LEAST: ListQuestion(Listed.AT_LEAST),
-    **{Ask(name): ListQuestion(Listed.NAMES, name) for name in ("rooms", "sounds", "things")},
-    **{Ask(f"count_{name}"): ListQuestion(Listed.NAMES, name, counts=True) for name in ("rooms", "sounds", "things")},
-}
+    other: str = ""  # the other of two things
+    number: int = 1  # of ``AT_LEAST`` and ``ROOMS_WITH``; 0: the room with the most
+    # What was heard, in and near what: of ``HEARD``, of ``AT_LEAST`` and ``ROOMS_WITH`` where events of a sound count.
+    # The name is "" for any sound.
+    sounds: tuple[Target, ...] = ()
 
 
 def list_question(inquiry: Inquiry) -> ListQuestion | None:
-    """Return the question to the lists that the networks read; None for another one."""
+    """Return the question to the lists that the networks read; None for another one. ``QueryError``: no list has it."""
     ask, of = inquiry.ask, inquiry.of
-    hears = [one.kind is TargetKind.SOUND for one in of]
-    if ask in (Ask.WHEN, Ask.HOW_MANY) and hears == [True]:
-        return _heard(of[0].name, of[0].near, counts=ask is Ask.HOW_MANY)
-    if not ask.is_listed:
+    if ask is Ask.HEARD and len(of) == 1:
+        of = (Target(TargetKind.SOUND, near=of),)
+    hears = bool(of) and all(one.kind is TargetKind.SOUND for one in of)
+    of_sounds = _asked("of_sounds").get(ask) if hears else None
+    listed, near = of_sounds or _asked("asked").get(ask), [each for one in of for each in one.near]
+    if listed is None and not ask.is_listed:
         return None
-    listed = _ASKED[ask]
-    if not of:
-        return listed
-    if ask is Ask.HEARD:
-        return _heard("", of[:1])
-    if of[0].kind is TargetKind.IMAGE and ask is Ask.ROOM_OF:
-        return replace(listed, name="this photo")
-    if any(one.is_file for one in of) or len(of) != 1 + ask.of_two:
-        return None
-    if listed.of is Listed.HEARD:
-        plain = all(hears) and not any(one.near for one in of)
-        return replace(listed, name=of[0].name, other=of[1].name) if plain else None
+    if listed is None or len(of) != (0 if ask.of_map else 1 + ask.of_two):
+        raise QueryError("Ask this of one sound or thing at a time, and whether one came first of two sounds.")
+    if any(one.kind is TargetKind.CLIP for one in (*of, *near)) or (not of_sounds and any(one.is_file for one in near)):
+        raise QueryError("This is not answered by a photo or a recording; say in words what is meant, and where.")
+    if listed.of is Listed.LAST_SEEN and near:
+        raise QueryError(f"When a thing was last seen is known by its name alone: when was the {of[0].name} last seen?")
+    number = listed.number * inquiry.number
+    if of_sounds:
+        return replace(listed, sounds=of, number=number)
     if listed.of in (Listed.AT_LEAST, Listed.ROOMS_WITH):
-        of = (replace(of[0], name=of[0].name if singulars_of(of[0].name) else plural_of(of[0].name)),)
-    said = [f"sound of {one.name}" if one.kind is TargetKind.SOUND else phrase(one)[4:] for one in of]
-    name = of[0].name if listed.of is Listed.LAST_SEEN else said[0]
-    number = inquiry.number if ask.is_numbered else 0
-    return replace(listed, name=name, other=said[1] if ask.of_two else "", number=number)
+        of = [replace(one, name=_several(one.name)) for one in of]
+    name, *other = [in_query(one) for one in of] or [listed.name]
+    return replace(listed, name=name, other="".join(other), number=number)
 
 
-def _heard(name: str, near: Sequence[Target], *, counts: bool = False) -> ListQuestion | None:
-    if len(near) > 1 or any(one.kind not in (TargetKind.AREA, TargetKind.OBJECT) for one in near):
-        return None
-    how = ["in" if one.kind is TargetKind.AREA else "near" for one in near]
-    return ListQuestion(
-        Listed.HEARD, name, counts=counts, how="".join(how), other="".join(phrase(one)[4:] for one in near)
-    )
+@cache
+def _asked(rows: str) -> Mapping[str, ListQuestion]:
+    return {ask: ListQuestion(Listed[row["of"]], **row.get("with", {})) for ask, row in table(_TABLE)[rows].items()}
+
+
+def in_query(target: Target) -> str:
+    """Return a target as a query names it: ``chair near the sofa in the kitchen``."""
+    if target.kind is TargetKind.IMAGE:
+        return "this photo"
+    heard = target.kind is TargetKind.SOUND
+    named = replace(target, kind=TargetKind.OBJECT, name=f"sound of {target.name}") if heard else target
+    return phrase(named).removeprefix("the ").replace(" nearest to ", " near ")
+
+
+def _several(name: str) -> str:
+    return name if singulars_of(name) else plural_of(name)
 
 
 _TABLE = "list_questions"
@@ -141,12 +125,13 @@ def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
 
 
 def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
-    how = _how_of(said["how"])
+    how = said["how"] and ("in" if pattern(_TABLE, "in").fullmatch(said["how"]) else said["how"])
+    how = how if how in ("", "in") else "on" if how.startswith("on") else "near"
     said["room" if of is Listed.CHANGES or how == "in" else "thing"] += said["place"]
     room, thing = mended(said["room"]) or said["room"], said["thing"]
     if room and lexicon().find(room, EntryKind.ROOM) is None:
         return None
-    if speaks_of_photo(thing) or " or " in thing:
+    if pattern(_TABLE, "photo").search(thing) or " or " in thing:
         return None
     change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(said["change"])), "")
     name, since = room or thing or said["seen"], said["visit"] + said["date"]
@@ -155,20 +140,23 @@ def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
     return ListQuestion(of, name, counts=counts, since=since, change=change, how=how, other=said["other"])
 
 
-def _how_of(said: str) -> str:
-    if not said:
-        return ""
-    return "on" if said.startswith("on") else "in" if pattern(_TABLE, "in").fullmatch(said) else "near"
-
-
 def _numbered(plain: str) -> ListQuestion | None:
     # "Two chairs in the kitchen" asks whether there are so many.
     plain = pattern(_TABLE, "where").sub("", plain).removeprefix("the ")
-    found = re.fullmatch(rf"({'|'.join(NUMBERS)}|[2-9]|[1-9]\d) ([a-z][^.?!]*)", plain)
-    name = "" if found is None else pattern(_TABLE, "tail").sub("", found[2]).strip()
-    if found is None or all(lexicon().head(name, kind) is None for kind in (EntryKind.THING, EntryKind.ROOM)):
-        return None
-    return ListQuestion(Listed.AT_LEAST, found[2], number=NUMBERS.get(found[1]) or int(found[1]))
+    found, number = pattern(_TABLE, "least").match(plain), least_said(plain)
+    what = "" if found is None else plain[found.end() :].strip()
+    name = pattern(_TABLE, "tail").sub("", what).strip()
+    is_named = any(lexicon().head(name, kind) is not None for kind in (EntryKind.THING, EntryKind.ROOM))
+    what = what.replace(name, _several(name), 1)
+    return ListQuestion(Listed.AT_LEAST, what, number=number) if is_named and number > 1 else None
+
+
+def least_said(text: str) -> int:
+    """Return the least number that a question asks for, as for "more than one" two; 0 where no words say that."""
+    found = pattern(_TABLE, "least").search(text.lower())
+    if found is None:
+        return 0
+    return (table(_TABLE)["numbers"].get(found["number"]) or int(found["number"])) + bool(found["more"])
 
 
 def said_alternatives(text: str) -> tuple[str, ...]:
@@ -221,11 +209,6 @@ def _is_named(name: str) -> bool:
     *before, last = name.split() or [""]
     sounds = last == "sound" or last in sounding_forms()
     return bool(lexicon().senses(name)) or (sounds and lexicon().head(" ".join(before), EntryKind.SOUND) is not None)
-
-
-def speaks_of_photo(words: str) -> bool:
-    """Return whether words speak of a photo."""
-    return pattern(_TABLE, "photo").search(words.casefold()) is not None
 
 
 def _plain(text: str) -> str:

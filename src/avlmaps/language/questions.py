@@ -13,6 +13,7 @@ from avlmaps.language.claims import unanswered, unmet_by
 from avlmaps.language.intents import Ask, Inquiry, Pick, Target, TargetKind
 from avlmaps.language.learned.decision import NameResolver, is_doubtful, kind_of
 from avlmaps.language.learned.reader import Read, ReadingLimits, learned_reader
+from avlmaps.language.list_questions import least_said
 from avlmaps.language.names import is_entry, is_known, sounding_forms, sounds_like, third_forms
 from avlmaps.language.sentence import ASK, Attachments, Sentence, language_of, stand_ins
 from avlmaps.language.verbalise import lacks_file, phrase
@@ -185,7 +186,8 @@ def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
             raise QueryError(f"A map cannot choose {phrase(replace(one, near=()))!r}; say what it is near.")
     sides = sentence.side_notes((*inquiry.of, *targets))
     notes = (*sentence.notes, *resolver.notes, *sides, *_from_nowhere(sentence, targets))
-    return AskedSentence(replace(inquiry, of=targets), tuple(dict.fromkeys(notes)))
+    number = (least_said(sentence.text) if inquiry.ask.is_numbered else 0) or inquiry.number
+    return AskedSentence(replace(inquiry, of=targets, number=number), tuple(dict.fromkeys(notes)))
 
 
 FROM_NOWHERE = "No position is known to count"

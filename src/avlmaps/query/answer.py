@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.schema import DayAnswer, UsualAnswer
+
+
+Keeps = Callable[[Sequence[float]], bool]
+"""Whether a place, metres, recording frame, counts: that of one storey."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +88,8 @@ class Answer:
     when: "tuple[DayAnswer, ...]" = ()
     usual: "tuple[UsualAnswer, ...]" = ()  # on how many days each goal was there, in an answer about what is usual
     alike: int = 0  # number of places that fit as well as the likeliest, itself among them; 0 where nothing is found
+    # The answer of a list from the places that a function keeps, such as those of one storey.
+    again: "Callable[[Keeps], Answer] | None" = field(default=None, repr=False, compare=False)
 
     def __repr__(self) -> str:
         counted = "" if self.count is None else f", count={self.count}"

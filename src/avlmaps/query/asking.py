@@ -7,7 +7,6 @@ import itertools
 import re
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING
@@ -33,7 +32,6 @@ from avlmaps.query.places import distance_m, lies_between, place_given
 
 if TYPE_CHECKING:
     from avlmaps.language.intents import Ask
-    from avlmaps.language.list_questions import ListQuestion
     from avlmaps.language.questions import AskedSentence
     from avlmaps.language.sentence import OwnName
     from avlmaps.maps.storeys import Storeys
@@ -258,7 +256,7 @@ def _together(answers: Sequence[Answer], top: int) -> Answer:
         found=all(one.found for one in answers), probability=min(one.probability for one in answers),
         count=sum(counts) if len(counts) == len(answers) else None, parts=tuple(parts),
         notes=tuple(dict.fromkeys(notes)), alternatives=tuple(others), text=" ".join(one.text for one in answers),
-        alike=0, when=(), usual=(),
+        alike=0, when=(), usual=(), again=None,
     )  # fmt: skip
 
 
@@ -283,29 +281,23 @@ def _of_sources(asking: _Asking) -> Answer | None:
 
 
 def _of_lists(asking: _Asking) -> Answer | None:
+    from avlmaps.language.list_questions import list_question, read_list
     from avlmaps.query.lists import answer_list
 
-    listed, asked = _read_list(asking), asking.asked
+    asked, own = asking.asked, own_names(asking.avlmap, asking.asked.sentence)
+    listed = read_list(asked.sentence, own)
+    if listed is None and asked.sentence.strip():
+        try:
+            inquiry = _reading(asked, asked.sentence, own).inquiry
+        except QueryError:  # `_read` says why a sentence is not understood
+            return None
+        listed = list_question(inquiry)
     return listed and answer_list(asking.avlmap, listed, asked.top, partial(_about, asking), asked.at)
 
 
-def _read_list(asking: _Asking) -> "ListQuestion | None":
-    from avlmaps.language.list_questions import list_question, read_list
-
-    asked, own = asking.asked, own_names(asking.avlmap, asking.asked.sentence)
-    by_rows = read_list(asked.sentence, own)
-    if by_rows is not None or not asked.sentence.strip():
-        return by_rows
-    with suppress(QueryError):  # `_read` says why a sentence is not understood
-        return list_question(_reading(asked, asked.sentence, own).inquiry)
-    return None
-
-
 def _about(asking: _Asking, words: str) -> Answer:
-    from avlmaps.language.list_questions import speaks_of_photo
-
     asked = asking.asked
-    if asked.image is not None and asked.clip is None and speaks_of_photo(words):
+    if asked.image is not None and asked.clip is None and words == "this photo":
         photo = Part(Modality.IMAGE, asked.image, is_file=True)
         return _answered(asking.avlmap, Question.of([photo]), asked)
     return _read(asking.but(sentence=words, primary=None, top=MOST_GOALS))

@@ -1,9 +1,12 @@
-"""Answers from the lists of a map: rooms by size, sounds by time, what is in a room, beside a thing or on a storey."""
+"""Answers from the lists of a map: rooms by size, sounds by time, counts, what is in a room or beside a thing."""
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,13 +17,15 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Question
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import place_text, the_room
-from avlmaps.core.words import stem_of
-from avlmaps.language.list_questions import Listed, ListQuestion
+from avlmaps.core.words import singulars_of, stem_of
+from avlmaps.language.intents import Target, TargetKind
+from avlmaps.language.list_questions import Listed, ListQuestion, in_query
 from avlmaps.language.names import sounding_forms
 from avlmaps.language.said_places import SaidStorey
+from avlmaps.language.verbalise import phrase
 from avlmaps.maps.storeys import Storeys, said_storeys
 from avlmaps.query import changes
-from avlmaps.query.answer import Alternative, Answer, in_words, placed, sentence_of
+from avlmaps.query.answer import Alternative, Answer, Keeps, in_words, placed, sentence_of
 from avlmaps.query.changes import ChangeKind, Days
 from avlmaps.query.contents import NOWHERE, Whereabouts
 from avlmaps.query.edits import means
@@ -44,6 +49,8 @@ _LEAST_M2 = 1.0  # of a room; less is a corner that views disagree about
 _LIKELY = 0.3  # of a sound's second name
 _ROUND_SOUNDS = frozenset({"the", "a", "an", "of", "sound", "noise", "someone", "somebody", "my", "your", "go", "off"})
 _MOST_SOURCES = 5  # of sounds by time; each costs a density
+_EVERY = ListQuestion(Listed.NAMES, "things")
+_Event = tuple[float, Goal]  # the onset of a sound, seconds, and where it was heard
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +61,35 @@ class _Lists:
     top: int
     ask: Callable[[str], Answer]
     at: HeardAt | None
+    keeps: Keeps
 
-    def days(self) -> Days:
-        return Days.of(self.avlmap)
+    def goals(self, kind: str) -> list[Goal]:
+        """Return all rooms, sounds or things."""
+        if kind == "rooms":
+            goals = [_room_goal(self.avlmap.where, number) for number in range(len(self.avlmap.where.rooms))]
+        elif kind == "sounds":
+            return [goal for _, goal in _events(self, Target(TargetKind.SOUND))]
+        else:
+            goals = list(map(_thing_goal, self.avlmap.things())) if self.avlmap.has(Kind.PIXELS) else []
+        return [goal for goal in goals if self.keeps(goal.position)]
 
-    def things(self) -> "list[Thing]":
-        return self.avlmap.things() if self.avlmap.has(Kind.PIXELS) else []
+    def found(self, words: str) -> Answer:
+        """Return the answer of what a question names. ``_AbsentError``: it is not found."""
+        subject = self.ask(words)
+        goals = tuple(goal for goal in subject.goals if self.keeps(goal.position))
+        if not (subject.found and self.likely(goals)):
+            text = f"No {words} is found." if subject.found else subject.text
+            raise _AbsentError(replace(subject, goals=(), found=False, text=text))
+        return replace(subject, goals=goals)
+
+    def likely(self, goals: Iterable[Goal]) -> list[Goal]:
+        """Return the goals that count as found."""
+        return [goal for goal in goals if goal.probability >= self.avlmap.settings.found_at]
+
+    def judged(self, goals: Sequence[Goal], is_so: bool, is_sure: bool, text: str, count: int | None = None) -> Answer:
+        """Return the answer to whether something is so."""
+        said = "No" if not is_so else "Yes" if is_sure else "Perhaps"
+        return replace(self.answer(goals, f"{said}: {text}.", count=count), found=is_so and is_sure)
 
     def answer(
         self, goals: Sequence[Goal], text: str, subject: Answer | None = None, count: int | None = None
@@ -71,12 +101,23 @@ class _Lists:
         return Answer(tuple(goals), found, parts, heat=heat, probability=probability, count=count, text=text)
 
 
+class _AbsentError(Exception):
+    # What a question names is not found.
+    def __init__(self, answer: Answer) -> None:
+        self.answer = answer
+
+
 def answer_list(
-    avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callable[[str], Answer], at: HeardAt | None = None
-) -> Answer:
-    """Answer a question from the lists of a map. ``QueryError``: the map has no such list."""
-    whole = ANSWERS[question.of](_Lists(avlmap, question, top, ask, at))
-    return replace(whole, when=whole.when[:top], usual=whole.usual[:top])
+    avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callable[[str], Answer], at: HeardAt | None = None,
+    keeps: Keeps = lambda position: True,
+) -> Answer:  # fmt: skip
+    """Answer a question from the lists of a map, by what lies where ``keeps`` says. ``QueryError``: none is such."""
+    try:
+        whole = ANSWERS[question.of](_Lists(avlmap, question, top, ask, at, keeps))
+    except _AbsentError as absent:
+        whole = absent.answer
+    again = partial(answer_list, avlmap, question, top, ask, at)
+    return replace(whole, when=whole.when[:top], usual=whole.usual[:top], again=again)
 
 
 def _goal(position: Sequence[float], likely: float, name: str, size: Sequence[float] = (0.0, 0.0, 0.0)) -> Goal:
@@ -88,9 +129,9 @@ def _room_goal(where: Whereabouts, number: int) -> Goal:
     return _goal(where.rooms[number].position, where.rooms[number].confidence, where.names[number])
 
 
-def _sound_goal(sound: "SoundEvent") -> Goal:
-    score = float(sound.confidences[0]) if sound.confidences else 0.0
-    return _goal(sound.position, score, sound.names[0] if sound.names else "sound")
+def _sound_goal(sound: "SoundEvent", name: str = "") -> Goal:
+    score = _called(sound, name) if name else float(sound.confidences[0]) if sound.confidences else 0.0
+    return _goal(sound.position, score, name or (sound.names[0] if sound.names else "sound"))
 
 
 def _thing_goal(thing: "Thing") -> Goal:
@@ -100,10 +141,11 @@ def _thing_goal(thing: "Thing") -> Goal:
 def _rooms_by_size(lists: _Lists) -> Answer:
     where, first = lists.avlmap.where, lists.question.first
     areas = np.array([room.area_m2 for room in where.rooms], np.float64)
+    kept = np.array([lists.keeps(room.position) for room in where.rooms], bool)
     if not len(areas):
         raise QueryError("The map does not know the sizes of rooms: it has no floor plan, or no model of views.")
     order = np.argsort(areas if first else -areas, kind="stable")
-    order = order[areas[order] >= _LEAST_M2]
+    order = order[kept[order] & (areas[order] >= _LEAST_M2)]
     if not len(order):
         return lists.answer([], f"The map shows no room of {_LEAST_M2:g} m² or more.")
     likely = extreme_shares(areas[order], smallest=first)
@@ -129,15 +171,15 @@ def extreme_shares(areas_m2: Float[np.ndarray, " r"], *, smallest: bool) -> Floa
 
 
 def _sounds_by_time(lists: _Lists) -> Answer:
-    avlmap, first, sounds = lists.avlmap, lists.question.first, lists.avlmap.sounds()
-    if not sounds:
-        return lists.answer([], "The map holds no sounds.")
-    which = "first" if first else "last"
-    numbers = sorted(range(len(sounds)), key=lambda number: sounds[number].onset_s * (1.0 if first else -1.0))
+    avlmap, which, sounds = lists.avlmap, "first" if lists.question.first else "last", lists.avlmap.sounds()
+    numbers = [number for number, sound in enumerate(sounds) if lists.keeps(sound.position)]
+    numbers.sort(key=lambda number: sounds[number].onset_s, reverse=not lists.question.first)
+    if not numbers:
+        return lists.answer([], "No sound was heard.")
     goals = [_sound_goal(sounds[number]) for number in numbers]
-    onset_s = sounds[numbers[0]].onset_s
-    named = f"is {'' if goals[0].probability >= avlmap.settings.found_at else 'perhaps '}the {goals[0].name}"
-    text = placed(f"the {which} sound {named} at {onset_s:.1f} s, heard", goals[0])
+    named = f"is {'' if lists.likely(goals[:1]) else 'perhaps '}the {goals[0].name}"
+    named = f"the {which} sound {named} at {sounds[numbers[0]].onset_s:.1f} s"
+    text = placed(f"{named}, heard", goals[0])
     if lists.at != "source":
         return lists.answer(goals, text)
     if not avlmap.source_map.is_located(numbers[0]):
@@ -146,65 +188,88 @@ def _sounds_by_time(lists: _Lists) -> Answer:
 
     located = [number for number in numbers if avlmap.source_map.is_located(number)]
     found = [source_of(avlmap, number) for number in located[:_MOST_SOURCES]]
-    goals = [
-        replace(
-            _goal(one.position, one.confidence, one.name or "sound"), probability=one.probability, spread=one.spread
-        )
-        for one in found
-    ]
+    goals = [_goal(one.position, one.confidence, one.name or "sound") for one in found]
+    spread = zip(goals, found, strict=True)
+    goals = [replace(goal, probability=one.probability, spread=one.spread) for goal, one in spread]
     things = ", ".join(f"the {name} ({share:.2f})" for name, _, share in found[0].things)
-    told = placed(f"the {which} sound {named} at {onset_s:.1f} s; it comes from a place", goals[0])
+    told = placed(f"{named}; it comes from a place", goals[0])
     return lists.answer(goals, f"{told} It may be {things}." if things else told)
 
 
 def _heard(lists: _Lists) -> Answer:
-    # When and how often a sound was heard, which came first, or what was heard in a room or near a thing.
-    question, sounds = lists.question, sorted(lists.avlmap.sounds(), key=lambda sound: sound.onset_s)
-    name, how, other = question.name, question.how, question.other
-    found = [sound for sound in sounds if not name or _is_called(sound, name)]
-    if name and not found:
-        names = counted([_sound_goal(sound).name for sound in sounds]) if sounds else "none"
-        return lists.answer([], f"No {name} was heard; the map's sounds: {names}.", count=0)
-    where, goals = "", list(map(_sound_goal, found))
-    if how in ("in", "near"):
-        subject, fits = lists.ask(other) if how == "near" and goals else None, list[int]()
-        if subject is not None and not subject.found:
-            return replace(subject, goals=())
-        if subject is not None:
-            fits = sorted(number for _, number in _near(lists, subject.goals[0], goals, _HEARD_M))
-        elif goals:
-            fits = np.flatnonzero(lists.avlmap.where.inside(other, [goal.position for goal in goals])).tolist()
-        found, goals, where = [found[n] for n in fits], [goals[n] for n in fits], f" {how} {the_room(other)}"
-        if not found:
-            return lists.answer([], f"No {name or 'sound'} was heard{where}.", count=0)
-    if not name:
-        told = ", ".join(f"{goal.name} at {sound.onset_s:.1f} s" for goal, sound in zip(goals, found, strict=True))
-        return lists.answer(goals, f"{where[1:].capitalize()} were heard: {told}.", count=len(found))
-    if how in ("before", "after"):
-        others = [sound for sound in sounds if _is_called(sound, other)]
-        if not others:
-            return lists.answer([], f"No {other} was heard.")
-        one, second = found[0].onset_s, others[0].onset_s
-        is_so = one < second if how == "before" else one > second
-        return lists.answer(goals, f"{'Yes' if is_so else 'No'}: {name} at {one:.1f} s, {other} at {second:.1f} s.")
-    rooms = [f" in the {room}" if (room := lists.avlmap.where.name_of(sound.position)) else "" for sound in found]
-    times = [f"at {sound.onset_s:.1f} s{room}" for sound, room in zip(found, rooms, strict=True)]
-    often = "once" if len(found) == 1 else f"{len(found)} times"
-    text = f"{goals[0].name.capitalize()} was heard{where} {often}: {', '.join(times)}."
-    return lists.answer(goals, text, count=len(found))
+    # When, how often and where a sound was heard, which sounds were, or whether one came before another.
+    every = list(map(_sound_goal, lists.avlmap.sounds()))
+    if not every:
+        return lists.answer([], "The map holds no sounds.")
+    heard = [_events(lists, one) for one in lists.question.sounds]
+    for one, events in zip(lists.question.sounds, heard, strict=True):
+        if not events:
+            others = "" if one.near else f"; the map's sounds: {counted([goal.name for goal in every])}"
+            return lists.answer([], f"No {one.name or 'sound'} was heard{_places(one)}{others}.", count=0)
+    if lists.question.how:
+        return _compared(lists, *heard)
+    (one,), (events,) = lists.question.sounds, heard
+    goals, told = [goal for _, goal in events], [_told(lists, event) for event in events]
+    if not one.name:
+        told = [f"{goal.name} {at}" for goal, at in zip(goals, told, strict=True)]
+    elif " in " not in _places(one):
+        rooms = [lists.avlmap.where.name_of(goal.position) for goal in goals]
+        told = [f"{at} in {the_room(room)}" if room else at for at, room in zip(told, rooms, strict=True)]
+    if one.name and len(told) > 1:
+        told[0], told[-1] = f"first {told[0]}", f"last {told[-1]}"
+    often = "once" if len(told) == 1 else f"{len(told)} times"
+    begins = f"{one.name}: heard {often}{_places(one)}, " if one.name else f"heard{_places(one)}: "
+    text = sentence_of(begins + ", ".join(told))
+    return replace(lists.answer(goals, text, count=len(goals)), found=bool(lists.likely(goals)))
 
 
-def _is_called(sound: "SoundEvent", words: str) -> bool:
-    # One of the likely names of a sound is meant by words: "the phone ring" is "telephone ringing".
+def _compared(lists: _Lists, ones: Sequence[_Event], others: Sequence[_Event]) -> Answer:
+    # The surest pair of events that shows the order; where none does, the pair that comes nearest to it.
+    if both := {(at, goal.position) for at, goal in ones} & {(at, goal.position) for at, goal in others}:
+        names = f"{ones[0][1].name!r} and {others[0][1].name!r}"
+        raise QueryError(f"The sound at {min(both)[0]:.1f} s is meant by both names, {names}; name two that differ.")
+    sign, nearest = (1, (ones[0], others[-1])) if lists.question.how == "before" else (-1, (ones[-1], others[0]))
+    shown = [pair for pair in product(ones, others) if sign * (pair[1][0] - pair[0][0]) > 0.0]
+    pair = max(shown, key=lambda pair: min(goal.probability for _, goal in pair), default=nearest)
+    goals, text = [goal for _, goal in pair], ", ".join(f"{event[1].name} {_told(lists, event)}" for event in pair)
+    return lists.judged(goals, bool(shown), len(lists.likely(goals)) == len(goals), text)
+
+
+def _events(lists: _Lists, sound: Target) -> list[_Event]:
+    # The events of a name ("" for any) in and near all places that are named, by their onsets.
+    every = ((one.onset_s, _sound_goal(one, sound.name)) for one in lists.avlmap.sounds())
+    events = [one for one in every if (one[1].probability or not sound.name) and lists.keeps(one[1].position)]
+    for place in sound.near:
+        goals = [goal for _, goal in events]
+        if place.kind is TargetKind.AREA:
+            lists.avlmap.where.require(place.name)
+            fits = np.flatnonzero(lists.avlmap.where.inside(place.name, [goal.position for goal in goals])).tolist()
+        else:
+            marks = lists.likely(lists.found(in_query(place)).goals)
+            fits = {number for mark in marks for _, number in _near(lists, mark, goals, _HEARD_M)}
+        events = [events[number] for number in fits]
+    return sorted(events, key=itemgetter(0))
+
+
+def _told(lists: _Lists, event: _Event) -> str:
+    return f"{'' if lists.likely(event[1:]) else 'perhaps '}at {event[0]:.1f} s"
+
+
+def _places(sound: Target) -> str:
+    return "".join(
+        f" in {the_room(one.name)}" if one.kind is TargetKind.AREA else f" near {phrase(one)}" for one in sound.near
+    )
+
+
+def _called(sound: "SoundEvent", words: str) -> float:
+    # How likely a sound is what words mean, by its likely names: "the phone ring" is "telephone ringing".
     wanted, meant = _stems(words), lexicon().find(words, EntryKind.SOUND)
     for name, confidence in zip(sound.names, sound.confidences, strict=False):
-        if confidence < _LIKELY and name != sound.names[0]:
-            continue
-        own = _stems(name)
+        own, is_likely = _stems(name), confidence >= _LIKELY or name == sound.names[0]
         is_same = meant is not None and lexicon().find(name, EntryKind.SOUND) == meant
-        if is_same or (wanted and (wanted <= own or own <= wanted)):
-            return True
-    return False
+        if is_likely and (is_same or (wanted and own and (wanted <= own or own <= wanted))):
+            return float(confidence)
+    return 0.0
 
 
 def _stems(words: str) -> frozenset[str]:
@@ -214,32 +279,24 @@ def _stems(words: str) -> frozenset[str]:
 
 
 def _names(lists: _Lists) -> Answer:
-    kind, where = lists.question.name, lists.avlmap.where if lists.question.name == "rooms" else None
-    if where is not None:
-        goals = [_room_goal(where, number) for number in range(len(where.rooms))]
-    elif kind == "sounds":
-        goals = [_sound_goal(sound) for sound in sorted(lists.avlmap.sounds(), key=lambda sound: sound.onset_s)]
-    else:
-        goals = list(map(_thing_goal, lists.things()))
-    named = [goal.name for goal in goals] if where is None else [room.name for room in where.rooms]
-    many = f"is 1 {kind[:-1]}" if len(named) == 1 else f"are {len(named) or 'no'} {kind}"
-    text = f"There {many}{f': {counted(named)}' if named else ''}."
-    return lists.answer(goals, text, count=len(named))
+    kind, goals = lists.question.name, lists.goals(lists.question.name)
+    many = f"is 1 {kind[:-1]}" if len(goals) == 1 else f"are {len(goals) or 'no'} {kind}"
+    named = f": {counted([goal.name for goal in goals])}" if goals else ""
+    return lists.answer(goals, f"There {many}{named}.", count=len(goals))
 
 
 def _changes(lists: _Lists) -> Answer:
     # What is new, gone or moved, in a room or anywhere, and when it was noticed.
-    question, days = lists.question, lists.days()
+    question, days = lists.question, Days.of(lists.avlmap)
     since = days.visit_of(question.since) if question.since else 0
     answer = changes.changes_answer(days, lists.avlmap.path.name, since, lists.avlmap.where.name_of)
     every: tuple[ChangeKind, ...] = ("new", "moved", "gone")
     kinds: list[ChangeKind] = [kind for kind in every if question.change in ("", kind)]
-    listed = [one for one in answer["changes"] if one["kind"] in kinds]
+    listed = [one for one in answer["changes"] if one["kind"] in kinds and lists.keeps(one["position"])]
     if question.name:
+        lists.avlmap.where.require(question.name)
         inside = lists.avlmap.where.inside(question.name, [one["position"] for one in listed])
         listed = [one for one, is_in in zip(listed, inside, strict=True) if is_in]
-        if not lists.avlmap.where.has(question.name):
-            return lists.answer([], _no_room(question.name), count=0)
     answer["changes"] = listed
     goals = [_goal(one["position"], one["confidence"], one["name"], one["size"]) for one in listed]
     whole = lists.answer(goals, changes.text_of(answer, kinds, question.name), count=len(listed))
@@ -252,7 +309,8 @@ def _last_seen(lists: _Lists) -> Answer:
     entry = lexicon().head(name, EntryKind.THING)
     if entry is None:
         raise QueryError(f"{name!r} is no thing that is known; name a thing, such as: where was the bag last seen?")
-    answer = changes.last_seen(lists.days(), name, means(entry.name), lists.avlmap.where.name_of)
+    answer = changes.last_seen(Days.of(lists.avlmap), name, means(entry.name), lists.avlmap.where.name_of)
+    answer["seen"] = [one for one in answer["seen"] if lists.keeps(one["position"])]
     goals = [_goal(one["position"], one["confidence"], one["name"]) for one in answer["seen"]]
     whole = lists.answer(goals, changes.last_seen_text(answer))
     return replace(whole, when=tuple(one["last_seen"] for one in answer["seen"]))
@@ -262,24 +320,21 @@ def _usual(lists: _Lists) -> Answer:
     # What is usually somewhere, or where a thing usually is, by the days that looked.
     avlmap, name, how = lists.avlmap, lists.question.name, lists.question.how
     days = Days.of(avlmap, "nobody knows what is usual there")
-    if not how:
-        meant = means(name)
-        found = changes.usual(days, lambda stay: meant(changes.name_of(stay)))
-        text = changes.usual_place_text(days, name, found, avlmap.where.name_of)
-    elif how == "in":
-        if not lists.avlmap.where.has(name):
-            return lists.answer([], _no_room(name))
-        inside = lists.avlmap.where.inside(name, [stay.position for stay in days.life.stays])
-        within = {id(stay) for stay, is_in in zip(days.life.stays, inside, strict=True) if is_in}
-        found = changes.usual(days, lambda stay: id(stay) in within)
-        text = changes.usual_text(found, f"in {the_room(name)}")
+    stays = days.life.stays
+    if how == "in":
+        avlmap.where.require(name)
+        fits = avlmap.where.inside(name, [stay.position for stay in stays]).tolist()
+    elif how:
+        marks = lists.likely(lists.found(name).goals)
+        fits = [any(lies(avlmap, how, stay, mark) for mark in marks) for stay in stays]
     else:
-        subject = lists.ask(name)
-        if not subject.found:
-            return replace(subject, goals=())
-        marks = [goal for goal in subject.goals if goal.probability >= avlmap.settings.found_at]
-        found = changes.usual(days, lambda stay: any(lies(avlmap, how, stay, mark) for mark in marks))
-        text = changes.usual_text(found, f"{how} the {name}")
+        meant = means(name)
+        fits = [meant(changes.name_of(stay)) for stay in stays]
+    within = {id(stay) for stay, is_so in zip(stays, fits, strict=True) if is_so and lists.keeps(stay.position)}
+    found = changes.usual(days, lambda stay: id(stay) in within)
+    place = f"in {the_room(name)}" if how == "in" else f"{how} the {name}"
+    at_home = changes.usual_place_text(days, name, found, avlmap.where.name_of)
+    text = changes.usual_text(found, place) if how else at_home
     whole = lists.answer([_goal(one.stay.position, one.share, one.name, one.stay.size) for one in found], text)
     is_known = bool(found) and found[0].is_usual
     return replace(whole, found=is_known, usual=tuple(one.to_json() for one in found))
@@ -314,37 +369,47 @@ class _Box:
 
     def overlaps(self, other: "_Box") -> bool:
         # Each holds the middle of the other: they are one thing.
-        return bool((np.abs(self.middle - other.middle) <= np.minimum(self.size, other.size) / 2.0).all())
+        return bool((np.abs(self.middle - other.middle) < np.minimum(self.size, other.size) / 2.0).all())
+
+
+def _counted(lists: _Lists) -> tuple[list[Goal], str]:
+    # What is counted, the events of a sound or the things that are found, and its name.
+    for sound in lists.question.sounds:
+        return [goal for _, goal in _events(lists, sound)], f"events of {sound.name}{_places(sound)}"
+    name = lists.question.name
+    subject = lists.ask(f"how many {name} are there")
+    if subject.count is None:
+        raise QueryError(f"A map cannot count {name!r}; ask it like: how many chairs are in the kitchen?")
+    return [goal for goal in lists.likely(subject.goals) if lists.keeps(goal.position)], name
 
 
 def _at_least(lists: _Lists) -> Answer:
-    number, what = lists.question.number, lists.question.name
-    answer = lists.ask(f"how many {what} are there")
-    count = answer.count or 0
-    said = f"{count} of the {number} {what} are found" if count < number else f"{count} {what} are found"
-    goals = answer.goals[: max(number, 1)]
-    return replace(answer, goals=goals, found=count >= number, text=f"{sentence_of(said)} {answer.text}")
+    number, (goals, name) = lists.question.number, _counted(lists)
+    one = f"1 {next(iter(singulars_of(name)), name)} is found"
+    told = one if len(goals) == 1 else f"{len(goals) or 'no'} {name} are found"
+    return lists.judged(goals, len(goals) >= number, len(lists.likely(goals)) >= number, told, len(goals))
 
 
 def _rooms_with(lists: _Lists) -> Answer:
-    question, where = lists.question, lists.avlmap.where
-    subject = lists.ask(f"how many {question.name} are there")
-    sure = [goal for goal in subject.goals if goal.probability >= lists.avlmap.settings.found_at]
-    inside = where.rooms_of(np.array([goal.position for goal in sure], np.float64).reshape(-1, 3)).tolist()
-    often = Counter(number for number in inside if number != NOWHERE).most_common()
-    least = question.number or max((count for _, count in often), default=1)
-    rooms = [(number, count) for number, count in often if count >= least]
-    goals = [_room_goal(where, number) for number, _ in rooms]
+    where, (counts, name) = lists.avlmap.where, _counted(lists)
+    if not where.rooms:
+        raise QueryError("The map has no rooms: it was built without a model of views.")
+    inside = where.rooms_of(np.array([goal.position for goal in counts], np.float64).reshape(-1, 3)).tolist()
+    often = Counter(room for room in inside if room != NOWHERE).most_common()
+    least = lists.question.number or max((count for _, count in often), default=1)
+    rooms, goals = [(room, count) for room, count in often if count >= least], list[Goal]()
+    for room, _ in rooms:
+        sure = sorted(one.probability for one, at in zip(counts, inside, strict=True) if at == room)[-least]
+        goal = _room_goal(where, room)
+        goals.append(replace(goal, probability=min(goal.probability, sure)))
     told = ", ".join(f"{the_room(goal.name)} ({count})" for goal, (_, count) in zip(goals, rooms, strict=True))
-    which = f"with {least} or more" if question.number else "with the most"
-    text = f"Rooms {which} {question.name}: {told or 'none is known'}."
-    return lists.answer(goals, text, count=len(rooms))
+    which = f"{least} or more" if lists.question.number else "the most"
+    text = f"{told or 'no room is known that'} {'have' if len(goals) > 1 else 'has'} {which} {name}"
+    return lists.answer(goals, sentence_of(text), count=len(goals))
 
 
 def _room_of(lists: _Lists) -> Answer:
-    subject = lists.ask(lists.question.name)
-    if not subject.found:
-        return replace(subject, goals=())
+    subject = lists.found(lists.question.name)
     where, goal = lists.avlmap.where, subject.goals[0]
     number = int(where.parts_at(np.array([goal.position]))[0])
     if number == NOWHERE:
@@ -357,25 +422,21 @@ def _room_of(lists: _Lists) -> Answer:
 
 def _contents(lists: _Lists) -> Answer:
     name = lists.question.name
-    subject = lists.ask(name)
-    if not subject.found:
-        return replace(subject, goals=())
-    where, things = lists.avlmap.where, lists.things()
+    subject = lists.found(name)
+    where, things = lists.avlmap.where, lists.goals("things")
     inside = where.inside(name, [thing.position for thing in things])
-    goals = [_thing_goal(thing) for thing, is_in in zip(things, inside, strict=True) if is_in]
+    goals = [thing for thing, is_in in zip(things, inside, strict=True) if is_in]
     number = f"{len(goals)} thing{'s' * (len(goals) > 1)}: " if lists.question.counts and goals else ""
     text = f"In {the_room(name)}: {number}{counted([goal.name for goal in goals])}."
-    text = text if where.has(name) else _no_room(name)
+    text = text if where.has(name) else f"The map shows no room that is a {name} as a whole."
     return lists.answer(goals, text, subject, count=len(goals))
 
 
 def _beside(lists: _Lists) -> Answer:
-    subject = lists.ask(lists.question.name)
-    if not subject.found:
-        return replace(subject, goals=())
+    subject = lists.found(lists.question.name)
     if lists.question.other:
         return _between(lists, subject)
-    goals = list(map(_thing_goal, lists.things()))
+    goals = lists.goals("things")
     near = _near(lists, subject.goals[0], goals, BESIDE_M)
     words = in_words([one.part for one in subject.parts])
     what = ", ".join(f"{goals[number].name} ({gap:.1f} m)" for gap, number in near[:_MOST_NAMED])
@@ -395,13 +456,8 @@ def _near(lists: _Lists, mark: Goal, goals: Sequence[Goal], most_m: float) -> li
 
 def _between(lists: _Lists, one: Answer) -> Answer:
     question, avlmap = lists.question, lists.avlmap
-    other = lists.ask(question.other)
-    if not other.found:
-        return replace(other, goals=())
-    if question.how:
-        goals = [_room_goal(avlmap.where, number) for number in range(len(avlmap.where.rooms))]
-    else:
-        goals = list(map(_thing_goal, lists.things()))
+    other = lists.found(question.other)
+    goals = lists.goals(question.how or "things")
     ends = [avlmap.space.level(np.array(end.goals[0].position))[:2] for end in (one, other)]
     places = avlmap.space.level(np.array([goal.position for goal in goals]).reshape(-1, 3))[:, :2]
     fits, sure = lies_between(places, *ends), min(one.probability, other.probability)
@@ -436,10 +492,6 @@ ANSWERS: Mapping[Listed, Callable[[_Lists], Answer]] = {
 """What answers each kind of list."""
 
 
-def _no_room(name: str) -> str:
-    return f"The map shows no room that is a {name} as a whole."
-
-
 def counted(names: Sequence[str]) -> str:
     """Return names, the most frequent first, each with how often it occurs: ``chair (4), sofa``."""
     if not names:
@@ -470,13 +522,17 @@ def answer_on_storey(
     notes = (note,) if note else ()
     if not numbers:
         return _no_such(storeys, word, notes, None if word.lists else ask(word.rest, top))
-    if word.lists:
-        things = avlmap.things() if avlmap.has(Kind.PIXELS) else []
-        goals = [goal for goal in map(_thing_goal, things) if storeys is None or _storey(storeys, goal) in numbers]
-        likely, text = goals[0].probability if goals else 0.0, _list(word, goals)
-        goals, found = tuple(goals), bool(goals)
-        return Answer(goals[:top], found, (), probability=likely, count=len(goals), notes=notes, text=text)
-    return _restricted(avlmap, ask(word.rest, MOST_GOALS), word, numbers, notes, top)
+
+    def is_here(position: Sequence[float]) -> bool:
+        return storeys is None or int(storeys.of_places(np.array([position]))[0]) in numbers
+
+    every = answer_list(avlmap, _EVERY, top, lambda words: ask(words, top)) if word.lists else None
+    whole = every or ask(word.rest, MOST_GOALS)
+    if whole.again is None:
+        return _restricted(whole, word, avlmap, [goal for goal in whole.goals if is_here(goal.position)], notes, top)
+    kept = whole.again(is_here)
+    text = f"{sentence_of(at_storey(word))[:-1]}: {kept.text}"
+    return replace(kept, goals=kept.goals[:top], notes=(*notes, *kept.notes), text=text)
 
 
 def _no_such(storeys: Storeys | None, word: SaidStorey, notes: tuple[str, ...], whole: Answer | None) -> Answer:
@@ -488,26 +544,18 @@ def _no_such(storeys: Storeys | None, word: SaidStorey, notes: tuple[str, ...], 
     return replace(whole, found=False, probability=0.0, count=count, notes=(*notes, *whole.notes), text=text)
 
 
-def _list(word: SaidStorey, goals: Sequence[Goal]) -> str:
-    return sentence_of(f"{at_storey(word)}: {counted([goal.name for goal in goals])}")
-
-
 def _restricted(
-    avlmap: "AVLMap", whole: Answer, word: SaidStorey, numbers: Sequence[int], notes: tuple[str, ...], top: int
+    whole: Answer, word: SaidStorey, avlmap: "AVLMap", here: Sequence[Goal], notes: tuple[str, ...], top: int
 ) -> Answer:
     # The goals of an answer that lie on some storeys; found where the first of them is likely enough.
-    storeys, found_at = avlmap.storeys, avlmap.settings.found_at
-    here = [goal for goal in whole.goals if storeys is None or _storey(storeys, goal) in numbers]
+    found_at, others = avlmap.settings.found_at, whole.alternatives
     likely = here[0].probability if here else 0.0
-    found, others = bool(here) and likely >= found_at, whole.alternatives
+    found, asked = bool(here) and likely >= found_at, [one.part for one in whole.parts]
     count = None if whole.count is None else sum(goal.probability >= found_at for goal in here)
-    asked = [one.part for one in whole.parts]
-    if not asked:  # a list
-        text = _list(word, here)
-    elif found:
+    if found:
         text = placed(f"{in_words(asked)} {at_storey(word)} is most likely", here[0])
     else:
-        text = _absent(whole, word, here, storeys)
+        text = _absent(whole, word, here, avlmap.storeys)
         if whole.found:
             others = (Alternative(Question.of(asked), whole.probability, True, whole.goals[:1]), *others)
     text = text if count is None else f"Counted {at_storey(word)}: {count}. {text}"
@@ -523,7 +571,7 @@ def _absent(whole: Answer, word: SaidStorey, here: Sequence[Goal], storeys: Stor
     if here:
         text += f"; the best guess there is at {place_text(here[0].position)}, probability {here[0].probability:.2f}"
     if whole.found and storeys is not None:
-        name = storeys[_storey(storeys, whole.goals[0])].name
+        name = storeys[int(storeys.of_places(np.array(whole.goals[0].position))[0])].name
         at = place_text(whole.goals[0].position)
         text += f"; one is found on the {name} at {at}, probability {whole.probability:.2f}"
     return f"{text}."
@@ -552,10 +600,6 @@ def storeys_meant(word: SaidStorey, count: int) -> tuple[list[int], str]:
                 f"{word.number} over the ground floor."
             )
     return ([number for number in every if number not in chosen] if word.isnt and chosen else chosen), note
-
-
-def _storey(storeys: Storeys, goal: Goal) -> int:
-    return int(storeys.of_places(np.array([goal.position]))[0])
 
 
 def at_storey(word: SaidStorey) -> str:

@@ -129,7 +129,7 @@ class QueryAnswer(TypedDict):
     frame: Frame
     level_from_recording: Matrix | None
     notes: NotRequired[Annotated[list[str], Meta(description="how words were read; why the map may be wrong")]]
-    count: NotRequired[Annotated[int, Meta(description="the number of things, for a sentence such as 'how many'")]]
+    count: NotRequired[Annotated[int, Meta(description="how many things, sounds or rooms, where a sentence asks that")]]
     alike: NotRequired[Annotated[int, Meta(description="places that fit as well as the likeliest, if several do")]]
     alternatives: NotRequired[
         Annotated[list[AlternativeAnswer], Meta(description="the other things that the sentence may mean")]
