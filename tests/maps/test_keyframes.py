@@ -53,9 +53,7 @@ def within(settings: KeyframeSettings, stamps: np.ndarray, poses: np.ndarray, a:
 def test_every_frame_lies_within_the_limits_of_a_keyframe_shortly_before(seed: int, count: int, hurry: float) -> None:
     stamps, poses = walk(seed, count, hurry)
     chosen = keyframes_by_motion(stamps, poses, SETTINGS)
-    assert chosen[0] == 0
-    assert chosen[-1] == count - 1
-    assert (np.diff(chosen) > 0).all()
+    assert (chosen[0], chosen[-1]) == (0, count - 1) and (np.diff(chosen) > 0).all()
     for frame in np.setdiff1d(np.arange(count), chosen):
         last = int(np.searchsorted(chosen, frame))
         assert any(within(SETTINGS, stamps, poses, int(one), int(frame)) for one in chosen[max(last - 2, 0) : last])
@@ -101,15 +99,13 @@ def test_lifted_points_lie_on_the_surface_that_the_pixel_shows(rig: Rig) -> None
     good = np.isfinite(points[:, 0])
     assert good.mean() > 0.6
     distance = distance_to_surface_m(points[good])
-    assert np.median(distance) < 0.006
-    assert np.percentile(distance, 99) < 0.03
+    assert np.median(distance) < 0.006 and np.percentile(distance, 99) < 0.03
     colour_from_world = rig.rgb_from_depth @ inverse(frame.world_from_camera)
     np.testing.assert_allclose(rig.rgb.project(apply(colour_from_world, points[good])), xy[good], atol=0.01)
 
 
 def test_depth_of_another_size_is_looked_up_at_the_same_place() -> None:
-    rig = Rig(CAMERA, CAMERA.resized(160, 120))
-    frame = RoomWalk(rig=rig).frame(2)
+    frame = RoomWalk(rig=Rig(CAMERA, CAMERA.resized(160, 120))).frame(2)
     xy = np.random.default_rng(0).uniform((0, 0), (320, 240), (400, 2)).astype(np.float32)
     points = lift_keypoints(xy, frame, 6.0)
     good = np.isfinite(points[:, 0])
@@ -133,9 +129,8 @@ def test_holes_and_far_depths_are_not_lifted_and_a_few_lost_pixels_do_no_harm() 
     depth[:, :50] = 0.0
     depth[:, 200:] = 7.0
     depth[::3, 50:200:3] = 0.0
-    points = lift_keypoints(
-        np.array([[20, 100], [100, 100], [300, 100], [0, 0], [320, 240]], np.float32), flat_frame(depth), 6.0
-    )
+    xy = np.array([[20, 100], [100, 100], [300, 100], [0, 0], [320, 240]], np.float32)
+    points = lift_keypoints(xy, flat_frame(depth), 6.0)
     np.testing.assert_array_equal(np.isfinite(points[:, 0]), [False, True, False, False, False])
     assert points[1, 2] == 1.5
 
@@ -151,16 +146,11 @@ def test_the_nearer_of_two_surfaces_hides_the_other_in_the_colour_camera() -> No
     assert not (seen[120, :280] > 2.0).any()
 
 
-def test_the_middle_of_a_view_is_in_the_middle_of_what_is_seen() -> None:
+def test_the_middle_of_a_view_is_in_the_middle_of_what_is_seen_and_without_depth_at_the_camera() -> None:
     depth = np.full((240, 320), 2.0, np.float32)
     depth[:, 300:] = 0.0
-    frame = flat_frame(depth)
-    np.testing.assert_allclose(middle_of_view(frame), [-0.08, 0.0, 2.0], atol=0.04)
-
-
-def test_a_camera_that_saw_no_depth_saw_itself() -> None:
-    frame = flat_frame(np.zeros((240, 320), np.float32))
-    np.testing.assert_array_equal(middle_of_view(frame), np.zeros(3))
+    np.testing.assert_allclose(middle_of_view(flat_frame(depth)), [-0.08, 0.0, 2.0], atol=0.04)
+    np.testing.assert_array_equal(middle_of_view(flat_frame(np.zeros_like(depth))), np.zeros(3))
 
 
 @dataclass
@@ -184,12 +174,9 @@ def test_what_is_kept_of_a_keyframe_fits_together() -> None:
     assert 3 < len(keyframes) == count < 40
     np.testing.assert_array_equal(keyframes.stamp_s, recording.stamps_s[chosen])
     np.testing.assert_array_equal(keyframes.world_from_camera, recording.world_from_camera[chosen])
-    assert keyframes.view.shape == (count, 0)
-    assert keyframes.place.shape == (count, 64 * 64)
-    assert keyframes.xy.shape == (rows, 2)
-    assert keyframes.descriptors.shape == (rows, 64)
-    assert keyframes.descriptors.dtype == np.float16
-    assert keyframes.points_world.shape == (rows, 3)
+    assert (keyframes.view.shape, keyframes.place.shape) == ((count, 0), (count, 64 * 64))
+    assert (keyframes.xy.shape, keyframes.points_world.shape) == ((rows, 2), (rows, 3))
+    assert (keyframes.descriptors.shape, keyframes.descriptors.dtype) == ((rows, 64), np.float16)
     assert np.isfinite(keyframes.points_world[:, 0]).mean() > 0.6
     assert set(state) == {"centres"}
     for start, stop in zip(keyframes.thumbnail_offsets, keyframes.thumbnail_offsets[1:], strict=False):
@@ -208,6 +195,5 @@ def test_a_profile_with_views_gives_area_features_and_one_without_keypoints_none
 
 def test_no_keyframes_are_a_map_without_pictures() -> None:
     keyframes, _ = perceive_keyframes(RoomWalk(), [], Encoders.named("colours"), np.random.default_rng(0))
-    assert len(keyframes) == 0
-    assert keyframes.world_from_camera.shape == (0, 4, 4)
+    assert len(keyframes) == 0 and keyframes.world_from_camera.shape == (0, 4, 4)
     np.testing.assert_array_equal(keyframes.offsets, [0])

@@ -23,16 +23,13 @@ def test_a_map_built_by_the_papers_rules_is_known_by_its_settings():
     assert rules_of(chosen.for_profile(0.6)) == "ours"
 
 
-def test_the_papers_rules_leave_what_they_do_not_decide():
+def test_the_papers_rules_leave_what_they_do_not_decide_and_a_profile_leaves_theirs():
     chosen = replace(DEFAULTS, voxel_size_m=0.1)
     assert build_settings("paper", chosen).voxel_size_m == 0.1
+    assert build_settings("paper").for_profile(50.0).fusion.variance_m2 == 0.6
     asked = QuerySettings(heat=HeatSettings(context_falloff_per_m=0.5), seed=3)
     assert query_settings("paper", asked).heat == asked.heat
     assert query_settings("paper", asked).seed == 3
-
-
-def test_a_profile_does_not_change_the_papers_weight_by_distance():
-    assert build_settings("paper").for_profile(50.0).fusion.variance_m2 == 0.6
 
 
 @pytest.mark.parametrize("pause_s", [0.5, 1.5])

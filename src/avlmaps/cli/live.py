@@ -46,8 +46,8 @@ class Live(Building):
     as_fast_as_possible: bool = False
     """Wait for the map instead of the clock; no frame is late."""
     every_frame: bool = False
-    """Fuse every frame that is not late, also where nothing moved and nothing new is in view; the end is bit by bit
-    that of a build."""
+    """Fuse and encode every frame that is not late, also where nothing moved and nothing new is in view; the end is
+    that of a build, bit by bit where frames are 5 cm or 3.5 degrees apart: a build encodes no nearer ones."""
     serve: bool = False
     """Answer HTTP on this machine while the map grows, and afterwards until Ctrl-C, as `avlmaps serve` does; agents are
     served by `avlmaps serve MAP` beside it, which takes each save."""

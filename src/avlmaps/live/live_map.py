@@ -104,7 +104,7 @@ class LiveMap:
 
     The folder is a whole map at any moment from the first save on, also when the process is killed; another process
     may open it. What came after the last save is lost then, a few seconds (``status().unsaved_s``). At the end, it is
-    the map that a build makes of the frames that were fused.
+    the map that a build makes of the frames that were fused, where it encodes the same ones (``FrameSettings.look_m``).
     """
 
     def __init__(

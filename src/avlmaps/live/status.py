@@ -17,7 +17,7 @@ class LiveSettings:
 
     gates: bool = True
     """Fuse only frames that bring something: the robot moved, or new surface is in view. Without gates every frame
-    that is not late is fused and encoded, and the end is that of a build."""
+    that is not late is fused and encoded; a build encodes only those 5 cm or 3.5 degrees apart."""
     most_waiting: int = 2
     """Frames that may wait; when one more comes, the oldest is dropped as late."""
     still_m: float = 0.02

@@ -95,9 +95,11 @@ def keyframes_by_motion(
     return np.array([*chosen, *chooser.end()], np.int64)
 
 
-def select_keyframes(recording: Recording, settings: KeyframeSettings = DEFAULT_KEYFRAMES) -> Int[np.ndarray, " k"]:
-    """Choose the keyframes of a recording; it reads no picture."""
-    return keyframes_by_motion(recording.stamps_s, recording.world_from_camera, settings)
+def select_keyframes(
+    recording: Recording, settings: KeyframeSettings = DEFAULT_KEYFRAMES, step: int = 1
+) -> Int[np.ndarray, " k"]:
+    """Choose the keyframes of every ``step``-th frame of a recording; it reads no picture."""
+    return keyframes_by_motion(recording.stamps_s[::step], recording.world_from_camera[::step], settings) * step
 
 
 def describe_keyframe(

@@ -1,17 +1,15 @@
 """The plan of a build: what it is made of, which frames it fuses, and where it stores what it has finished."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import sampled_digest
 from avlmaps.core.progress import say
 from avlmaps.core.wording import option
-from avlmaps.maps.keyframes import keyframes_by_motion
-from avlmaps.maps.settings import BuildSettings, KeyframeSettings
+from avlmaps.maps.keyframes import select_keyframes
+from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.folder import MANIFEST, PARTS, is_map_or_free, read_info, remove_parts, sweep
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo
 from avlmaps.maps.store.tables import SUFFIX, key_of
@@ -19,8 +17,6 @@ from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.types import LARGEST_BUDGET_BYTES, Recording
 
 BUILD_VERSION = 9  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
-
-LOOKS = KeyframeSettings(translation_m=0.05, rotation_deg=3.5)  # how far apart frames are that an encoder is given
 
 Span = tuple[int, int, int]  # (first, last + 1, step) of frames
 
@@ -42,12 +38,8 @@ class BuildPlan:
         """Return the stretches of frames that are fused one after the other, by the files of what they bring."""
         count, step = len(self.recording), self.settings.frames.step
         stride = self.settings.frames.summed * step
-        key = key_of("frames", self.key, self.recording.base_height)
-        home = self.path / PARTS / f"frames-{key[:12]}"
-        return {
-            home / f"{start:08d}{SUFFIX}": (start, min(start + stride, count), step)
-            for start in range(0, count, stride)
-        }  # fmt: skip
+        home = self.path / PARTS / f"frames-{key_of('frames', self.key, self.recording.base_height)[:12]}"
+        return {home / f"{at:08d}{SUFFIX}": (at, min(at + stride, count), step) for at in range(0, count, stride)}
 
 
 def make_plan(recording: Recording, path: Path, encoders: Encoders, settings: BuildSettings) -> BuildPlan:
@@ -58,11 +50,14 @@ def make_plan(recording: Recording, path: Path, encoders: Encoders, settings: Bu
     settings = settings.for_profile(encoders.weight_variance_m2)
     models = models_of(encoders)
     key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), encoders.name, models, settings)
-    numbers = np.arange(0, len(recording), settings.frames.step)
-    stamps_s, poses = recording.stamps_s[numbers], recording.world_from_camera[numbers]
-    limits = settings.keyframes, settings.keyframes if encoders.keyframes_only else LOOKS
-    keyframes, looks = (frozenset(numbers[keyframes_by_motion(stamps_s, poses, one)].tolist()) for one in limits)
-    return BuildPlan(recording, path, encoders, settings, models, key, keyframes, keyframes | looks)
+    frames = settings.frames
+    keyframes = looks = frozenset(select_keyframes(recording, settings.keyframes, frames.step).tolist())
+    if not encoders.keyframes_only and 0.0 in (frames.look_m, frames.look_deg):
+        looks = frozenset(range(0, len(recording), frames.step))
+    elif not encoders.keyframes_only:
+        limits = replace(settings.keyframes, translation_m=frames.look_m, rotation_deg=frames.look_deg)
+        looks |= frozenset(select_keyframes(recording, limits, frames.step).tolist())
+    return BuildPlan(recording, path, encoders, settings, models, key, keyframes, looks)
 
 
 def require_place(path: Path, overwrite: bool) -> None:

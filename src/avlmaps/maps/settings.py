@@ -129,6 +129,10 @@ class FrameSettings:
     """Stop nevertheless when more than this share of the frames cannot be read."""
     per_submap: int = 0
     """Frames of a submap: the map stores their sums and can follow corrected poses. 0 stores none."""
+    look_m: float = 0.05
+    """Encode keyframes and frames this far apart, metres; others add surfaces and colours. 0 encodes every frame."""
+    look_deg: float = 3.5
+    """Or turned by this angle, degrees; 0 encodes every frame."""
 
     @property
     def summed(self) -> int:
@@ -136,7 +140,7 @@ class FrameSettings:
         return self.per_submap or self.per_part
 
     def __post_init__(self) -> None:
-        hold_numbers(self, MapError, least_0="per_submap max_bad_share", least_1="step per_part")
+        hold_numbers(self, MapError, least_0="per_submap max_bad_share look_m look_deg", least_1="step per_part")
         _require(self.max_bad_share <= 1.0, f"max_bad_share is {self.max_bad_share}", "between 0 and 1")
 
 
@@ -152,11 +156,8 @@ class GravitySettings:
     def __post_init__(self) -> None:
         hold_numbers(self, MapError, least_1="frames")
         height_m = self.camera_height_m
-        _require(
-            height_m is None or 0.02 <= height_m <= 10.0,
-            f"The height of the camera over the floor is {height_m} m",
-            "between 0.02 and 10, in metres",
-        )
+        fault = f"The height of the camera over the floor is {height_m} m"
+        _require(height_m is None or 0.02 <= height_m <= 10.0, fault, "between 0.02 and 10, in metres")
 
 
 @dataclass(frozen=True, slots=True)

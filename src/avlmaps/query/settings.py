@@ -150,8 +150,7 @@ PAPER_HEARING = HearingSettings(
 )
 
 
-# Heat falls from the camera's place, through walls; cosines are stretched over the keyframes; each view speaks for
-# itself, and things do not.
+# Heat falls from the camera, through walls; cosines are stretched; each view speaks for itself, and things do not.
 PAPER_AREAS = AreaSettings(anchor="camera", extent="cones", score="min-max")
 
 
@@ -171,7 +170,8 @@ def build_settings(rules: Rules, settings: BuildSettings = DEFAULTS) -> BuildSet
     if rules == "ours":
         return settings
     fusion = replace(settings.fusion, weight_variance_m2=PAPERS_VARIANCE_M2, sensor="none")
-    return replace(settings, fusion=fusion, hearing=PAPER_HEARING)
+    frames = replace(settings.frames, look_m=0.0, look_deg=0.0)
+    return replace(settings, frames=frames, fusion=fusion, hearing=PAPER_HEARING)
 
 
 def query_settings(rules: Rules, settings: QuerySettings | None = None) -> QuerySettings:
@@ -183,5 +183,5 @@ def query_settings(rules: Rules, settings: QuerySettings | None = None) -> Query
 
 
 def rules_of(built_with: BuildSettings) -> Rules:
-    """Return the rules that a map was built by, from the settings in its manifest."""
-    return "paper" if build_settings("paper", built_with) == built_with else "ours"
+    """Return the rules that a map was built by, from the settings in its manifest; old ones say nothing of looks."""
+    return "paper" if replace(build_settings("paper", built_with), frames=built_with.frames) == built_with else "ours"

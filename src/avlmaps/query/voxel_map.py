@@ -34,7 +34,7 @@ IN_MEMORY = Path("the frames")  # as sentences name a map that has no folder
 
 
 class VoxelMap:
-    """A map in memory: ``add`` frames, ``ask``, ``save``. It is the map that ``build_map`` makes of the same frames.
+    """A map in memory: ``add`` frames, ``ask``, ``save``. It is the map that ``build_map`` makes if it encodes all.
 
     Up, the floor and the depth camera's error are found in the first 60 frames, or with the first question; up and the
     floor again with a question after the walk has doubled, and in ``save``, so that the map of a longer walk can differ

@@ -254,7 +254,8 @@ def _killed(lost: list[float]) -> list[list[object]]:
 
 
 def _ends(name: str, recording: Recording, place: Path, used: Encoders, rate: float) -> list[list[object]]:
-    built = build_map(recording, place / "built", used, progress=False, allow=["geometry", "colour"])
+    every = avlmaps.BuildSettings(frames=avlmaps.FrameSettings(look_m=0.0))
+    built = build_map(recording, place / "built", used, every, progress=False, allow=["geometry", "colour"])
     rows: list[list[object]] = []
     for gates, pace in ((True, None), (True, rate), (False, None)):
         played = play(recording, place / "end", used, rate=pace, settings=LiveSettings(gates=gates))
@@ -281,8 +282,7 @@ def _equality(one: MapData, other: MapData) -> str:
 
 
 def _goals(one: AVLMap, other: AVLMap) -> tuple[list[float], int]:
-    apart_m: list[float] = []
-    alone = 0
+    apart_m, alone = list[float](), 0
     for word in one.encoders.pixels.vocabulary:
         answers = [avlmap.ask(word).to_dict() for avlmap in (one, other)]
         found = [bool(answer["found"]) for answer in answers]
