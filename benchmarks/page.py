@@ -93,7 +93,7 @@ OTHER_HANDS = (
     "ESC-50 fold 1, 400 clips, 50 names, by sounds-5",
     "85 more clips, by sounds-5",
     "the thirteenth, at first use",
-    "the fourteenth, by the reader before",
+    "the fourteenth, reader before",
     "the fifteenth, at first use",
     "six more, 1,097 commands, at first use",
     "an eleventh writer, commands",
