@@ -20,7 +20,6 @@ ERRORS = (
     (("add-sounds", "REC", "--clips", "nowhere", "--out", "OUT"), 1, "audio", "nowhere"),
     (("calibrate", "REC", "--out", "OUT"), 1, "recording", ""),
     (("build", "nowhere", "--out", "OUT"), 1, "recording", "There is nothing at nowhere"),
-    (("build", "REC", "--out", "OUT", "--profile", "magic"), 1, "backend", "no profile called 'magic'"),
     (("import-map", "nowhere", "--out", "OUT"), 1, "map", ""),
     (("info", "nowhere"), 1, "recording", "nowhere"),
     (("query", "nowhere.avlmap", "the chair"), 1, "map", "nowhere.avlmap"),
@@ -28,7 +27,6 @@ ERRORS = (
     (("query", "MAP"), 2, "usage", "takes a sentence, or parts"),
     (("query", "MAP", "--object", "red", "--plot", "x.doc"), 1, "query", ""),
     (("locate", "MAP", "nothing.png"), 1, "query", "nothing.png"),
-    (("live", "nowhere", "--out", "OUT"), 1, "recording", ""),
     (("live", "--out", "OUT"), 2, "usage", ""),
     (("live", "REC", "--out", "OUT", "--source", "ros2"), 2, "usage", ""),
     (("live", "REC", "--out", "OUT", "--topics", "rgb=/rgb"), 1, "recording", ""),
@@ -38,11 +36,9 @@ ERRORS = (
     (("edit", "MAP", "--rename", "unicorn", "--to", "horse"), 1, "query", ""),
     (("edit", "MAP", "--pin", "dock"), 2, "usage", ""),
     (("edit", "MAP", "--forbid", "x", "--box", "1,2,3"), 1, "query", ""),
-    (("edit", "MAP", "--undo", "last"), 1, "query", ""),
     (("sources", "nowhere.avlmap"), 1, "map", ""),
     (("sources", "MAP"), 1, "query", ""),
     (("go", "nowhere.avlmap", "go to the chair", "--scene", "house:7"), 1, "map", ""),
-    (("go", "MAP", "gabble gabble the", "--scene", "house:7"), 1, "unclear", ""),
     (("things", "nowhere.avlmap"), 1, "map", ""),
     (("rooms", "nowhere.avlmap"), 1, "map", ""),
     (("shell", "nowhere.avlmap"), 1, "map", ""),
@@ -61,18 +57,14 @@ ERRORS = (
     (("query", "MAP", "--object", "red", "--top", "0"), 2, "usage", "--top takes a number from 1 on, not 0"),
     (("query", "MAP", "--object", "red", "--intrinsics", "1,2,3,4"), 2, "usage", "Intrinsics belong to a photo"),
     (("query", "MAP", "the chair", "--near", "here"), 2, "usage", "A place is x,y"),
-    (("query", "MAP", "--object", " "), 1, "query", "The object in the query is empty"),
     (("query", "MAP", "--object", "chair"), 1, "query", "understands nothing of 'chair'"),
     (("query", "MAP", "--area", "kitchen"), 1, "backend", "has no views backend"),
     (("query", "MAP", "--sound-clip", "nothing.wav"), 1, "query", "nothing.wav"),
-    (("query", "MAP", "--image", "nothing.png"), 1, "query", "nothing.png"),
-    (("locate", "MAP", "MAP/map.json"), 1, "query", "map.json"),
     (("info", "REC", "--plot", "x.png"), 2, "usage", "--plot draws a map"),
     (("build", "REC", "--out", "OUT", "--voxel-size-m", "0"), 2, "usage", "takes a number from 0.001 to 10"),
     (("build", "REC", "--out", "OUT", "--rules", "paper", "--sensor", "kinect"), 2, "usage", "every depth as it is"),
     (("build", "REC", "--out", "OUT", "--format", "tum"), 1, "recording", "rgb.txt"),
     (("build", "REC", "--out", "OUT", "--audio", "nothing.wav"), 1, "audio", "nothing.wav"),
-    (("bench", "indexing", "--out", "OUT", "--model", "eyes=clip"), 1, "backend", "the modules are pixels"),
     (("bench", "indexing", "--out", "OUT", "--scenes", "house:1", "--sounds", "nowhere"), 1, "audio", "nowhere"),
 )
 
@@ -104,13 +96,11 @@ def test_every_verb_is_among_them() -> None:
 
 def test_a_command_line_that_cannot_be_read_says_what_is_wrong(run) -> None:
     for words, told in (
-        (("query", "MAP", "--tpo", "3"), "there is no option --tpo; did you mean --top?"),
         (("query",), "Missing from avlmaps query: MAP"),
         (("edit", "MAP", "--undo"), "Missing value for argument '--undo'"),
         (("go", "MAP", "x", "--language", "x"), "invalid choice 'x' for argument '--language'. Expected one of"),
         (("build", "x", "--out", "y", "--voxel-size-m", "abc"), "--voxel-size-m"),
         ((), "a verb comes first: demo"),
-        (("nonsense",), "nonsense"),
     ):
         code, out, err = run(*words, "--json")
         assert code == 2
@@ -178,11 +168,9 @@ def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> No
     ("words", "said"),
     [
         (("qurey", "MAP", "sofa"), "there is no verb 'qurey'; did you mean query?"),
-        (("expotr", "MAP"), "did you mean export?"),
         (("zzz",), "there is no verb 'zzz'. The verbs: demo"),
         (("query", "MAP", "sofa", "--tpo", "3"), "there is no option --tpo; did you mean --top?"),
         (("go", "MAP", "sofa", "--chat_modl", "x"), "did you mean --chat-model?"),
-        (("export", "MAP", "--otu", "x.ply"), "did you mean --out?"),
         (("build", "REC", "--out", "M", "--voxel-sise-m=0.1"), "did you mean --voxel-size-m?"),
         (("query", "MAP", "sofa", "--primary", "objct"), "invalid choice 'objct'"),
     ],

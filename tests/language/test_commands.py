@@ -113,8 +113,6 @@ KITCHEN = Target(TargetKind.AREA, "kitchen")
     [
         ("Drive to the left one of the two chairs", thing("chairs", Pick.LEFT)),
         ("go to the chair furthest to the left", thing("chair", Pick.LEFT)),
-        ("go to the chair that is furthest to the right", thing("chair", Pick.RIGHT)),
-        ("Go to the second nearest window", thing("window", Pick.NEAREST, 2)),
         ("go to the second chair from the left", thing("chair", Pick.LEFT, 2)),
         ("go to the third farthest blue chair in the kitchen", thing("blue chair", Pick.FARTHEST, 3, KITCHEN)),
         ("go to the northernmost lamp", thing("lamp", Pick.NORTH)),
@@ -140,7 +138,6 @@ NEAREST_SOFA = Go(thing("sofa", Pick.NEAREST))
         ("go to the sofa if there is one, else come back", If(thing("sofa"), (Go(thing("sofa")),), (Return(),))),
         ("go halfway to the sofa if there is one",
          If(thing("sofa"), (act.Between((Target(TargetKind.HERE), thing("sofa"))),))),
-        ("Check whether we have a sofa and if so go to it", If(thing("sofa"), (NEAREST_SOFA,))),
         ("If the map contains a sofa, approach it to within half a metre; if not, go to the kitchen instead.",
          If(thing("sofa"), (StopAt(thing("sofa", Pick.NEAREST), 0.5),), (Go(KITCHEN),))),
         ("is there a sofa? if so go there", If(thing("sofa"), (NEAREST_SOFA,))),
@@ -213,8 +210,6 @@ def test_a_number_chooses_one_of_several_meanings() -> None:
     ("command", "why"),
     [
         ("There's a draught coming from the bathroom", "remark"),
-        ("It is quite warm in here today", "remark"),
-        ("My sister says robots always go to the fridge first", "tells of a drive"),
         ("'Go to the window,' she whispered, and the curtain fell", "tells of a drive"),
         ("At quarter past three the lads will be going to the kitchen", "no order that the robot understands"),
         ("go to the kitchen in the morning", "knows no clock"),

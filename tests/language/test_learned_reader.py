@@ -300,8 +300,3 @@ def test_the_network_alone_reads_most_of_them_and_random_weights_do_not(monkeypa
     monkeypatch.setattr(reader, "_step", Noise())
     monkeypatch.setattr(reader, "lines", reader.written)
     assert [alone(row, reader) for row in rows].count("right") < 0.3 * len(rows)
-
-
-def test_the_whole_reader_takes_the_words_of_a_map() -> None:
-    read = read_command("go to the frobnicator", Attachments(knows=lambda _: True))
-    assert read.intents == (Go(Target(TargetKind.OBJECT, "frobnicator")),)

@@ -18,10 +18,7 @@ BY_ROWS = {
 }
 READ = {
     "when did you hear the phone?": (Listed.HEARD, "phone", False),
-    "when did the phone ring": (Listed.HEARD, "phone ring", False),
-    "How often did the call bell go?": (Listed.HEARD, "call bell", False),
     "how often did you hear a dog barking": (Listed.HEARD, "dog barking", False),
-    "When was the alarm last heard?": (Listed.HEARD, "alarm", False),
     "what did you hear in the kitchen?": (Listed.HEARD, "", False),
     "What have you in the kitchen heard?": (Listed.HEARD, "", False),
     "list the sounds in the bathroom": (Listed.HEARD, "", False),
@@ -32,27 +29,17 @@ READ = {
     "which rooms have at least two beds?": (Listed.ROOMS_WITH, "beds", False),
     "Which room has the most lamps?": (Listed.ROOMS_WITH, "lamps", False),
     "What is the largest room in the house?": (Listed.ROOM_BY_SIZE, "", False),
-    "which room is the smallest": (Listed.ROOM_BY_SIZE, "", True),
     "please show me the smallest room": (Listed.ROOM_BY_SIZE, "", True),
-    "What was the last noise you heard?": (Listed.SOUND_BY_TIME, "", False),
     "what did you hear last": (Listed.SOUND_BY_TIME, "", False),
     "what is in the kitchen?": (Listed.CONTENTS, "kitchen", False),
     "what is in the kichen": (Listed.CONTENTS, "kitchen", False),
-    "what does the bathroom contain?": (Listed.CONTENTS, "bathroom", False),
     "what is next to the bed?": (Listed.BESIDE, "bed", False),
-    "can you tell me what is near the sofa": (Listed.BESIDE, "sofa", False),
     "which room is this photo from?": (Listed.ROOM_OF, "this photo", False),
-    "what room was this picture taken in?": (Listed.ROOM_OF, "this photo", False),
     "in which room is the sofa?": (Listed.ROOM_OF, "sofa", False),
-    "which rooms are there?": (Listed.NAMES, "rooms", False),
     "what sounds were heard?": (Listed.NAMES, "sounds", False),
-    "what have we got in the kitchen these days?": (Listed.CONTENTS, "kitchen", False),
-    "how many sound events were recorded": (Listed.NAMES, "sounds", False),
     "how many rooms does the house have?": (Listed.NAMES, "rooms", False),
     "List the rooms on this map.": (Listed.NAMES, "rooms", False),
-    "what's the smallest room we have got": (Listed.ROOM_BY_SIZE, "", True),
     "whats the last thing u heard": (Listed.SOUND_BY_TIME, "", False),
-    "Identify the room in which the printer is located.": (Listed.ROOM_OF, "printer", False),
     "the room where the piano stands": (Listed.ROOM_OF, "piano", False),
     "list all acoustic events in temporal order": (Listed.NAMES, "sounds", False),
     "what was the first sound you you heard today": (Listed.SOUND_BY_TIME, "", True),
@@ -69,7 +56,7 @@ OTHER = [
 
 @pytest.mark.parametrize("text", [*BY_ROWS, *READ])
 def test_a_question_to_the_lists_is_read(text: str) -> None:
-    image = "view.png" if "photo" in text or "picture" in text else None
+    image = "view.png" if "photo" in text else None
     found = read_list(text) or list_question(read_question(text, Attachments(image)).inquiry)
     assert found is not None
     assert (read_list(text) is not None) is (text in BY_ROWS)
@@ -82,14 +69,11 @@ def test_a_question_to_the_lists_is_read(text: str) -> None:
     [
         ("what did you hear in the kitchen?", "", ["kitchen"], 1),
         ("which noises were heard near the sofa", "", ["sofa"], 1),
-        ("when did you hear music in the lounge", "", ["lounge"], 1),
-        ("did the glass break before the phone rang?", "before", ["phone ringing"], 1),
         ("did you hear the siren after the doorbell?", "after", ["doorbell"], 1),
         ("what is between the sofa and the tv?", "", ["tv"], 1),
         ("which rooms have at least two beds?", "", [], 2),
         ("which rooms have more than ten beds?", "", [], 11),
         ("which room has the most beds?", "", [], 0),
-        ("are there at least 3 chairs in the kitchen?", "", [], 3),
     ],
 )
 def test_a_question_says_where_which_came_first_and_how_many(
@@ -154,7 +138,6 @@ def test_each_alternative_has_the_context(names: list[str], tail: str) -> None:
     ("text", "said"),
     [
         ("when did you hear the dog and the phone?", ["when did you hear the dog", "when did you hear the phone"]),
-        ("where was the siren and the phone heard", ["where was the siren heard", "where was the phone heard"]),
         ("what time did the dog bark and the phone ring",
          ["what time did the dog bark", "what time did the phone ring"]),
         ("how many sofas and beds are there", ["how many sofas are there", "how many beds are there"]),
@@ -178,12 +161,6 @@ def test_numbers_in_words() -> None:
 @given(st.text(max_size=60))
 def test_no_text_is_too_much(text: str) -> None:
     read_list(text), said_alternatives(text), said_both(text)
-
-
-@pytest.mark.parametrize("begins", ["what is ", "", "the thing ", "everything that is "])
-def test_what_is_between_two_things_holds_both(begins: str) -> None:
-    read = list_question(read_question(f"{begins}between the sofa and the tv?").inquiry)
-    assert read is not None and (read.name, read.other) == ("sofa", "tv")
 
 
 def test_the_things_of_a_room_are_counted_there() -> None:

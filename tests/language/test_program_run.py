@@ -227,13 +227,10 @@ def test_a_program_without_skills_looks_at_the_clock_too() -> None:
     ("text", "said"),
     [
         ("for i in []:\n    x = 1\nturn(x)", "Line 3: `x` has no value yet"),
-        ("if 1 > 2:\n    x = 1\nturn(x)", "Line 3: `x` has no value yet"),
         ("for p in ['a', 1]:\n    move_to(p)", "Line 2: `move_to` takes a string, a Place or a Heat as its `target`"),
         ("p = get_pos('a')\nturn(1)\nget_max_pos_3d(p)", "Line 3: `get_max_pos_3d` takes a Heat"),
-        ("for i in range(3):\n    move_to(i)", "Line 2: `move_to` takes"),
         ("a, b = 1, 2, 3", "Line 1: 2 names cannot take 3 values"),
         ("a, b = 1, get_pos('x')\nturn(b)", "Line 2: `turn` takes a number"),
-        ("a, b = get_contour('rug')", "Line 1: 2 names cannot take 3 values"),
         ("for a, b in [(1, 2), (1, 2, 3)]:\n    pass", "Line 1: 2 names cannot take 3 values"),
         ("x = get_contour('rug')[3]", "Line 1: there is no element 3 among 3"),
         ("x = 'a' if 1 > 2 else 2\ny = x + 'b'", "Line 2: `+` takes"),
@@ -255,7 +252,6 @@ def test_what_only_a_run_can_tell_is_told_with_its_line(text: str, said: str) ->
     [
         ("turn(1)\nmove_to(p)", "Line 2: `p` has no value"),
         ("turn(1)\nget_max_pos_3d('sofa')", "Line 2: `get_max_pos_3d` takes a Heat"),
-        ("turn(1)\nturn(get_pos('x'))", "Line 2: `turn` takes a number"),
         ("turn(1)\nmove_to(p)\np = get_pos('a')", "Line 2: `p` is used before it has a value"),
         ("for i in range(3):\n    x = y\n    if i:\n        y = 1\nx = z", "Line 5: `z` has no value"),
     ],

@@ -8,26 +8,19 @@ from avlmaps.language.questions import parse_sentence, read_question
 
 UNDERSTOOD = {
     "the chair": [("object", "chair")],
-    "chair": [("object", "chair")],
     "Where is the red cabinet?": [("object", "red cabinet")],
     "Please go to the red cabinet.": [("object", "red cabinet")],
-    "could you find the bottle of milk": [("object", "bottle of milk")],
     "the leg of the table": [("object", "leg"), ("object", "table")],
     "the chair near the sound of glass breaking": [("object", "chair"), ("sound", "glass breaking")],
     "the chair next to the glass breaking sound": [("object", "chair"), ("sound", "glass breaking")],
     "the chair where a dog bark was heard": [("object", "chair"), ("sound", "dog bark")],
-    "the chair near where the dog barking can be heard": [("object", "chair"), ("sound", "dog barking")],
     "the chair where you heard the dog bark": [("object", "chair"), ("sound", "dog bark")],
-    "the chair where I heard the sound of rain": [("object", "chair"), ("sound", "rain")],
-    "the chair near the sound of typing on a keyboard": [("object", "chair"), ("sound", "typing on a keyboard")],
-    "the cup on the table": [("object", "cup"), ("object", "table")],
     "where a baby was heard crying": [("sound", "baby crying")],
     "go to the barking of a dog": [("sound", "dog barking")],
     "the sound of a baby crying": [("sound", "baby crying")],
     "the table in the kitchen": [("object", "table"), ("area", "kitchen")],
     "the kitchen table": [("object", "kitchen table")],
     "show me the living room": [("area", "living room")],
-    "the milk in the fridge": [("object", "milk"), ("object", "fridge")],
     "the chair near this photo ./x.png": [("object", "chair"), ("image", "./x.png")],
     'the chair beside "my photos/a b.JPG"': [("object", "chair"), ("image", "my photos/a b.JPG")],
     "the red cabinet near the picture shots/view.jpeg and the sound of rain in the office": [
@@ -41,15 +34,10 @@ UNDERSTOOD = {
 
 
 @pytest.mark.parametrize("sentence", UNDERSTOOD)
-def test_a_sentence_becomes_its_parts_in_order(sentence: str) -> None:
+def test_a_sentence_becomes_its_parts_in_order_and_the_first_is_sought(sentence: str) -> None:
     question = parse_sentence(sentence)
     assert [(str(part.modality), part.query) for part in question.parts] == UNDERSTOOD[sentence]
-
-
-@pytest.mark.parametrize("sentence", UNDERSTOOD)
-def test_only_the_first_part_is_sought(sentence: str) -> None:
-    roles = [part.role for part in parse_sentence(sentence).parts]
-    assert roles == [Role.PRIMARY] + [Role.CONTEXT] * (len(roles) - 1)
+    assert [part.role for part in question.parts] == [Role.PRIMARY] + [Role.CONTEXT] * (len(question.parts) - 1)
 
 
 def test_pictures_and_clips_are_files() -> None:

@@ -9,14 +9,11 @@ from avlmaps.language.said_places import asks_how_many_storeys, said_storeys
 # Question: what is left, number, above, excluded.
 NAMED = {
     "the bed upstairs": ("the bed", None, True, False),
-    "where is the sofa downstairs?": ("where is the sofa?", None, False, False),
     "the upstairs bathroom": ("the bathroom", None, True, False),
     "the chair on the first floor": ("the chair", 1, None, False),
     "the chair near the table on the ground floor": ("the chair near the table", 0, None, False),
     "the 2nd floor bedroom": ("bedroom", 2, None, False),
-    "The bed on the Second Storey": ("The bed", 2, None, False),
     "the bed on floor 2": ("the bed", 2, None, False),
-    "the chair on level one": ("the chair", 1, None, False),
     "the chair that is on the top floor": ("the chair", -1, None, False),
     "is there a toilet on the lowest floor?": ("is there a toilet?", 0, None, False),
     "the rug one floor up": ("the rug", None, True, False),

@@ -185,24 +185,6 @@ def test_the_two_ways_round_visit_the_same_corners_in_the_other_order() -> None:
     assert command_to_program("go clockwise around the table, then turn left").startswith(back)
 
 
-@pytest.mark.few(4)
-@pytest.mark.parametrize(
-    "command",
-    ["Geh zum Sofa", "Va dans la cuisine", "vas a la cocina por favor", "vai in cucina", "ga naar de keuken",
-     "gå till köket", "去厨房", "иди на кухню", "اذهب إلى المطبخ", "mutfağa git", "arrête"],
-)  # fmt: skip
-def test_another_language_asks_for_english(command: str) -> None:
-    read = stops(command)
-    assert "in English" in verbalise(read.intents)
-
-
-@pytest.mark.parametrize(
-    "command", ["go to the café", "go to the chaise longue", "drive to the piano", "circle the sofa"]
-)
-def test_words_that_english_took_over_are_english(command: str) -> None:
-    assert read_command(command).stops is None
-
-
 def test_contexts_of_different_kinds_are_all_kept() -> None:
     sentence = "the chair near the sound of dog barking and the area of the kitchen and the image ./a.png"
     (target,) = read_question(sentence, Attachments(knows=lambda _: True)).inquiry.of

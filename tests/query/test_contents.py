@@ -107,10 +107,6 @@ def test_what_is_surely_a_chair_but_of_no_sure_kind_is_listed_as_a_chair() -> No
         assert chair.confidence == pytest.approx(chairs.best, abs=1e-3)
 
 
-def test_names_choose_what_is_listed(furnished: AVLMap) -> None:
-    assert {thing.name for thing in furnished.things(["table"], least_confidence=0.0)} == {"table"}
-
-
 @pytest.mark.parametrize("least", [-0.1, 1.5, float("nan")])
 def test_a_confidence_outside_zero_to_one_is_refused(furnished: AVLMap, least: float) -> None:
     with pytest.raises(QueryError, match="between 0 and 1"):

@@ -33,12 +33,6 @@ def test_each_chair_is_one_goal_and_the_larger_one_leads() -> None:
     assert goals[0].parts == {"object": 1.0}
 
 
-def test_no_two_goals_share_an_instance() -> None:
-    m = furnished_map(sounds=sounds_of([track(4.0, 3.0)], [0.9]))
-    goals = (m.object("chair", primary=True) * m.sound("dog")).goals(top=10)
-    assert len({goal.position for goal in goals}) == len(goals) == 2
-
-
 def things(space: Space, mask: np.ndarray, instance: np.ndarray, confidence: np.ndarray) -> NearThings:
     return NearThings(space, Part(Modality.OBJECT, "chair", Role.PRIMARY), 2.0, mask, instance, confidence, True)
 

@@ -164,12 +164,6 @@ def test_where_nothing_is_sure_the_best_guess_is_told_and_not_found() -> None:
     assert [goal.score for goal in little.goals(5)] == [pytest.approx(0.5, abs=0.01), pytest.approx(0.3, abs=0.01)]
 
 
-def test_who_must_guess_is_told_of_things_that_are_too_unsure_to_be_told() -> None:
-    table = Heatmap.of(ask("coffee table", least_confidence=0.45))
-    assert [goal.score for goal in table.goals(5)] == [pytest.approx(0.5, abs=0.01)]
-    assert [goal.score for goal in table.include_uncertain().goals(5)][1:] == [pytest.approx(0.3, abs=0.01)]
-
-
 def test_a_colour_never_answers_for_a_noun_that_nobody_knows() -> None:
     factor = ask("red elephant", RGB)
     assert not factor.found

@@ -10,8 +10,6 @@ from hypothesis import strategies as st
 from query_fakes import FakeMap, furnished_map, sounds_of
 
 from avlmaps.core.question import HeardAt, Modality, Part, Role
-from avlmaps.language.sentence import Attachments
-from avlmaps.language.translator import LearnedTranslator
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.sources.candidates import Spread
 from avlmaps.maps.types import SourceEvidence
@@ -97,12 +95,6 @@ def test_a_sound_that_is_not_located_yet_is_not_called_unheard() -> None:
     for scores, said in asked:
         factor = source_factor(SPACE, sources, np.array(scores), part, SoundSettings(), heat)
         assert not factor.found and said in factor.note
-
-
-def test_a_plan_says_where_a_sound_comes_from_where_that_is_meant() -> None:
-    said = [LearnedTranslator(Attachments(at=at)).program_for("go to where the smoke alarm is heard").plan for at in AT]
-    ends = "smoke alarm was heard", "the sound of smoke alarm comes from"
-    assert said == [f"I will go to where {end}." for end in ends]
 
 
 class Asked(FakeMap):
