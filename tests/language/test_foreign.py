@@ -23,6 +23,9 @@ UNNAMED = [
     "jdi do kuchyně",
     "menj a konyhába",
     "台所へ",
+    "去厨房",
+    "иди на кухню",
+    "اذهب إلى المطبخ",
 ]
 ENGLISH = ["go to the café", "find the piñata", "dove", "the metro", "a sedan", "the chaise longue", "go to the salón"]
 
