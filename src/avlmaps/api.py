@@ -94,7 +94,6 @@ def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap
 
 
 def _asked_with(data: "MapData", encoders: "Encoders | None") -> "Encoders":
-    """Return the encoders that a map names, with others in their places."""
     from avlmaps.maps.store.map_data import encoders_of_map
 
     named = encoders_of_map(data.info)

@@ -180,7 +180,6 @@ def _drop(stream: TextIO) -> None:
 
 @contextmanager
 def _models_in_force(verb: object) -> Iterator[None]:
-    """Load models as a verb's words say while it runs, here and in processes that it starts."""
     options = {"folder": "models", "device": "device", "precision": "precision", "batch": "batch"}
     values = ((name, getattr(verb, option, None)) for name, option in options.items())
     given: dict[str, Any] = {name: value for name, value in values if value is not None}

@@ -123,7 +123,6 @@ def meant(words: Sequence[str], printed: str, verbs: Mapping[str, type[Verb]]) -
 
 
 def _options(verb: type[Any]) -> tuple[str, ...]:
-    """Return the options of a verb as they are typed, those of its groups among them."""
     names, hints = ["--help"], get_type_hints(verb, include_extras=True)
     for each in dataclasses.fields(verb):
         group, notes = each.default_factory, getattr(hints[each.name], "__metadata__", ())

@@ -163,7 +163,8 @@ class Lexicon:
             wide = not want.is_compound(wanted)
             if any(want is entry or (wide and want in self.wider(entry.name, want.kind)) for entry in named):
                 return True
-        return _ends_with(other, wanted)
+        phrase, tail = (" ".join(one.lower().split()) for one in (other, wanted))
+        return bool(tail) and f" {phrase}".endswith(f" {tail}")
 
     def suggest(self, word: str, kind: EntryKind | None = None, most: int = 3) -> tuple[tuple[str, float], ...]:
         """Return known spellings close to one that `find` does not know, with their likeness (1: equal), best first."""
@@ -255,13 +256,8 @@ def lexicon() -> Lexicon:
 
 def noun_of(phrase: str) -> str:
     """Return the word that says what a phrase is about, known or not: "blue zebra in a cage" is a zebra."""
-    return undescribed(phrase).split()[-1] if phrase.split() else ""
-
-
-def undescribed(phrase: str) -> str:
-    """Return a phrase without the description after its noun: "bottle of wine" is "bottle"."""
     words = phrase.split()
-    return " ".join(words[: _link(words)])
+    return words[_link(words) - 1] if words else ""
 
 
 def _link(words: Sequence[str]) -> int:
@@ -283,8 +279,3 @@ def _listed(text: str) -> tuple[str, ...]:
 def _size(text: str) -> tuple[Range, Range, Range]:
     width, depth, height = ((float(low), float(high)) for low, _, high in (p.partition("-") for p in text.split(" x ")))
     return width, depth, height
-
-
-def _ends_with(phrase: str, tail: str) -> bool:
-    phrase, tail = " ".join(phrase.lower().split()), " ".join(tail.lower().split())
-    return bool(tail) and (phrase == tail or phrase.endswith(f" {tail}"))

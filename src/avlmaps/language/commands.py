@@ -37,7 +37,12 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
 
     Raises LanguageError where it is empty or too long.
     """
-    _check_length(text)
+    if not any(mark.isalnum() for mark in text):
+        raise LanguageError(f"The command is empty; say it like: {EXAMPLE}.")
+    if len(text) > MOST_CHARACTERS:
+        raise LanguageError(
+            f"The command has {len(text)} characters, more than {MOST_CHARACTERS}; give it in several commands."
+        )
     if is_stop(text):
         return Command((act.Wait(),))
     read = _read(text, given)
@@ -167,23 +172,12 @@ def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed
 
 def _without_effect(sentence: Sentence) -> list[str]:
     slow = load_word_classes().words["SLOW"]
-    words = [token.text for token in sentence.tokens]
-    return [f"'{word}' has no effect: the robot has one speed." for word in words if word in slow]
+    return [f"'{one.text}' has no effect: the robot has one speed." for one in sentence.tokens if one.text in slow]
 
 
 def _lost_sides(intents: Sequence[act.Intent], sentence: Sentence) -> tuple[str, ...]:
     """Return a note for each side ("the chair left of the table") that only says which thing is meant."""
-    steps = act.steps_of(intents)
     # The side is where it drives or looks.
-    if any(isinstance(step, act.Beside | act.Face | act.StopAt) for step in steps):
+    if any(isinstance(step, act.Beside | act.Face | act.StopAt) for step in act.steps_of(intents)):
         return ()
     return sentence.side_notes(target for intent in intents for target in act.targets_of(intent))
-
-
-def _check_length(text: str) -> None:
-    if not any(mark.isalnum() for mark in text):
-        raise LanguageError(f"The command is empty; say it like: {EXAMPLE}.")
-    if len(text) > MOST_CHARACTERS:
-        raise LanguageError(
-            f"The command has {len(text)} characters, more than {MOST_CHARACTERS}; give it in several commands."
-        )

@@ -249,10 +249,8 @@ Intent = (
 
 def to_json(intent: Intent) -> dict[str, Any]:
     """Return an intent as JSON has it; what is None or a default is left out."""
-    told = {name: value for name, value in values_of(intent).items() if name != "meanings"}
-    return {"do": intent.do} | {
-        name: _told(value) for name, value in told.items() if value not in (None, "", (), Side.AHEAD)
-    }
+    told = {name: value for name, value in values_of(intent).items() if value not in (None, "", (), Side.AHEAD)}
+    return {"do": intent.do} | {name: _told(value) for name, value in told.items() if name != "meanings"}
 
 
 def _told(value: Any) -> Any:

@@ -259,7 +259,6 @@ def number_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
 
 
 def _with_part(tokens: list[Token], end: int, value: float) -> list[tuple[int, float]]:
-    """Return a number, and the number with "and a half" or "point five" behind it."""
     match [token.text for token in tokens[end : end + 3]]:
         case ["and", "a" | "an", part] if part in _PARTS:
             return [(end + 3, value + _PARTS[part]), (end, value)]
@@ -305,7 +304,8 @@ def _and_smaller(
     joined = at < len(tokens) and tokens[at].text == "and"
     for end, value in number_at(tokens, at + joined):
         ends = end >= len(tokens) or tokens[end].kind == "punct"
-        bare = end >= len(tokens) or not (_is_unit(tokens, end) or tokens[end].text in _list("counted"))
+        is_unit = any(_unit(tokens, end, each) for each in (LENGTHS, _ANGLES, _TIMES))
+        bare = end >= len(tokens) or not (is_unit or tokens[end].text in _list("counted"))
         parts = 100 if units is LENGTHS and unit == 1.0 else 60 if units is _TIMES and unit == 60.0 else 0
         inches = units is LENGTHS and unit == _FOOT and not joined and 1 <= value < 12
         hundredths = (ends or not joined) and 10 <= value < parts
@@ -315,10 +315,6 @@ def _and_smaller(
         if smaller is not None and smaller < unit and tokens[end].text not in _list("no_parts"):
             return [(end + 1, round(amount + value * smaller, 4))]
     return []
-
-
-def _is_unit(tokens: Sequence[Token], at: int) -> bool:
-    return any(_unit(tokens, at, units) for units in (LENGTHS, _ANGLES, _TIMES))
 
 
 def _unit(tokens: Sequence[Token], at: int, units: Mapping[str, float]) -> float | None:

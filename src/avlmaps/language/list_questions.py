@@ -136,8 +136,7 @@ def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
     change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(said["change"])), "")
     name, since = room or thing or said["seen"], said["visit"] + said["date"]
     how = "rooms" if said["names"] else how
-    counts = bool(said["counts"])
-    return ListQuestion(of, name, counts=counts, since=since, change=change, how=how, other=said["other"])
+    return ListQuestion(of, name, counts=bool(said["counts"]), since=since, change=change, how=how, other=said["other"])
 
 
 def _numbered(plain: str) -> ListQuestion | None:

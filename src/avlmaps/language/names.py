@@ -30,6 +30,7 @@ def is_entry(name: str) -> bool:
     return bool(words) and _is_name(" ".join(words)) and not (len(words) == 1 and words[0] in listed("never"))
 
 
+@cache
 def mended(name: str) -> str | None:
     """Return the name that a misspelt one is taken for; None where none is clearly meant."""
     words = tuple(name.lower().split())
@@ -37,7 +38,7 @@ def mended(name: str) -> str | None:
         return None
     for tail in range(min(2, len(words)), 0, -1):
         wrong = " ".join(words[-tail:])
-        (better, alike), (_, next_alike) = (*near_names(wrong), ("", 0.0), ("", 0.0))[:2]
+        (better, alike), (_, next_alike) = (*lexicon().suggest(wrong), ("", 0.0), ("", 0.0))[:2]
         is_sure = alike >= _ALIKE and alike - next_alike >= _APART
         if is_sure and better[0] == wrong[0] and not is_other_form(wrong, better):
             right = (*words[:-tail], *better.split())
@@ -79,12 +80,6 @@ def _words_of(name: str) -> frozenset[str]:
 def _is_compound(word: str) -> bool:
     cuts = range(_SHORTEST_PART, len(word) - _SHORTEST_PART + 1)
     return any(is_word(word[:at]) and is_word(word[at:]) for at in cuts)
-
-
-@cache
-def near_names(word: str) -> tuple[tuple[str, float], ...]:
-    """Return known names that are spelt like a word, and how alike they are, the closest first."""
-    return lexicon().suggest(word)
 
 
 @cache

@@ -94,11 +94,9 @@ def _where_it_sounds(text: str) -> str:
 
 def by_name(sentence: Sentence) -> AskedSentence | None:
     """Return the query of a sentence that is one name and nothing else, which needs no reading; None for others."""
-    words = [
-        token.text for token in sentence.tokens if token.kind != "punct" and token.text not in _listed("plain_articles")
-    ]
-    name = " ".join(words)
-    plain = all(token.kind in ("word", "punct") for token in sentence.tokens)
+    said = [token for token in sentence.tokens if token.kind != "punct"]
+    words = [token.text for token in said if token.text not in _listed("plain_articles")]
+    name, plain = " ".join(words), all(token.kind == "word" for token in said)
     if not (plain and words and is_entry(name)) or any(sounds_like(word) for word in words):
         return None
     return AskedSentence(Inquiry(Ask.WHERE, (Target(kind_of(name, TargetKind.OBJECT), name),)), sentence.notes)

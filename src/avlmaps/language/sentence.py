@@ -171,9 +171,7 @@ def _order_words() -> frozenset[str]:
     classes = load_word_classes().words
     names = ("GO", "TURN", "FACE", "WAIT", "CIRCLE", "RETURN", "BACK_UP")
     begins = {phrase.split()[0] for name in names for phrase in classes[name]}
-    return frozenset(
-        re.escape(word) for word in begins - {"the", "a", "be", "is", "to", "you", "your", "in", "on", "and", "with"}
-    )
+    return frozenset(map(re.escape, begins - {"the", "a", "be", "is", "to", "you", "your", "in", "on", "and", "with"}))
 
 
 def is_reserved(name: str) -> bool:
@@ -181,9 +179,8 @@ def is_reserved(name: str) -> bool:
     said = [token.text for token in tokenise(name) if token.kind != "punct"]
     said = said[1:] if said[:1] and said[0] in claimed_words("determiners") and len(said) > 1 else said
     taken = claimed_words("reserved") | claimed_words("stops") | WORDS
-    return bool(said) and (
-        said[0] in claimed_words("leading") or all(word in taken or word[0].isdigit() for word in said)
-    )
+    is_order = all(word in taken or word[0].isdigit() for word in said)
+    return bool(said) and (is_order or said[0] in claimed_words("leading"))
 
 
 def stand_ins(text: str, names: Sequence[OwnName]) -> StandIns:

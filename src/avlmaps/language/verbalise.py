@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
+from avlmaps.core.lexicon import lexicon
 from avlmaps.language import intents as act
 from avlmaps.language.claims import claimed_words, lacking
 from avlmaps.language.intents import Clarify, Intent, Pick, Refuse, Target, TargetKind
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import class_words, is_known, may_name, near_names
+from avlmaps.language.names import class_words, is_known, may_name
 from avlmaps.language.word_classes import listed, table
 from avlmaps.perception.embedded.words import is_word
 
@@ -87,7 +88,7 @@ def _picked(target: Target) -> str:
 
 def unknown(name: str) -> Clarify:
     """Return the question for a name whose head is not known."""
-    near = tuple(word for word, _ in near_names(name.split()[-1]))[:3]
+    near = tuple(word for word, _ in lexicon().suggest(name.split()[-1]))
     hint = f" Did you mean {' or '.join(near)}?" if near else " Say it in another word."
     return Clarify(f"I do not know '{name}'.{hint}", near)
 

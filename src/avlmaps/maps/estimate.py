@@ -33,7 +33,8 @@ def doubts_of(recording: Recording, allowed: Sequence[str]) -> tuple[str, ...]:
         if name not in known:
             raise RecordingError(f"There is nothing called {name!r} to allow; known are: {', '.join(known)}.")
     try:
-        useless = _useless(recording)
+        array = _array_of(recording)
+        useless = level_faults(array)[0] if array is not None else []
         verdict = judge(recording, useless)
     except RecordingError:  # no frame of the sample can be read; how many may be lost is decided later
         return ()
@@ -81,11 +82,6 @@ def doubts_of_channels(track: AudioTrack, walk: Trajectory, name: str) -> tuple[
 def _array_of(recording: Recording) -> AudioTrack | None:
     track = recording.audio
     return track if track is not None and track.microphones is not None and len(track.microphones) > 1 else None
-
-
-def _useless(recording: Recording) -> list[str]:
-    array = _array_of(recording)
-    return level_faults(array)[0] if array is not None else []
 
 
 def _of_microphones(track: AudioTrack, walk: Trajectory, useless: Sequence[str] | None) -> list[Finding]:

@@ -164,7 +164,6 @@ def up_doubts(recording: Recording) -> tuple[Finding, ...]:
 
 
 def _overturned(frames: Sequence[Frame], up: Float[np.ndarray, "3"]) -> bool:
-    """Return whether what is level faces down, not up."""
     counts = list[Int[np.ndarray, "2"]]()
     for axis in (up, -up):
         sights = [sight_of(frame, axis) for frame in frames]

@@ -98,7 +98,6 @@ class Outline:
         return float(np.linalg.norm(self.nearest_to(xy) - xy)) > 2 * _AS_NEAR_M
 
     def _feet(self, places: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "m k 2"]:
-        """Return the point nearest to each place on each side."""
         a = self.corners
         side = np.roll(a, -1, axis=0) - a
         length = np.maximum((side**2).sum(axis=1), 1e-18)

@@ -113,8 +113,9 @@ class PathFinder:
             leg = self._on_one(at, Spot(flight.points[0, :2], at.storey))
             if leg is None:
                 return None
-            legs.append(leg)
-            legs.append(_climb(leg, flight.points, (at.storey, at.storey + step)))
+            points = np.concatenate([leg.points[-1:], flight.points])
+            length_m = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+            legs += [leg, Route(leg.stop, points, length_m, length_m, (at.storey, at.storey + step))]
             at = Spot(flight.points[-1, :2], at.storey + step)
         last = self._on_one(at, place)
         return None if last is None else _joined([*legs, last])
@@ -172,12 +173,6 @@ class PathFinder:
 
     def _world(self, level: Float[np.ndarray, "3"]) -> list[float]:
         return [float(value) for value in self.avlmap.space.world(level)]
-
-
-def _climb(before: Route, points: Float[np.ndarray, "n 3"], storeys: tuple[int, int]) -> Route:
-    points = np.concatenate([before.points[-1:], points])
-    length_m = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-    return Route(before.stop, points, length_m, length_m, storeys)
 
 
 def _joined(legs: "list[Route]") -> Route:

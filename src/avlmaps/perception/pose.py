@@ -46,9 +46,11 @@ def estimate_pose(
         "min_iterations": 100,
         "seed": int(rng.integers(2**31)),
     }
+    params = [camera.fx, camera.fy, camera.cx, camera.cy]
+    given = {"model": "PINHOLE", "width": camera.width, "height": camera.height, "params": params}
     refinement = {"loss_type": "CAUCHY", "loss_scale": 0.25 * max_error_px}
     found, report = poselib.estimate_absolute_pose(
-        xy.astype(np.float64), points_world.astype(np.float64), _as_poselib(camera), ransac, refinement
+        xy.astype(np.float64), points_world.astype(np.float64), given, ransac, refinement
     )
     inlier = np.array(report["inliers"], bool)
     if inlier.sum() < _FEWEST_POINTS:
@@ -150,12 +152,3 @@ def _small_motion(step: Float[np.ndarray, "6"]) -> Float[np.ndarray, "4 4"]:
     from scipy.spatial.transform import Rotation
 
     return from_rotation(Rotation.from_rotvec(step[:3]).as_matrix(), step[3:])
-
-
-def _as_poselib(camera: Pinhole) -> dict[str, object]:
-    return {
-        "model": "PINHOLE",
-        "width": camera.width,
-        "height": camera.height,
-        "params": [camera.fx, camera.fy, camera.cx, camera.cy],
-    }

@@ -241,9 +241,7 @@ def _context_words(part: Part) -> str:
 
 def _likely(goal: Goal) -> str:
     known = f"{place_text(goal.position)}, probability {goal.probability:.2f}"
-    if goal.spread is None:
-        return known
-    return f"{known}: it lies {goal.spread.around('there')}"
+    return known if goal.spread is None else f"{known}: it lies {goal.spread.around('there')}"
 
 
 def sentence_of(text: str) -> str:

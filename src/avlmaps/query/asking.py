@@ -31,7 +31,6 @@ from avlmaps.query.modalities import Attachment, Photo, read_picture
 from avlmaps.query.places import distance_m, lies_between, place_given
 
 if TYPE_CHECKING:
-    from avlmaps.language.intents import Ask
     from avlmaps.language.questions import AskedSentence
     from avlmaps.language.sentence import OwnName
     from avlmaps.maps.storeys import Storeys
@@ -314,8 +313,12 @@ def _of_claims(asking: _Asking) -> Answer | None:
 def _read(asking: _Asking) -> Answer:
     asked, avlmap = asking.asked, asking.avlmap
     from avlmaps.language.intents import Ask
+    from avlmaps.language.list_questions import said_alternatives
 
-    questions, notes, kind = _questions(asked, own_names(avlmap, asked.sentence))
+    own = own_names(avlmap, asked.sentence)
+    read = [_reading(asked, words, own) for words in said_alternatives(asked.sentence) or (asked.sentence,)]
+    questions = dict.fromkeys(question for one in read for question in one.questions)
+    notes, kind = dict.fromkeys(note for one in read for note in one.notes), read[0].inquiry.ask
     counted = kind is Ask.HOW_MANY
     listed = None if questions else _of_lists(asking)  # "the largest room" in another question
     if listed is not None:
@@ -366,16 +369,6 @@ def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
     encoder = avlmap.encoders.pixels
     is_name = isinstance(encoder, NamedPixelEncoder) and asked.sentence in encoder.vocabulary
     return Question.of([Part(Modality.OBJECT, asked.sentence)]) if is_name else None
-
-
-def _questions(asked: Asked, own: "tuple[OwnName, ...]") -> "tuple[tuple[Question, ...], tuple[str, ...], Ask]":
-    from avlmaps.language.list_questions import said_alternatives
-
-    said = said_alternatives(asked.sentence) or (asked.sentence,)
-    read = [_reading(asked, words, own) for words in said]
-    questions = tuple(dict.fromkeys(question for one in read for question in one.questions))
-    notes = tuple(dict.fromkeys(note for one in read for note in one.notes))
-    return questions, notes, read[0].inquiry.ask
 
 
 def _reading(asked: Asked, words: str, own: "tuple[OwnName, ...]") -> "AskedSentence":

@@ -68,8 +68,7 @@ class Days:
 
         ``said``: "2", "visit 2", "day 2", "2026-11-25", "yesterday" or "today". ``QueryError``: there is none.
         """
-        text = str(said).strip().lower()
-        text = text.removeprefix("visit ").removeprefix("day ").strip()
+        text = str(said).strip().lower().removeprefix("visit ").removeprefix("day ").strip()
         if text in ("today", "yesterday"):
             text = (date.today() - timedelta(days=text == "yesterday")).isoformat()
         if text.isdecimal():
@@ -236,9 +235,7 @@ def last_seen_text(answer: "LastSeenAnswer") -> str:
 
 
 def _article(name: str) -> str:
-    if name == SOMETHING:
-        return name
-    return f"{'an' if name[:1] in 'aeiou' else 'a'} {name}"
+    return name if name == SOMETHING else f"{'an' if name[:1] in 'aeiou' else 'a'} {name}"
 
 
 USUAL_FROM, FEWEST_DAYS = 0.5, 2

@@ -221,13 +221,9 @@ def share_voxels(factors: Sequence[Factor], of_things: Callable[[], Float32[np.n
         at_anchors = np.prod([lead.scores, *(factor.at(lead.anchors) for factor in others)], axis=0)
         heat, instance = np.append(heat, at_anchors), np.append(instance, lead.instance)
     inside = np.prod([np.ones(count), *(region.held(lead) for region in regions)], axis=0)
-    return Shares(lead, rows, heat, instance, _highest(instance, heat, count) * inside, inside)
-
-
-def _highest(instance: Int[np.ndarray, " m"], heat: Float[np.ndarray, " m"], count: int) -> Float[np.ndarray, " i"]:
-    peak = np.zeros(count)
-    np.maximum.at(peak, instance, heat)
-    return peak
+    highest = np.zeros(count)
+    np.maximum.at(highest, instance, heat)
+    return Shares(lead, rows, heat, instance, highest * inside, inside)
 
 
 def weigh_goals(

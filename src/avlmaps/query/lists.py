@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,7 +69,8 @@ class _Lists:
         elif kind == "sounds":
             return [goal for _, goal in _events(self, Target(TargetKind.SOUND))]
         else:
-            goals = list(map(_thing_goal, self.avlmap.things())) if self.avlmap.has(Kind.PIXELS) else []
+            things = self.avlmap.things() if self.avlmap.has(Kind.PIXELS) else []
+            goals = [_goal(one.position, float(one.confidence), one.name, one.size) for one in things]
         return [goal for goal in goals if self.keeps(goal.position)]
 
     def found(self, words: str) -> Answer:
@@ -132,10 +132,6 @@ def _room_goal(where: Whereabouts, number: int) -> Goal:
 def _sound_goal(sound: "SoundEvent", name: str = "") -> Goal:
     score = _called(sound, name) if name else float(sound.confidences[0]) if sound.confidences else 0.0
     return _goal(sound.position, score, name or (sound.names[0] if sound.names else "sound"))
-
-
-def _thing_goal(thing: "Thing") -> Goal:
-    return _goal(thing.position, float(thing.confidence), thing.name, thing.size)
 
 
 def _rooms_by_size(lists: _Lists) -> Answer:
@@ -248,7 +244,7 @@ def _events(lists: _Lists, sound: Target) -> list[_Event]:
             marks = lists.likely(lists.found(in_query(place)).goals)
             fits = {number for mark in marks for _, number in _near(lists, mark, goals, _HEARD_M)}
         events = [events[number] for number in fits]
-    return sorted(events, key=itemgetter(0))
+    return sorted(events, key=lambda event: event[0])
 
 
 def _told(lists: _Lists, event: _Event) -> str:

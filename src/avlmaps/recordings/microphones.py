@@ -145,15 +145,10 @@ def _numbers(given: Any, name: str) -> Float[np.ndarray, "*n"]:
     return np.asarray(array, np.float64)
 
 
-def _square(side_m: float) -> list[list[float]]:
-    half = side_m / 2
-    return [[half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0], [-half, half, 0.0]]
-
-
 PRESETS: dict[str, list[list[float]]] = {
     "mono": [[0.0, 0.0, 0.0]],
     "stereo": [[0.0, 0.1, 0.0], [0.0, -0.1, 0.0]],
-    "square4": _square(0.2),
+    "square4": [[0.1, 0.1, 0.0], [0.1, -0.1, 0.0], [-0.1, -0.1, 0.0], [-0.1, 0.1, 0.0]],
 }
 """Places of the arrays that have a name, metres: the left of two is first, the square begins in front on the left."""
 

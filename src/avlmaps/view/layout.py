@@ -204,7 +204,6 @@ def detail_order(
 
 
 def _one_of_each(index: Int[np.ndarray, "n 3"], shift: int, chosen: np.ndarray) -> Int[np.ndarray, " m"]:
-    """Return one row of each block of which none is chosen yet: the first of them."""
     if not len(index):
         return np.zeros(0, np.int64)
     low, high = (end >> shift for end in index_ends(index))

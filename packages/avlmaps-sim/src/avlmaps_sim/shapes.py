@@ -16,15 +16,11 @@ _QUADS = np.array(
 )  # fmt: skip
 
 
-def _quads(vertex: Float[np.ndarray, "v 3"], quads: np.ndarray, material: Material) -> Mesh:
-    return triangles_of(vertex, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]), material)
-
-
-def box(low: Triple, high: Triple, material: Material) -> Mesh:
-    """Return a box between two corners."""
+def box(low: Triple, high: Triple, material: Material, quads: np.ndarray = _QUADS) -> Mesh:
+    """Return a box between two corners, or some of its sides."""
     (a, b, c), (d, e, f) = low, high
     corner = np.array([(x, y, z) for z in (c, f) for y in (b, e) for x in (a, d)], np.float64)
-    return _quads(corner, _QUADS, material)
+    return triangles_of(corner, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]), material)
 
 
 def slab(x: float, y: float, z: float, width: float, depth: float, height: float, material: Material) -> Mesh:

@@ -274,7 +274,6 @@ class Grammar:
         return row.intent(**values)
 
     def _begin(self, slots: Sequence[Slot | Amount], after: Open) -> Open:
-        """Return what may begin some slots, behind which something else may follow."""
         if not slots:
             return after
         slot = slots[0]
@@ -304,7 +303,6 @@ class Grammar:
         return of.value(value)
 
     def _target(self, after: Open, *, in_near: bool = False) -> Reading[Target]:
-        """Read a target whose kind is the next symbol, and what it is near."""
         kind, words = str(self.next), list[int]()
         may = self._named(kind, words, after, in_near=in_near)
         while isinstance((yield from self._see(may)), int):
@@ -326,7 +324,6 @@ class Grammar:
         return target
 
     def _named(self, kind: str, words: Sequence[int], after: Open, *, in_near: bool) -> Open:
-        """Return what may follow a kind of target and some words of its name."""
         is_file, is_here = kind in ("image", "clip"), kind == "here"
         tokens = frozenset[int]()
         if is_file and not words:

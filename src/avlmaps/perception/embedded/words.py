@@ -371,13 +371,9 @@ class Meanings:
                 out.setdefault(phrase, []).append(name)
         return out
 
-    @cached_property
-    def _flat(self) -> list[str]:
-        return [alias for called in self.called for alias in called]
-
     def _cosines(self, phrase: str) -> Float32[np.ndarray, " k"]:
         starts = np.cumsum([0, *(len(called) for called in self.called[:-1])])
-        vectors = self.words.encode([phrase, *self._flat])
+        vectors = self.words.encode([phrase, *(alias for called in self.called for alias in called)])
         return np.maximum.reduceat(vectors[1:] @ vectors[0], starts)
 
 

@@ -82,7 +82,6 @@ def _with_directions(path: Path, audio: AudioTrack | None, start_s: float) -> Au
 
 
 def _fitted_rig(folder: Path, description: Description, found: "_Pictures", video: VideoFrames | None) -> Rig:
-    """Return the cameras at the sizes that the pictures have."""
     rig, file = description.rig(), folder / layout.DESCRIPTION
     cameras: list[Pinhole] = []
     for files, camera, what in ((found.colour, rig.rgb, "colour"), (found.depth, rig.depth, "depth")):

@@ -32,7 +32,7 @@ from avlmaps.recordings.formats.file_recording import (
     sizes,
     whole_frames,
 )
-from avlmaps.recordings.formats.layouts import Z_UP, Cameras, Poses, fitted_cameras
+from avlmaps.recordings.formats.layouts import Z_UP, Cameras, fitted_cameras
 from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES
 from avlmaps.recordings.plausible import date_fault, pace_fault, repeat_fault
 
@@ -113,8 +113,10 @@ def _timed(
     path: Path, name: str, stamps_s: Float[np.ndarray, " n"], files: list[tuple[str, str]], start_s: float
 ) -> FileRecording:
     file = find_trajectory(path) or path / TRAJECTORIES[0]
-    trajectory = _trajectory(file)
+    trajectory = tables.read_poses(file).trajectory(file.name)
+    assert trajectory is not None
     known_s = trajectory.stamps_s
+    note(*timeline.gap_notices(known_s, f"poses in {file.name}"))
     if fault := pace_fault(stamps_s, "pictures") or pace_fault(known_s, f"poses of {file.name}"):
         raise RecordingError(f"{path}: {fault}")
     covered = trajectory.covers(stamps_s)
@@ -152,13 +154,6 @@ def _stream(path: Path) -> _Stream:
     order = timeline.in_order(np.array(stamps), f"pictures of {path.name}")
     note(*order.notices)
     return _Stream(np.array(stamps)[order.index], [files[i] for i in order.index])
-
-
-def _trajectory(path: Path) -> timeline.Trajectory:
-    found = tables.read_poses(path).trajectory(path.name)
-    assert found is not None
-    note(*timeline.gap_notices(found.stamps_s, f"poses in {path.name}"))
-    return found
 
 
 def _tum_camera(path: Path, shots: Shots) -> tuple[Cameras, Float[np.ndarray, "3"] | None]:
@@ -219,7 +214,9 @@ def open_icl_nuim(path: Path) -> FileRecording:
             f"{path} has no poses: put ICL-NUIM's livingRoomN.gt.freiburg or trajN.gt.freiburg, or a trajectory with "
             f"stamps (CameraTrajectory.txt), beside {listed.name}."
         )
-    known = _freiburg(truth)
+    table = tables.read_poses(truth)
+    usable = np.flatnonzero(table.usable)
+    known = dict(zip(table.stamps_s[usable].astype(int).tolist(), table.pose[usable], strict=True))
     listed_rows = {row[0]: row for row in rows}
     posed = [listed_rows[number] for number in whole_frames(path, associations=listed_rows, pose=known)]
     mirror, numbers = np.diag([1.0, -1.0, 1.0, 1.0]), np.array([row[0] for row in posed], np.float64)
@@ -235,12 +232,6 @@ def open_icl_nuim(path: Path) -> FileRecording:
         path, "icl-nuim", found.rig, shots, lambda _: truth, depth_units=found.units_per_m,
         up_in_world=np.array([0.0, -1.0, 0.0]), posed=len(posed) / len(rows),
     )  # fmt: skip
-
-
-def _freiburg(file: Path) -> Poses:
-    table = tables.read_poses(file)
-    rows = np.flatnonzero(table.usable)
-    return dict(zip(table.stamps_s[rows].astype(int).tolist(), table.pose[rows], strict=True))
 
 
 # What rtabmap-export writes

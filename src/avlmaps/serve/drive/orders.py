@@ -270,7 +270,6 @@ class Dispatcher:
 
     @contextmanager
     def _refusing(self, who: Who, **entry: str) -> Generator[None]:
-        """Log what is refused, and say it to the client."""
         try:
             yield
         except AvlmapsError as error:

@@ -172,10 +172,8 @@ def _without_storey(target: Any, said: str) -> Any:
 
 
 def _listed(asked: Mapping[str, Any]) -> dict[str, Any]:
-    told = {
-        name: [_target(one) for one in value] if isinstance(value, list) else value for name, value in asked.items()
-    }
-    return {name: _target(value) if isinstance(value, dict) else value for name, value in told.items()}
+    told = {name: _target(value) if isinstance(value, dict) else value for name, value in asked.items()}
+    return {name: [_target(one) for one in value] if isinstance(value, list) else value for name, value in told.items()}
 
 
 def _outcome(got: Sequence[Any], wanted: Sequence[Any]) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, rim
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple, joined, triangles_of
+from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple, joined
 from avlmaps_sim.shapes import box, ellipsoid, lathe, loft, prism, rounded_rectangle, sheet, tube
 
 Panel = Literal["flat", "framed", "raised", "glass", "mirror", "slatted"]
@@ -233,13 +233,7 @@ _BOOKS: tuple[Triple, ...] = (
     (0.55, 0.13, 0.12), (0.12, 0.2, 0.4), (0.15, 0.35, 0.22), (0.85, 0.8, 0.68), (0.12, 0.12, 0.13), (0.8, 0.62, 0.2),
     (0.4, 0.26, 0.18), (0.92, 0.92, 0.9), (0.3, 0.5, 0.62), (0.5, 0.22, 0.4), (0.75, 0.4, 0.2),
 )  # fmt: skip
-
-
-def _half_box(low: Triple, high: Triple, look: Material) -> Mesh:
-    (a, b, c), (d, e, f) = low, high
-    corner = np.array([(x, y, z) for z in (c, f) for y in (b, e) for x in (a, d)], np.float64)
-    quads = np.array([[4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [1, 3, 7, 5]])
-    return triangles_of(corner, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]), look)
+_BOOK_SIDES = np.array([[4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [1, 3, 7, 5]])  # all but the back and the one below
 
 
 def book_looks(rng: np.random.Generator) -> list[Material]:
@@ -260,7 +254,7 @@ def books(rng: np.random.Generator, room: Room, looks: list[Material], fill: flo
             break
         tall = min(usual * draw(rng, 0.78, 1.15), (f - c) * 0.97)
         depth = deep * draw(rng, 0.85, 1.05)
-        parts.append(_half_box((front - depth, y, c), (front, y + wide, c + tall), pick(rng, looks)))
+        parts.append(box((front - depth, y, c), (front, y + wide, c + tall), pick(rng, looks), _BOOK_SIDES))
         y += wide
     rest = e - y
     if parts and rest > 0.2 and chance(rng, 0.5):

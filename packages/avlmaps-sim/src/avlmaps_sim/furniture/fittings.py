@@ -174,13 +174,9 @@ def _grip(style: FrontStyle, x: float, low: Pair, high: Pair, opens: str, grip: 
         return [knob(x, y, z, 0.014, style.metal)]
     if style.handle == "strip":
         return [box((x, y - 0.004, b + 0.02), (x + 0.024, y + 0.004, d - 0.02), style.metal)]
-    long = min(0.18, 0.5 * (d - b)) if d - b < 1.0 else _long_bar(d - b)
+    long = min(0.18, 0.5 * (d - b)) if d - b < 1.0 else min(0.45, 0.3 * (d - b))
     z = d - inset - long if grip == "top" else b + inset if grip == "bottom" else (b + d - long) / 2
     return [bar_handle((x, y, z), long, True, style.metal)]
-
-
-def _long_bar(height: float) -> float:
-    return min(0.45, 0.3 * height)
 
 
 def front(style: FrontStyle, x: float, low: Pair, high: Pair, opens: str = "left", grip: str = "top") -> list[Mesh]:

@@ -212,12 +212,9 @@ def _crouching(rng: np.random.Generator) -> Parts:
     return [body(pose, _tall(rng), _looks(rng))]
 
 
-_CLOTHS = ("fabric", "fabric", "fabric", "curtain", "leather")
-
-
 def fabric(rng: np.random.Generator) -> Material:
     """Return the cloth of a garment."""
-    return material(pick(rng, _CLOTHS), rng)
+    return made_of(rng, "fabric", "fabric", "fabric", "curtain", "leather")
 
 
 def _waves(rng: np.random.Generator, number: int, longest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

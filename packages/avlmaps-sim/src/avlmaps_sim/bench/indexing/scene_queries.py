@@ -145,18 +145,11 @@ def _spread(avlmap: AVLMap, recording: Recording, rows_of: _Rows) -> Float32[np.
         y = (row * _STRIDE_PX + 0.5 - camera.cy) / camera.fy * z
         points = apply(frame.world_from_camera, np.stack([x, y, z], axis=1))
         which = label[::_STRIDE_PX, ::_STRIDE_PX][row, column]
-        seen, numbers = _once_each(packed(stored.grid.index_of(points)), which)
+        seen, numbers = np.unique(np.stack([packed(stored.grid.index_of(points)), which], axis=1), axis=0).T
         at = np.minimum(np.searchsorted(key, seen), max(len(key) - 1, 0))
         known = key[at] == seen
         np.add.at(total, at[known], rows[numbers[known]])
     return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
-
-
-def _once_each(
-    key: Int[np.ndarray, " n"], which: Int[np.ndarray, " n"]
-) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
-    pairs = np.unique(np.stack([key, which], axis=1), axis=0)
-    return pairs[:, 0], pairs[:, 1]
 
 
 @dataclass(eq=False)
