@@ -94,7 +94,7 @@ OTHER_HANDS = (
     "85 more clips, by sounds-5",
     "the thirteenth, at first use",
     "the fourteenth, reader before",
-    "the fifteenth, at first use",
+    "the fifteenth",
     "six more, 1,097 commands, at first use",
     "an eleventh writer, commands",
     "the same, questions",

@@ -167,7 +167,10 @@ def test_a_condition_in_odd_words_is_read() -> None:
      "go to the kitchen unless there is no fridge there", "go to the kitchen unless there is no sofa",
      "if the lamp is on go to the sofa",
      "if there is a sofa stop going to the kitchen", "if there is a sofa, and a chair, go to the sofa",
-     "when you have been to the kitchen, no sofa"],
+     "when you have been to the kitchen, no sofa", "if there is a bed, pass on going to the sofa",
+     "if there is a bed, go to the sofa or not", "if there is a bed that is made go to the sofa",
+     "go to the sofa but keep your distance if there is a bed", "if there is a bed, turn left not 90 degrees",
+     "if there is a bin, drive around it, not through it", "if there is no table, go to the sofa, leave the rug"],
 )  # fmt: skip
 def test_what_a_map_cannot_say_is_no_condition(command: str) -> None:
     assert read_command(command).stops is not None

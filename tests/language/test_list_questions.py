@@ -54,6 +54,19 @@ OTHER = [
 ]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    "question",
+    ["which rooms have more than fifteen chairs?", "are there two or three chairs?", "are there 2 to 3 chairs?",
+     "what did you not hear in the kitchen?", "when did you not hear the phone?", "are there only two chairs?",
+     "what did you hear in the bedroom next to the kitchen?", "did the dog or the cat bark before the phone rang"],
+)  # fmt: skip
+def test_what_no_list_says_is_not_answered_as_what_it_says(question: str) -> None:
+    listed = read_list(question)
+    with pytest.raises(QueryError):
+        assert listed is None
+        list_question(read_question(question).inquiry)
+
+
 @pytest.mark.parametrize("text", [*BY_ROWS, *READ])
 def test_a_question_to_the_lists_is_read(text: str) -> None:
     image = "view.png" if "photo" in text else None

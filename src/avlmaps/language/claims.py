@@ -204,7 +204,6 @@ def in_direction(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tupl
 
 
 def _turns(tokens: Sequence[Token], at: int) -> bool:
-    """Return whether the words round a direction are of a turn: "turn 90 degrees clockwise"."""
     cuts = [number for number, token in enumerate(tokens) if token.kind == "punct" or token.text in ("then", "and")]
     start = max((cut for cut in cuts if cut < at), default=-1)
     clause = list(tokens[start + 1 : min((cut for cut in cuts if cut > at), default=len(tokens))])

@@ -176,7 +176,6 @@ def _without_effect(sentence: Sentence) -> list[str]:
 
 
 def _lost_sides(intents: Sequence[act.Intent], sentence: Sentence) -> tuple[str, ...]:
-    """Return a note for each side ("the chair left of the table") that only says which thing is meant."""
     # The side is where it drives or looks.
     if any(isinstance(step, act.Beside | act.Face | act.StopAt) for step in act.steps_of(intents)):
         return ()

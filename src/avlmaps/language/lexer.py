@@ -112,7 +112,6 @@ def _is_minus(text: str, at: int) -> bool:
 
 
 def _stands_alone(text: str, at: int, mark: str) -> bool:
-    """Return whether a hyphen is a dash between words and not a part of one."""
     return mark == "-" and (at == 0 or text[at - 1].isspace()) and (at + 1 == len(text) or not text[at + 1].isdigit())
 
 

@@ -71,6 +71,8 @@ def list_question(inquiry: Inquiry) -> ListQuestion | None:
         return None
     if listed is None or len(of) != (0 if ask.of_map else 1 + ask.of_two):
         raise QueryError("Ask this of one sound or thing at a time, and whether one came first of two sounds.")
+    if len(set(of)) < len(of) or any([each.kind for each in one.near].count(TargetKind.AREA) > 1 for one in of):
+        raise QueryError("Ask this of one room at a time, or of two sounds or things that differ.")
     if any(one.kind is TargetKind.CLIP for one in (*of, *near)) or (not of_sounds and any(one.is_file for one in near)):
         raise QueryError("This is not answered by a photo or a recording; say in words what is meant, and where.")
     if listed.of is Listed.LAST_SEEN and near:

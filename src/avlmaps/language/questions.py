@@ -193,7 +193,6 @@ FROM_NOWHERE = "No position is known to count"
 
 
 def _from_nowhere(sentence: Sentence, targets: Sequence[Target]) -> tuple[str, ...]:
-    """Return a note for "the nearest window": a question comes from no place, so that none is the nearest."""
     if any(near.kind is not TargetKind.AREA for target in targets for near in target.near):
         return ()
     said = {token.text: None for token in sentence.tokens if token.text in ("nearest", "closest")}

@@ -387,6 +387,9 @@ def _at_least(lists: _Lists) -> Answer:
 
 
 def _rooms_with(lists: _Lists) -> Answer:
+    sounds = lists.question.sounds
+    if sounds and lists.at == "source":  # where it came from, not where it was heard
+        return _room_of(replace(lists, question=replace(lists.question, name=in_query(sounds[0]))))
     where, (counts, name) = lists.avlmap.where, _counted(lists)
     if not where.rooms:
         raise QueryError("The map has no rooms: it was built without a model of views.")
@@ -400,7 +403,8 @@ def _rooms_with(lists: _Lists) -> Answer:
         goals.append(replace(goal, probability=min(goal.probability, sure)))
     told = ", ".join(f"{the_room(goal.name)} ({count})" for goal, (_, count) in zip(goals, rooms, strict=True))
     which = f"{least} or more" if lists.question.number else "the most"
-    text = f"{told or 'no room is known that'} {'have' if len(goals) > 1 else 'has'} {which} {name}"
+    heard = f"{sounds[0].name} was heard in {told}" if sounds and goals and least == 1 else ""
+    text = heard or f"{told or 'no room is known that'} {'have' if len(goals) > 1 else 'has'} {which} {name}"
     return lists.answer(goals, sentence_of(text), count=len(goals))
 
 

@@ -172,6 +172,8 @@ def weighed(read: Read, names: NameResolver) -> Weighed:
     meant = frozenset(word for one in intents for word in _MEANT.get(type(one), ()))
     counted = any(target.number > 1 for one in intents for target in act.targets_of(one))
     doubtful = is_doubtful(tokens, read.used, meant | {"third"} if counted else meant)
+    if doubtful and any(isinstance(one, act.If) for one in intents):  # a condition of which half was read
+        return Weighed((refusal_of(unclear(tokens), tokens),), read.probability)
     return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(names.notes)))
 
 
