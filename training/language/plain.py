@@ -229,10 +229,7 @@ class _Maker:
             self._of, (*(self.draw.choice(kinds) for _ in "12"), TargetKind.AREA)
         )
         text = self.draw.choice(_SAID["questions"][written])
-        words, more = (
-            ("two", "three", "four", "five", "six")[number - 2],
-            ("one", "two", "three", "four", "five")[number - 2],
-        )
+        more, words = _NUMBERS[number - 2 : number]
         least = (f"at least {words}", f"at least {number}", f"{words} or more", f"more than {more}", words)
         said = {key: self.draw.choice(each) for key, each in _FILLED.items()} | {
             "thing": thing, "other": other, "room": room, "early": str(ask), "many": plural_of(target.name),
