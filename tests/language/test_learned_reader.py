@@ -199,6 +199,17 @@ def test_two_likely_readings_are_a_question_with_choices(first: Any, second: Any
     assert 1 <= len(answer.intents[0].choices) <= 3
 
 
+@given(first=drives, second=stops, likely=st.floats(0.31, 0.6))
+def test_a_refusal_beside_a_likely_drive_asks_about_the_drive_and_harm_refuses(
+    first: Any, second: Any, likely: float
+) -> None:
+    drives, stops = Weighed(first, likely), Weighed(second, 1.0 - likely)
+    answer = decided(sorted([drives, stops], key=lambda one: -one.probability), ReadingLimits())
+    refuses = second == (Refuse(RefusalReason.HARM, "no"),)
+    refuses = refuses or (stops.probability > likely and getattr(second[0], "reason", None) in DANGERS)
+    assert answer.intents == second if refuses else getattr(answer.intents[0], "meanings", ()) == (first,)
+
+
 @given(first=st.lists(names.map(Go), min_size=1, max_size=3).map(tuple), likely=st.floats(0.3, 0.5))
 def test_readings_that_end_at_the_same_places_count_together(first: Any, likely: float) -> None:
     second = (*first, Wait(5.0))

@@ -204,15 +204,18 @@ def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Command:
     """Return what to do of some readings."""
     best, every = readings[0], tuple(readings)
     dangers = [one for one in readings if isinstance(one.stops, Refuse) and one.stops.reason in DANGERS]
+    harms = any(one.stops.reason is RefusalReason.HARM for one in dangers if isinstance(one.stops, Refuse))
+    likely = tuple(one.intents for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
+    question = Command((which(likely),), (), every, "unsure")
     if dangers and sum(one.probability for one in dangers) >= limits.danger:
-        return Command(dangers[0].intents, (), every, "danger")
+        return Command(dangers[0].intents, (), every, "danger") if harms or best.stops is not None else question
     if best.stops is not None:
-        return Command(best.intents, (), every, "stop")
+        is_open = likely and not harms and best.probability < limits.command
+        return question if is_open else Command(best.intents, (), every, "stop")
     alike = sum(one.probability for one in readings if one.stops is None and is_same(one.intents, best.intents))
     if alike >= (limits.doubtful if best.doubtful else limits.command):
         return Command(best.intents, best.notes, every, "read")
-    likely = (one.intents for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
-    return Command((which(tuple(likely)),), (), every, "unsure")
+    return question
 
 
 def which(meanings: Sequence[tuple[Intent, ...]]) -> Clarify:
