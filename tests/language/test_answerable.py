@@ -92,9 +92,10 @@ def test_a_purpose_keeps_its_place(place: str) -> None:
     assert served.near == named.near
 
 
-def test_the_till_is_no_until() -> None:
-    (target,) = read_question("the bin near the till", Attachments(knows=lambda _: True)).inquiry.of
-    assert [near.name for near in target.near] == ["till"]
+@pytest.mark.parametrize("place", ["the till", "the old till", "the scissor lift", "the trouser press"])
+def test_a_name_that_looks_like_another_word_stays(place: str) -> None:
+    (target,) = read_question(f"the bin near {place}", Attachments(knows=lambda _: True)).inquiry.of
+    assert [near.name for near in target.near] == [place.removeprefix("the ")]
 
 
 @given(

@@ -205,7 +205,7 @@ def _meant() -> tuple[re.Pattern[str], dict[str, str]]:
 @cache
 def _better(word: str) -> str | None:
     drawn = (re.sub(r"(.)\1{2,}", letters, word) for letters in (r"\1", r"\1\1"))  # "sofaaaa"
-    if word in _known() or word.removesuffix("s") in _known():
+    if not _known().isdisjoint((word, word.removesuffix("s"), f"{word}s")):  # "scissor lift" is no misspelt "scissors"
         return None
     if meant := next((one for one in drawn if one in _known()), None):
         return meant
