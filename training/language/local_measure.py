@@ -1,8 +1,8 @@
 """`python -m training.language.local_measure MODEL`: the reader, a local language model, and both on commands.
 
-Commands come from the lists of `avlmaps bench language` that the reader was not fitted to (v33 and v36), from a sample
-of the other lists, and from sentences that are no order (tests/language/commands/gate_held_out.tsv, or another
-table whose column `is` says "no"). What the model wrote is kept in a file, so that a run goes on where it ended.
+Commands come from a list that the reader was not fitted to (held_out.jsonl, or `--commands`), from a sample of the
+lists of `avlmaps bench language`, and from sentences that are no order (tests/language/commands/gate_held_out.tsv, or
+another table whose column `is` says "no"). What the model wrote is kept in a file: a run goes on where it ended.
 """
 
 import argparse
@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from training.language.pool import HELD_OUT
 from training.language.rows import LISTS, lists
 
 from avlmaps.core.errors import LanguageError
@@ -28,6 +27,7 @@ from avlmaps.language.sentence import Attachments
 from avlmaps_sim.bench.language import Row, judge_intents, read_list
 
 WAYS = ("reader", "model", "both")
+_HELD_OUT = "held out"
 
 
 class KeptModel(LocalModel):
@@ -72,17 +72,16 @@ class Said:
     list: str
 
 
-def sentences(no_orders: Path, count: int, seed: int) -> list[Said]:
-    """Return commands of the voices held out, of the other lists, and sentences that are no order, mixed."""
-    paths = {path.stem: path for group in ("blind", "voices") for path in lists()[group]}
+def sentences(commands: Path, no_orders: Path, count: int, seed: int) -> list[Said]:
+    """Return commands of a list held out, of the other lists, and sentences that are no order, mixed."""
     draw = random.Random(seed)
-    held = [(name, row) for name in sorted(HELD_OUT) for row in read_list(paths[name])]
+    held = [(_HELD_OUT, row) for row in read_list(commands)]
     others = [(path.stem, row) for path in lists()["blind"] for row in read_list(path)]
     found: list[Said] = []
     for rows in (held, others):
         usable = [(name, row) for name, row in rows if "intents" in row and row.get("say") and not row.get("image")
                   and not row.get("clip")]  # fmt: skip
-        found += [Said(str(row["say"]), row, name) for name, row in draw.sample(usable, count)]
+        found += [Said(str(row["say"]), row, name) for name, row in draw.sample(usable, min(len(usable), count))]
     with no_orders.open(encoding="utf-8", newline="") as file:
         closed = [row["sentence"] for row in csv.DictReader(file, delimiter="\t") if row["is"] == "no"]
     found += [Said(text, None, "no order") for text in draw.sample(closed, min(len(closed), count))]
@@ -140,6 +139,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m training.language.local_measure", description=__doc__)
     parser.add_argument("model", help="a GGUF file, or the address of a llama.cpp server")
     parser.add_argument(
+        "--commands", type=Path, default=Path(__file__).parent / "held_out.jsonl", help="a list that is held out"
+    )
+    parser.add_argument(
         "--no-orders", type=Path, default=LISTS / "gate_held_out.tsv", help="sentences that are no order"
     )
     parser.add_argument("--count", type=int, default=50, help="sentences of each of the three sources")
@@ -152,11 +154,11 @@ def main() -> None:
     translator = LocalTranslator(model, replace(Attachments(), at=None))
     ways = dict(zip(WAYS, (_by_reader, _by_model, _by_both), strict=True))
     counts: dict[tuple[str, str], Counter[str]] = {}
-    for number, said in enumerate(sentences(given.no_orders, given.count, given.seed)[: given.most], 1):
+    for number, said in enumerate(sentences(given.commands, given.no_orders, given.count, given.seed)[: given.most], 1):
         for way, read in ways.items():
             if way == "model" and not given.alone and not model.has(said.text):
                 continue
-            kind = "no orders" if said.row is None else "held out" if said.list in HELD_OUT else "other lists"
+            kind = "no orders" if said.row is None else _HELD_OUT if said.list == _HELD_OUT else "other lists"
             became = outcome(said, read, translator)
             counts.setdefault((kind, way), Counter())[became] += 1
         if number % 10 == 0:

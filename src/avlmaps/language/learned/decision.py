@@ -56,6 +56,7 @@ class Weighed(Meaning):
     probability: float
     doubtful: bool = False  # see `is_doubtful`
     notes: tuple[str, ...] = ()  # a sentence each: how words were taken
+    overruled: tuple[Intent, ...] = ()  # what the network reads where a row of claims stops it
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +155,7 @@ def _sound(name: str) -> str:
 def weighed(read: Read, names: NameResolver) -> Weighed:
     """Return a reading of a command, checked."""
     assert isinstance(read.meaning, tuple)
-    tokens, intents, stop = names.sentence.tokens, read.meaning, None
+    tokens, intents, stop, overruled = names.sentence.tokens, read.meaning, None, ()
     refused = next((one for one in intents if isinstance(one, Refuse)), None)
     if refused is not None:
         strange = refused.reason is RefusalReason.UNKNOWN and strange_word(tokens)
@@ -163,17 +164,19 @@ def weighed(read: Read, names: NameResolver) -> Weighed:
         stop = unclear(tokens)
     else:
         intents = at_each(tokens, [on_targets(one, names.resolve) for one in intents])
-        stop = names.problem or _too_much(intents) or unmet(tokens, intents, read.used)
+        stop = names.problem or _too_much(intents)
+        if stop is None and (stop := unmet(tokens, intents, read.used)):
+            overruled = tuple(intents)
     if stop is None:
         turned = in_direction(tokens, intents)
         intents, stop = (intents, turned) if isinstance(turned, Clarify) else (turned, None)
     if stop is not None:
-        return Weighed((refusal_of(stop, tokens),), read.probability)
+        return Weighed((refusal_of(stop, tokens),), read.probability, overruled=overruled)
     meant = frozenset(word for one in intents for word in _MEANT.get(type(one), ()))
     counted = any(target.number > 1 for one in intents for target in act.targets_of(one))
     doubtful = is_doubtful(tokens, read.used, meant | {"third"} if counted else meant)
     if doubtful and any(isinstance(one, act.If) for one in intents):  # a condition of which half was read
-        return Weighed((refusal_of(unclear(tokens), tokens),), read.probability)
+        return Weighed((refusal_of(unclear(tokens), tokens),), read.probability, overruled=tuple(intents))
     return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(names.notes)))
 
 
@@ -204,22 +207,23 @@ def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Command:
     """Return what to do of some readings."""
     best, every = readings[0], tuple(readings)
     dangers = [one for one in readings if isinstance(one.stops, Refuse) and one.stops.reason in DANGERS]
-    harms = any(one.stops.reason is RefusalReason.HARM for one in dangers if isinstance(one.stops, Refuse))
+    harms = any(getattr(one.stops, "reason", None) is RefusalReason.HARM for one in dangers)
+    is_danger = bool(dangers) and sum(one.probability for one in dangers) >= limits.danger
     likely = tuple(one.intents for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
-    question = Command((which(likely),), (), every, "unsure")
-    if dangers and sum(one.probability for one in dangers) >= limits.danger:
-        return Command(dangers[0].intents, (), every, "danger") if harms or best.stops is not None else question
-    if best.stops is not None:
-        is_open = likely and not harms and best.probability < limits.command
-        return question if is_open else Command(best.intents, (), every, "stop")
+    is_sure, hint = best.probability >= limits.command, ""
+    if best.overruled and is_sure:  # a person decides between the words of a row and the networks
+        likely, is_sure, hint = (best.overruled,), False, f"{verbalise(best.intents)} "
+    asks = likely and not harms and (best.stops is None or hint or not (is_sure or is_danger))
+    if (is_danger or best.stops is not None) and not asks:
+        return Command((dangers[0] if is_danger else best).intents, (), every, "danger" if is_danger else "stop")
     alike = sum(one.probability for one in readings if one.stops is None and is_same(one.intents, best.intents))
-    if alike >= (limits.doubtful if best.doubtful else limits.command):
+    if best.stops is None and not is_danger and alike >= (limits.doubtful if best.doubtful else limits.command):
         return Command(best.intents, best.notes, every, "read")
-    return question
+    return Command((which(likely, hint),), (), every, "unsure")
 
 
-def which(meanings: Sequence[tuple[Intent, ...]]) -> Clarify:
-    """Return the question which of a few meanings is the right one, or none of them."""
+def which(meanings: Sequence[tuple[Intent, ...]], hint: str = "") -> Clarify:
+    """Return the question which of a few meanings is the right one, or none of them; a hint stands before it."""
     by_words = dict(list({verbalise(meaning): meaning for meaning in meanings}.items())[:3])
     choices, meant = tuple(by_words), tuple(by_words.values())
     if len(choices) > 1:
@@ -227,7 +231,7 @@ def which(meanings: Sequence[tuple[Intent, ...]]) -> Clarify:
         by_number = f"Choose it by its number ({option('choose', '1')})."
         return Clarify(f"This can mean several things. {each} Which one, or none of these? {by_number}", choices, meant)
     if choices:
-        return Clarify(f"Is this what you mean? {choices[0]} If not, say it in other words.", choices, meant)
+        return Clarify(f"{hint}Is this what you mean? {choices[0]} If not, say it in other words.", choices, meant)
     return Clarify("This is not clear. Can you say it in other words?")
 
 
