@@ -70,7 +70,7 @@ def test_every_row_is_chosen_and_its_program_parses(row: dict[str, Any]) -> None
     values = {name: VALUES[name] for name in said & VALUES.keys()} | {name: one[0] for name, one in where.items()}
     if "of[0].kind" in where or "of[1].kind" in where or row["do"] == "between":
         values = {"of": (HERE, LAMP) if "of[0].kind" in where else (SOFA, HERE if where else LAMP)}
-    if "side" in intent.__slots__:
+    if "side" in intent.__dataclass_fields__:
         values["side"] = Side(values.get("side", "left" if row["do"] == "face" else "north"))
     made = intent(**values)
     assert row_of(made).words == row["words"] and row_of(made).program == row["program"]

@@ -14,18 +14,13 @@ import msgspec
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language import intents as act
-from avlmaps.language import lexer
-from avlmaps.language.lexer import Token
+from avlmaps.language.lexer import READS, Token, angle_at, begins_amount
 from avlmaps.language.names import describes, is_entry, sounding_forms, sounds_like
 from avlmaps.language.word_classes import filled, listed, load_word_classes, pattern_of, table, word_list
 
 _ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
 _MARKS = {act.TargetKind.AREA: "@", act.TargetKind.SOUND: "$"}
 _BEGIN = r"(?<![^ ^@$])[\^@$]?"  # of a word
-_HEARD = frozenset({"hear", "heard", "hearing", "sound", "noise"})
-_WAYS = dict.fromkeys(("clockwise", "cw"), act.TurnSense.CLOCKWISE) | dict.fromkeys(
-    ("counterclockwise", "anticlockwise", "ccw"), act.TurnSense.COUNTERCLOCKWISE
-)
 _ENDS = frozenset(act.Pick(side) for side in ("left", "right", "north", "south", "east", "west"))
 _VAGUE = frozenset({"a", "an", "one", "another"})
 
@@ -82,14 +77,12 @@ class _Marked:
     """A sentence as rows see it: its names with marks, its amounts and files as one word each."""
 
     def __init__(self, tokens: Sequence[Token], used: frozenset[int] | None, kinds: Mapping[str, str]) -> None:
-        self.tokens, self.text = tokens, " "
-        self._starts: list[tuple[int, int]] = []
-        words, at = list(tokens), 0
+        self.tokens, self.text = list(tokens), " "
+        self._starts, at = list[tuple[int, int]](), 0
         while at < len(tokens):
-            end, word = self._word(words, at, used, kinds)
             self._starts.append((len(self.text), at))
+            at, word = self._word(self.tokens, at, used, kinds)
             self.text += f"{word} "
-            at = end
         self._starts.append((len(self.text), len(tokens)))
 
     @staticmethod
@@ -97,22 +90,21 @@ class _Marked:
         token = tokens[at]
         if token.kind in ("image", "clip"):
             return at + 1, "‹file›" if used is None or at in used else "‹file!›"
-        ends = {name: max((end for end, _ in read(tokens, at)), default=at) for name, read in lexer.READS.items()}
+        ends = {name: max((end for end, _ in read(tokens, at)), default=at) for name, read in READS.items()}
         name = max(ends, key=ends.__getitem__)
         reads = used is None or not used.isdisjoint(range(at, ends[name]))
         counted = ends[name] < len(tokens) and tokens[ends[name]].text in claimed_words("counted")
         counts = name != "n" or token.kind == "number" or counted
         if ends[name] > at and counts and token.text not in kinds and (reads or token.text not in _VAGUE):
             return ends[name], f"‹{name}›" if reads else f"‹{name}!›"
-        named = used is not None and at in used and (token.text in kinds or not lexer.begins_amount(token))
+        named = used is not None and at in used and (token.text in kinds or not begins_amount(token))
         return at + 1, f"{kinds.get(token.text, '^') if named else ''}{token.text}"
 
     def said(self, start: int, end: int) -> str:
         """Return the words of the sentence from one character of the text to another."""
-        inside = [at for begin, at in self._starts if begin < end]
         first = max((at for begin, at in self._starts if begin <= start), default=0)
         last = min((at for begin, at in self._starts if begin >= end), default=len(self.tokens))
-        return " ".join(token.text for token in self.tokens[first : max(last, inside[-1] if inside else 0)])
+        return " ".join(token.text for token in self.tokens[first:last])
 
 
 def _first(kind: str, marked: _Marked, facts: frozenset[str]) -> act.Refuse | act.Clarify | None:
@@ -130,9 +122,13 @@ def _first(kind: str, marked: _Marked, facts: frozenset[str]) -> act.Refuse | ac
     return None
 
 
-def forbidden(tokens: Sequence[Token]) -> act.Refuse | act.Clarify | None:
-    """Return the refusal or question for words that no reading of a command could make good; None without such."""
-    return _first("words", _Marked(tokens, None, {}), frozenset())
+def claimed(kind: str, tokens: Sequence[Token], named: frozenset[int] | None = None) -> act.Refuse | act.Clarify | None:
+    """Return the refusal or question for words that no reading could make good; None without such.
+
+    Of a command they are ``words``, of one that lacks something ``unclear`` (``named`` are the words of known names),
+    of a question ``unanswered``.
+    """
+    return _first(kind, _Marked(tokens, named, {}), frozenset())
 
 
 def unmet(
@@ -150,26 +146,13 @@ def unmet_by(tokens: Sequence[Token], inquiry: act.Inquiry, used: frozenset[int]
     facts = {str(inquiry.ask), *_facts_of_targets(targets)} | ({"several"} if len(inquiry.of) > 1 else set())
     about = inquiry.of[0] if inquiry.of else None
     if about is not None and about.kind in (act.TargetKind.SOUND, act.TargetKind.CLIP):
-        facts |= {"sound"} | ({"heard sound"} if _HEARD & {token.text for token in tokens} else set())
+        facts |= {"sound"} | ({"heard sound"} if claimed_words("heard") & {token.text for token in tokens} else set())
         facts |= {"no sound"} if "heard sound" not in facts and not _sounds(about.name) else set()
     facts |= {token.kind for token in tokens if token.kind in ("clip", "image")}
     if inquiry.ask is act.Ask.EXISTS or _pattern("{ask}").search(marked.text):
         facts.add("whether")
     found = _first("question", marked, frozenset(facts))
     return None if found is None else getattr(found, "question", "A map cannot answer this.")
-
-
-def unanswered(tokens: Sequence[Token]) -> str | None:
-    """Return why a map cannot answer a question that no reading makes good, where its words show that."""
-    found = _first("unanswered", _Marked(tokens, None, {}), frozenset())
-    return None if found is None else getattr(found, "question", None)
-
-
-def lacking(tokens: Sequence[Token], named: frozenset[int]) -> act.Clarify:
-    """Return the question for what an unclear command lacks; ``named`` are the words of known names."""
-    found = _first("unclear", _Marked(tokens, named, {}), frozenset())
-    assert isinstance(found, act.Clarify)  # the last row fits all
-    return found
 
 
 def at_each(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tuple[act.Intent, ...]:
@@ -187,8 +170,9 @@ def in_direction(tokens: Sequence[Token], intents: Sequence[act.Intent]) -> tupl
     """Return intents whose circles run in the direction that is said, or the question which one is meant."""
     steps = act.steps_of(intents)
     turns = any(isinstance(step, act.Turn) for step in steps)
+    senses = {word: sense for sense in act.TurnSense if sense for word in claimed_words(sense)}
     said = ((at, token.text) for at, token in enumerate(tokens))
-    ways = [_WAYS[word] for at, word in said if word in _WAYS and not (turns and _turns(tokens, at))]
+    ways = [senses[word] for at, word in said if word in senses and not (turns and _turns(tokens, at))]
     circles = sum(isinstance(step, act.Circle) for step in steps)
     if not circles or not ways:
         return tuple(intents)
@@ -209,7 +193,7 @@ def _turns(tokens: Sequence[Token], at: int) -> bool:
     clause = list(tokens[start + 1 : min((cut for cut in cuts if cut > at), default=len(tokens))])
     turns = load_word_classes().words["TURN_HERE"]
     orders = {token.text for token in clause} & turns - {"turning", "rotating"}  # "circle it, turning clockwise"
-    return bool(orders) or any(lexer.angle_at(clause, number) for number in range(len(clause)))
+    return bool(orders) or any(angle_at(clause, number) for number in range(len(clause)))
 
 
 def _sounds(name: str) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language import intents as act
-from avlmaps.language.claims import claimed_words, forbidden
+from avlmaps.language.claims import claimed, claimed_words
 from avlmaps.language.gate import UNSURE, NoOrder, no_order
 from avlmaps.language.learned.decision import EXAMPLE, Command, NameResolver, Weighed, decided, refusal_of, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
@@ -15,13 +15,10 @@ from avlmaps.language.names import respelt
 from avlmaps.language.said_places import SaidStorey, said_storeys
 from avlmaps.language.sentence import ASK, Attachments, Sentence, StandIns, language_of, stand_ins
 from avlmaps.language.verbalise import verbalise
-from avlmaps.language.word_classes import load_word_classes, pattern
+from avlmaps.language.word_classes import load_word_classes, pattern, table
 
 MOST_CHARACTERS = 1000
-ON_ITS_STOREY = (
-    "'{said}': the robot stays on its storey. Name the place without the storey; a place on another one is refused, "
-    "with the reason."
-)
+_HARM = act.Refuse(act.RefusalReason.HARM)
 
 
 class UnclearError(LanguageError):
@@ -48,11 +45,12 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
     read = _read(text, given)
     stop = read.stops
     closed = no_order(text)
-    if closed is None or (stop is not None and (closed.kind == UNSURE or _harms(stop))):
+    if closed is None or (stop is not None and (closed.kind == UNSURE or stop == _HARM)):
         return read
     refused = act.Refuse(act.RefusalReason.UNKNOWN, _not_ordered(closed))
-    answer = refused if closed.refuses or stop is not None else _asked(closed, read.intents)
-    return replace(read, intents=(answer,), why="gate")
+    order = verbalise(read.intents).removeprefix("I will").rstrip(".")
+    asked = act.Clarify(f"{closed.answer} Shall I{order}?", (order.lstrip(", "),), (read.intents,))
+    return replace(read, intents=(refused if closed.refuses or stop is not None else asked,), why="gate")
 
 
 def is_stop(text: str) -> bool:
@@ -71,24 +69,14 @@ def check_order(text: str) -> None:
     """Raise an UnclearError for what is no order, or a danger, before a language model may write for it."""
     read = read_command(text)
     stop = read.stops
-    if stop is not None and (_harms(stop) or read.why == "gate"):
+    if stop and (stop == _HARM or read.why == "gate"):
         raise UnclearError(verbalise((stop,)), getattr(stop, "choices", ()))
-    closed = None if stop is None else no_order(text)  # the reader refuses it too, perhaps for another reason
-    if closed is not None:
+    if stop and (closed := no_order(text)):  # the reader refuses it too, perhaps for another reason
         raise UnclearError(_not_ordered(closed))
-
-
-def _harms(stop: act.Refuse | act.Clarify) -> bool:
-    return isinstance(stop, act.Refuse) and stop.reason is act.RefusalReason.HARM
 
 
 def _not_ordered(closed: NoOrder) -> str:
     return f"{closed.answer} Say what to do now, such as: go to the kitchen."
-
-
-def _asked(closed: NoOrder, intents: Sequence[act.Intent]) -> act.Clarify:
-    order = verbalise(intents).removeprefix("I will").rstrip(".")
-    return act.Clarify(f"{closed.answer} Shall I{order}?", (order.lstrip(", "),), (tuple(intents),))
 
 
 def _read(text: str, given: Attachments | None) -> Command:
@@ -97,28 +85,27 @@ def _read(text: str, given: Attachments | None) -> Command:
         read = _read(stand.text, replace(given or Attachments(), own=()))
         intents = tuple(_back(act.on_targets(one, stand.target), stand) for one in read.intents)
         return replace(read, intents=intents, notes=tuple(map(stand.back, read.notes)))
-    language = language_of(text)
-    if language is not None:
+    if language := language_of(text):
         return Command((act.Clarify(ASK.format(language=language)),))
     sentence = Sentence(text, given)
-    stop = forbidden(sentence.tokens)
-    if stop is not None:
+    if stop := claimed("words", sentence.tokens):
         return Command((refusal_of(stop, sentence.tokens),))
     storeys = said_storeys(text)
-    if storeys:
-        named = _on_storey(text, storeys, given)
-        if named is not None:
-            return named
-        numbered = [one.said for one in storeys if one.number is not None]
-        if numbered:
-            return Command((act.Clarify(ON_ITS_STOREY.format(said=numbered[0])),))
+    if named := _on_storey(text, storeys, given):
+        return named
+    if numbered := [one.said for one in storeys if one.number is not None]:
+        return Command((act.Clarify(table("storey_words")["stays"].format(said=numbered[0])),))
     reader = learned_reader()
     readings = weighed_readings(sentence, reader)
     if not readings:
-        question = act.Clarify(f"I do not understand this. Say it like: {EXAMPLE}.")
-        return Command((question,), why="unsure")
+        return Command((act.Clarify(f"I do not understand this. Say it like: {EXAMPLE}."),), why="unsure")
     answer = decided(readings, reader.limits)
-    notes = (*sentence.notes, *_without_effect(sentence), *answer.notes, *_lost_sides(answer.intents, sentence))
+    slow = (one.text for one in sentence.tokens if one.text in load_word_classes().words["SLOW"])
+    without_effect = (f"'{word}' has no effect: the robot has one speed." for word in slow)
+    # Where it drives or looks to a side, none is lost.
+    keeps = any(isinstance(step, act.Beside | act.Face | act.StopAt) for step in act.steps_of(answer.intents))
+    sides = sentence.side_notes(() if keeps else [one for each in answer.intents for one in act.targets_of(each)])
+    notes = (*sentence.notes, *without_effect, *answer.notes, *sides)
     intents = _picked(answer.intents, " ".join(token.text for token in sentence.tokens))
     return replace(answer, intents=intents, notes=tuple(dict.fromkeys(notes)))
 
@@ -149,16 +136,14 @@ def _back(intent: act.Intent, stand: StandIns) -> act.Intent:
 
 def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | None) -> Command | None:
     """Return a command whose one target is on a storey, by the target's name: "bed upstairs"; None for any other."""
-    word = storeys[0]
-    changes_storey = pattern("storey_words", "changes").search(text.lower())
-    if len(storeys) > 1 or not word.said or word.isnt or not word.rest or changes_storey:
+    if len(storeys) != 1 or pattern("storey_words", "changes").search(text.lower()):
+        return None
+    (word,) = storeys
+    if not word.said or word.isnt or not word.rest:
         return None
     inner = _read(word.rest, given)
-    targets = {target for intent in inner.intents for target in act.targets_of(intent)}
-    if inner.stops is not None or len(targets) != 1:
-        return None
-    (target,) = targets
-    if target.is_file or target.kind is act.TargetKind.HERE:
+    target, *others = {target for intent in inner.intents for target in act.targets_of(intent)} or {None}
+    if inner.stops or others or target is None or target.is_file or target.kind is act.TargetKind.HERE:
         return None
     at = word.said if word.above is not None and "stairs" in word.said else f"on the {word.said}"
     there = replace(target, name=f"{target.name} {at}")
@@ -168,15 +153,3 @@ def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | No
 def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed, ...]:
     """Return the checked readings of a command, the likeliest first; none where it has no word or too many."""
     return tuple(weighed(read, NameResolver(sentence)) for read in reader.command(sentence.tokens))
-
-
-def _without_effect(sentence: Sentence) -> list[str]:
-    slow = load_word_classes().words["SLOW"]
-    return [f"'{one.text}' has no effect: the robot has one speed." for one in sentence.tokens if one.text in slow]
-
-
-def _lost_sides(intents: Sequence[act.Intent], sentence: Sentence) -> tuple[str, ...]:
-    # The side is where it drives or looks.
-    if any(isinstance(step, act.Beside | act.Face | act.StopAt) for step in act.steps_of(intents)):
-        return ()
-    return sentence.side_notes(target for intent in intents for target in act.targets_of(intent))

@@ -34,10 +34,9 @@ def no_order(text: str) -> NoOrder | None:
     # What is said of the robot ("send the rover to the door") is judged as if it were said to it.
     forms = (text, _QUOTE.sub(": ", text), rewritten(text, only_robot=True)[0])
     said, quoted, ordered = (" ".join(token.text for token in tokenise(form)) for form in forms)
-    closed = (kind for kind, rows in _rows().items() if kind != _ORDER and any(row.search(quoted) for row in rows))
-    kind = next(closed, None)
-    if kind is not None:
-        return NoOrder(kind, table("gate")[kind]["answer"], "refuses" in table("gate")[kind])
+    for kind, rows in _rows().items():
+        if kind != _ORDER and any(row.search(quoted) for row in rows):
+            return NoOrder(kind, table("gate")[kind]["answer"], "refuses" in table("gate")[kind])
     if any(row.search(ordered) for row in _rows()[_ORDER]):
         return None
     unsure = english().no_order(text if ordered == said else ordered) > english().limit

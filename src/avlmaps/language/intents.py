@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache
 from string import Formatter
-from typing import Any, ClassVar
+from typing import Any, ClassVar, dataclass_transform
 
 import msgspec
 
@@ -114,24 +114,23 @@ class Target:
         return own | {name: value for name, value in told.items() if value}
 
 
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
 class Step:
-    """A step of a command; ``do`` is its name in JSON, such as ``stop_at``."""
+    """A step of a command, a frozen dataclass; ``do`` is its name in JSON, such as ``stop_at``."""
 
-    __slots__ = ()
     do: ClassVar[str]
 
     def __init_subclass__(cls) -> None:
         cls.do = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+        dataclass(frozen=True)(cls)
 
 
-@dataclass(frozen=True, slots=True)
 class Go(Step):
     """Drive to a target."""
 
     to: Target
 
 
-@dataclass(frozen=True, slots=True)
 class Face(Step):
     """Turn on the spot until a target is ahead, on the left, on the right, or behind."""
 
@@ -139,7 +138,6 @@ class Face(Step):
     side: Side = Side.AHEAD
 
 
-@dataclass(frozen=True, slots=True)
 class Turn(Step):
     """Turn on the spot by an angle, or to a heading of the compass (0 north, 90 east); one of the two is given."""
 
@@ -147,21 +145,18 @@ class Turn(Step):
     heading: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
 class Move(Step):
     """Drive straight ahead, or backwards by a negative distance."""
 
     metres: float
 
 
-@dataclass(frozen=True, slots=True)
 class Between(Step):
     """Drive to the middle between two targets; `TargetKind.HERE` is where the robot stands."""
 
     of: tuple[Target, Target]
 
 
-@dataclass(frozen=True, slots=True)
 class Beside(Step):
     """Drive to a side of a target; without a distance as near as the robot's skill goes."""
 
@@ -170,7 +165,6 @@ class Beside(Step):
     metres: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
 class StopAt(Step):
     """Stop at a distance from a target, on the side where the robot comes from."""
 
@@ -178,7 +172,6 @@ class StopAt(Step):
     metres: float
 
 
-@dataclass(frozen=True, slots=True)
 class Circle(Step):
     """Drive around a target, once; with ``views`` stop at this many points and look at it."""
 
@@ -187,7 +180,6 @@ class Circle(Step):
     way: TurnSense = TurnSense.ANY
 
 
-@dataclass(frozen=True, slots=True)
 class VisitEach(Step):
     """Drive to every instance of a target, the nearest first, and do something there."""
 
@@ -195,19 +187,16 @@ class VisitEach(Step):
     body: "tuple[Intent, ...]" = ()
 
 
-@dataclass(frozen=True, slots=True)
 class Wait(Step):
     """Stand still for some seconds; None where no time was said."""
 
     seconds: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
 class Return(Step):
     """Drive back to where the robot stood when the command began."""
 
 
-@dataclass(frozen=True, slots=True)
 class Repeat(Step):
     """Do the same several times."""
 
@@ -215,7 +204,6 @@ class Repeat(Step):
     body: "tuple[Intent, ...]"
 
 
-@dataclass(frozen=True, slots=True)
 class If(Step):
     """Do one thing where the map has a target, and another where it has none; one of them may be nothing."""
 
@@ -224,7 +212,6 @@ class If(Step):
     otherwise: "tuple[Intent, ...]" = ()
 
 
-@dataclass(frozen=True, slots=True)
 class Refuse(Step):
     """The robot does nothing; ``said`` is the sentence that says why."""
 
@@ -232,7 +219,6 @@ class Refuse(Step):
     said: str = field(default="", compare=False)
 
 
-@dataclass(frozen=True, slots=True)
 class Clarify(Step):
     """The robot does nothing until a question is answered: one of ``choices``, whose intents are ``meanings``."""
 
@@ -271,18 +257,13 @@ def on_targets(intent: Intent, change: Callable[[Target], Target]) -> Intent:
             return tuple(changed(one) for one in value)
         return on_targets(value, change) if hasattr(value, "do") else value
 
-    return replace(intent, **{name: changed(getattr(intent, name)) for name in intent.__slots__})
+    return replace(intent, **{name: changed(getattr(intent, name)) for name in intent.__dataclass_fields__})
 
 
 def targets_of(intent: Intent) -> tuple[Target, ...]:
     """Return the targets of an intent, in the order of the words; of a repeated one, those of its body."""
     found: list[Target] = []
-
-    def note(target: Target) -> Target:
-        found.append(target)
-        return target
-
-    on_targets(intent, note)
+    on_targets(intent, lambda target: found.append(target) or target)
     return tuple(found)
 
 
@@ -348,7 +329,7 @@ def paths_in(text: str) -> list[str]:
 
 def values_of(intent: Intent) -> dict[str, Any]:
     """Return the fields of an intent by their names."""
-    return {name: getattr(intent, name) for name in intent.__slots__}
+    return {name: getattr(intent, name) for name in intent.__dataclass_fields__}
 
 
 @cache

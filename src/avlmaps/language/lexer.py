@@ -42,9 +42,6 @@ _BEGIN_NUMBERS = frozenset({
 _LONGEST_NUMBER = 12  # words
 _COUNTED_PARTS = {name: 1 / part for name, part in _TABLE["parts"].items() if name != "half"}
 _PARTS = {name: 1 / part for name, part in _TABLE["parts"].items() if name != "thirds"}
-_PARTS_OF_TURNS = {
-    "half": 2, "halve": 2, "third": 3, "quarter": 4, "fifth": 5, "sixth": 6, "eighth": 8, "tenth": 10, "twelfth": 12,
-}  # fmt: skip
 # These the networks read as words: "a quarter turn", "half a turn", "three quarters of a turn".
 _READ_AS_WORDS = (0.25, 0.5, 0.75)
 _CHARACTERS = str.maketrans("‘’“”–—−‐‑﹣－…º", "''\"\"-------.°")
@@ -61,12 +58,14 @@ _TOKEN = re.compile(
   | (?P<number>\d+(?:[.,]\d+)?(?:/\d+)?)
   | (?P<clock>o['\s]?clock\b)
   | (?P<word>[^\W\d_]+(?:['’][^\W\d_]+)*)
+  | (?P<minus>(?<![^ =(\[{{,:;])-(?=\.?\d|pi\b))
+  | (?P<not>(?<!\S)!(?=[^\W\d_]))
+  | (?P<none>(?<=\S)-(?!>)|-(?=\d)|["'`*])
   | (?P<punct>->|=>|<-|\.+|[,;:!?()<>=\n-]|[^\w\s])
     """,
     re.IGNORECASE | re.VERBOSE,
 )
 _SPOKEN_END = re.compile(r"(?<=\w)[ ,]+(?:question mark|exclamation (?:mark|point))[ .?!]*$", re.IGNORECASE)
-_SIGNED = re.compile(r"\.?\d|pi\b", re.IGNORECASE)
 
 
 def tokenise(sentence: str) -> list[Token]:
@@ -85,34 +84,23 @@ def tokenise(sentence: str) -> list[Token]:
             tokens.append(Token("till", raw, "word", start, end))  # "the till" is no "until"
         elif kind == "word":
             tokens += _words(raw, start)
-        elif raw == "-" and _is_minus(plain, start):
-            tokens.append(Token("minus", raw, "word", start, end))
-        elif raw == "!" and re.match(r"(^|.*\s)![^\W\d_]", plain[: end + 1], re.DOTALL):
-            tokens.append(Token("not", raw, "word", start, end))  # as programs have it: "!kitchen"
-        elif raw not in ("-", '"', "'", "`", "*", "_") or _stands_alone(plain, start, raw):
+        elif kind in (
+            "minus",
+            "not",
+        ):  # the sign of a number, which leads to a question back; as in programs "!kitchen"
+            tokens.append(Token(kind, raw, "word", start, end))
+        elif kind != "none":
             word = "word" if kind in ("clock", "model", "run_on") or raw == "°" else kind
-            text = _MARKS.get(raw, "." if _ends_an_order(plain, end, raw) else raw.lower())
+            # "turn left! turn right" are two orders, and "stop!" is one
+            stops = raw.startswith(".") or (raw == "!" and plain[end:].strip(" !.?"))
+            text = _MARKS.get(raw, "." if stops else raw.lower())
             tokens.append(Token("o'clock" if kind == "clock" else text, raw, word, start, end))
     return tokens
-
-
-def _ends_an_order(text: str, end: int, raw: str) -> bool:
-    """Return whether a mark is a full stop: "turn left! turn right" are two orders, and "stop!" is one."""
-    return raw.startswith(".") or (raw == "!" and bool(text[end:].strip(" !.?")))
 
 
 def without_spoken_end(text: str) -> str:
     """Return a text without the name of the mark that ends it, as dictation has it: "the sofa question mark"."""
     return _SPOKEN_END.sub("", text)
-
-
-def _is_minus(text: str, at: int) -> bool:
-    """Return whether a hyphen is the sign of a number; a negative angle or distance leads to a question back."""
-    return (at == 0 or text[at - 1] in " =([{,:;") and bool(_SIGNED.match(text, at + 1))
-
-
-def _stands_alone(text: str, at: int, mark: str) -> bool:
-    return mark == "-" and (at == 0 or text[at - 1].isspace()) and (at + 1 == len(text) or not text[at + 1].isdigit())
 
 
 def _words(raw: str, start: int) -> list[Token]:
@@ -128,9 +116,6 @@ def _words(raw: str, start: int) -> list[Token]:
     rest = "is" if rest == "'s" and lower[:at] in _list("is") else rest
     middle = start + at
     return [Token(lower[:at], raw[:at], "word", start, middle), Token(rest, raw[at:], "word", middle, end)]
-
-
-# Numbers in words.
 
 
 @cache
@@ -204,7 +189,7 @@ def in_figures(tokens: Sequence[Token]) -> list[Token]:
 
 def _part_of_a_turn(found: re.Match[str]) -> float:
     count = _NUMBERS[found["count"]] if found["count"] else 1
-    return 360.0 * count / _PARTS_OF_TURNS[found["part"]]
+    return 360.0 * count / _TABLE["turns"][found["part"]]
 
 
 def _turns(tokens: list[Token], at: int) -> tuple[int, float | None]:
@@ -223,16 +208,10 @@ def _turns(tokens: list[Token], at: int) -> tuple[int, float | None]:
     return at, None
 
 
-# Amounts.
-
-
 def number_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
     """Return the numbers that begin at a token, each with where it ends: figures, words, "half", "a couple of"."""
-    found: list[tuple[int, float]] = []
-    if i >= len(tokens):
-        return found
-    token = tokens[i]
-    if token.kind != "number" and token.text not in _BEGIN_NUMBERS:
+    token, found = tokens[i] if i < len(tokens) else None, list[tuple[int, float]]()
+    if token is None or (token.kind != "number" and token.text not in _BEGIN_NUMBERS):
         return found
     if token.kind == "number":
         whole, _, part = token.text.replace(",", ".").partition("/")
@@ -319,10 +298,7 @@ def _and_smaller(
 def _unit(tokens: Sequence[Token], at: int, units: Mapping[str, float]) -> float | None:
     if at >= len(tokens):
         return None
-    word, raw = tokens[at].text, tokens[at].raw
-    behind = tokens[at + 1].text if at + 1 < len(tokens) else ""
-    if units is LENGTHS and raw in ("'", '"'):
-        return LENGTHS["foot" if raw == "'" else "inch"]
+    word, behind = tokens[at].text, tokens[at + 1].text if at + 1 < len(tokens) else ""
     if word == "in" and behind in _list("after_in"):
         return None
     return units.get(word) or (units.get(word.removesuffix("s")) if len(word) > 2 else None)

@@ -131,9 +131,8 @@ def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
     how = how if how in ("", "in") else "on" if how.startswith("on") else "near"
     said["room" if of is Listed.CHANGES or how == "in" else "thing"] += said["place"]
     room, thing = mended(said["room"]) or said["room"], said["thing"]
-    if room and lexicon().find(room, EntryKind.ROOM) is None:
-        return None
-    if pattern(_TABLE, "photo").search(thing) or " or " in thing:
+    is_room = not room or lexicon().find(room, EntryKind.ROOM) is not None
+    if not is_room or pattern(_TABLE, "photo").search(thing) or " or " in thing:
         return None
     change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(said["change"])), "")
     name, since = room or thing or said["seen"], said["visit"] + said["date"]

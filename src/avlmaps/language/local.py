@@ -12,7 +12,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from importlib import import_module
 from importlib.resources import files
@@ -53,17 +53,17 @@ _SIGNED = ("turn", "move_forward")
 _UNSAID = {"m": (0.5,), "s": (3.0,), "deg": (30, 45, 90, 135, 180, 225, 270, 315, 360), "n": (2, 3)}
 
 
-# The grammar.
-
-
 def grammar(tokens: Sequence[Token]) -> str:
     """Return the grammar of the programs that a model may write for a sentence; an empty line ends them."""
     calls = [_call(skill) for skill in skills().values() if skill.moves]
     said = (token.text for token in tokens if token.kind in ("word", "number") and '"' not in token.text)
     words = [_literal(word) for word in dict.fromkeys(said) if word not in _ARTICLES]
     sought = [_literal(f"{name}=") for name in skills()["get_major_map"].alternatives if name != "img"]
-    said_of = {unit: [_literal(f"{value:g}") for value in _said(tokens, unit)] for unit in _UNSAID}
-    rules = {"calls": calls, "words": words or ['"it"'], "sought": sought, **said_of}
+    rules = {"calls": calls, "words": words or ['"it"'], "sought": sought}
+    for unit, unsaid in _UNSAID.items():
+        amounts = (amount(tokens, at, unit) for at in range(len(tokens)))
+        values = (*(value for value in amounts if value is not None and value >= 0.0), *unsaid)
+        rules[unit] = [_literal(f"{value:g}") for value in dict.fromkeys(values)]
     text = files("avlmaps.language").joinpath("local_grammar.gbnf").read_text(encoding="utf-8")
     return Template(text.strip()).substitute({name: " | ".join(rule) for name, rule in rules.items()})
 
@@ -78,16 +78,8 @@ def _call(skill: Skill) -> str:
     return " ".join([*parts, '")"'])
 
 
-def _said(tokens: Sequence[Token], unit: str) -> list[float]:
-    said = (amount(tokens, at, unit) for at in range(len(tokens)))
-    return list(dict.fromkeys([*(value for value in said if value is not None and value >= 0.0), *_UNSAID[unit]]))
+_literal = partial(json.dumps, ensure_ascii=False)
 
-
-def _literal(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
-
-
-# What a program means.
 
 _SIDES = {str(side): side for side in Side if side not in (Side.FRONT, Side.AHEAD)}
 _STEPS: Mapping[str, Callable[..., Intent]] = {
@@ -166,15 +158,12 @@ def _joined(steps: Sequence[Intent]) -> list[Intent]:
     return found
 
 
-# The prompt.
-
-
 @cache
 def examples() -> tuple[tuple[str, str], ...]:
     """Return commands with their programs, chosen from the lists that the reader learnt from; plain ones come first."""
-    lines = files("avlmaps.language").joinpath("local_examples.tsv").read_text(encoding="utf-8").splitlines()
-    told = (line.split("\t") for line in lines)
-    return tuple((command, program.replace(" | ", "\n")) for command, program in told)
+    text = files("avlmaps.language").joinpath("local_examples.tsv").read_text(encoding="utf-8")
+    told = (line.replace(" | ", "\n").split("\t") for line in text.splitlines())
+    return tuple((command, program) for command, program in told)
 
 
 def prompt(command: str) -> str:
@@ -198,10 +187,8 @@ def _shown(numbers: Iterable[int]) -> str:
 
 
 def _form(text: str) -> frozenset[str]:
-    words = [
-        "<name>" if is_known(token.text) else "<number>" if token.kind == "number" else token.text
-        for token in tokenise(text)
-    ]
+    said = ((token.text, "<number>" if token.kind == "number" else token.text) for token in tokenise(text))
+    words = ["<name>" if is_known(word) else form for word, form in said]
     return frozenset([*words, *map(" ".join, pairwise(words))])
 
 
@@ -211,9 +198,6 @@ def _forms() -> tuple[Sequence[frozenset[str]], Mapping[str, float]]:
     forms = [_form(command) for command, _ in examples()]
     counts = Counter(part for form in forms for part in form)
     return forms, {part: math.log(len(forms) / count) for part, count in counts.items()}
-
-
-# The model.
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,13 +220,11 @@ class LocalModel:
             file = Path(model).expanduser()
             self._server = _served(file)
             self.url = self._server.listening_address
-            self._begin(f"{file.name}-{file.stat().st_size}-{sha256(_head().encode()).hexdigest()[:16]}.state")
-
-    def _begin(self, state: str) -> None:
-        """Load the state behind what every prompt begins with; compute and keep it where there is none yet."""
-        if self._post("/slots/0?action=restore", {"filename": state}) is None:
-            self._post("/completion", {"prompt": _head(), "n_predict": 0, "cache_prompt": True})
-            self._post("/slots/0?action=save", {"filename": state})
+            # The state behind what every prompt begins with is kept.
+            state = f"{file.name}-{file.stat().st_size}-{sha256(_head().encode()).hexdigest()[:16]}.state"
+            if self._post("/slots/0?action=restore", {"filename": state}) is None:
+                self._post("/completion", {"prompt": _head(), "n_predict": 0, "cache_prompt": True})
+                self._post("/slots/0?action=save", {"filename": state})
 
     def write(self, command: str, tokens: Sequence[Token]) -> Written:
         """Return the program that the model writes for a command; raises LanguageError where it does not answer."""
@@ -287,9 +269,6 @@ def _served(file: Path) -> Any:
         raise BackendError(f"{file} cannot be loaded ({fault}); {_TAKES}") from fault
 
 
-# The translator.
-
-
 class LocalTranslator(LearnedTranslator):
     """Translates with the reader and a language model together."""
 
@@ -302,8 +281,11 @@ class LocalTranslator(LearnedTranslator):
     def read(self, command: str) -> Command:
         """Return the meaning of a command; the model is asked where the reader is not sure of an order."""
         read = read_command(command, self.given)
-        settled = is_settled(read) or (read.stops is not None and no_order(command))  # the reader asks it of all else
-        return read if settled else both(read, self.proposed(command))
+        sure = sum(one.probability for one in read.readings if is_same(one.intents, read.intents)) >= _SURE
+        if sure or read.why in ("danger", "gate", "words") or isinstance(read.stops, Refuse):
+            return read
+        # The reader asks the gate of all that it drives.
+        return read if read.stops is not None and no_order(command) else both(read, self.proposed(command))
 
     def proposed(self, command: str) -> Weighed | None:
         """Return what the model makes of a command, checked; None where it means nothing."""
@@ -314,13 +296,6 @@ class LocalTranslator(LearnedTranslator):
             return None
         checked = weighed(Read(intents, 1.0, _used(intents, sentence.tokens)), NameResolver(sentence))
         return replace(checked, intents=tuple(on_targets(one, stand.target) for one in checked.intents))
-
-
-def is_settled(read: Command) -> bool:
-    """Return whether a reader needs no second opinion: it refuses, single words decide, or it is sure."""
-    if read.why in ("danger", "gate", "words") or isinstance(read.stops, Refuse):
-        return True
-    return sum(one.probability for one in read.readings if is_same(one.intents, read.intents)) >= _SURE
 
 
 def both(read: Command, proposed: Weighed | None) -> Command:
@@ -338,11 +313,10 @@ def both(read: Command, proposed: Weighed | None) -> Command:
 def _used(intents: Sequence[Intent], tokens: Sequence[Token]) -> frozenset[int]:
     """Return the tokens that some intents are made of: words of names, and where the amounts begin."""
     named = {word for one in intents for to in targets_of(one) for part in (to, *to.near) for word in part.name.split()}
-    used = {at for at, token in enumerate(tokens) if token.text in named}
     values = (value for one in act.every(intents) for value in act.values_of(one).values())
     numbers = {abs(value) for value in values if isinstance(value, float | int)}
-    for at in range(len(tokens)):
-        said = {amount(tokens, at, of) for of in READS}
-        if at not in used and amount_end(tokens, at) > at and said & numbers:
-            used.add(at)
-    return frozenset(used)
+
+    def counts(at: int) -> bool:
+        return amount_end(tokens, at) > at and not numbers.isdisjoint(amount(tokens, at, of) for of in READS)
+
+    return frozenset(at for at, token in enumerate(tokens) if token.text in named or counts(at))

@@ -126,8 +126,7 @@ def sounding_forms() -> dict[str, str]:
     """Return all forms of the verbs that sound, each with its -ing form."""
     forms = dict(pair.split("=") for pair in load_word_classes().lists["irregular"].split())
     for verb in load_word_classes().lists["verbs"].split():
-        ing = forms_of(verb)[1]
-        forms |= dict.fromkeys(forms_of(verb), ing)
+        forms |= dict.fromkeys(forms_of(verb), forms_of(verb)[1])
     return forms
 
 

@@ -9,7 +9,7 @@ from itertools import dropwhile
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
-from avlmaps.language.claims import unanswered, unmet_by
+from avlmaps.language.claims import claimed, unmet_by
 from avlmaps.language.intents import Ask, Inquiry, Pick, Target, TargetKind
 from avlmaps.language.learned.decision import NameResolver, is_doubtful, kind_of
 from avlmaps.language.learned.reader import Read, ReadingLimits, learned_reader
@@ -37,7 +37,9 @@ class AskedSentence:
     @property
     def questions(self) -> tuple[Question, ...]:
         """One question for each target; any of them answers. None where the lists of a map do."""
-        return tuple(_question_of(target) for target in self.inquiry.of)
+        every = ([target, *target.near] for target in self.inquiry.of)
+        parts = ([Part(_MODALITIES[x.kind], x.name, is_file=x.is_file, at=x.at) for x in of] for of in every)
+        return tuple(map(Question.of, parts))
 
 
 def parse_sentence(sentence: str) -> Question:
@@ -46,11 +48,6 @@ def parse_sentence(sentence: str) -> Question:
     Its first part is sought, the others say where it is.
     """
     return read_question(sentence, Attachments(knows=lambda _: True)).questions[0]
-
-
-def _question_of(target: Target) -> Question:
-    parts = [Part(_MODALITIES[one.kind], one.name, is_file=one.is_file, at=one.at) for one in (target, *target.near)]
-    return Question.of(parts)
 
 
 def read_question(text: str, given: Attachments | None = None) -> AskedSentence:
@@ -72,12 +69,10 @@ def read_question(text: str, given: Attachments | None = None) -> AskedSentence:
             raise QueryError(stand.back(str(refused))) from None
         of = tuple(map(stand.target, read.inquiry.of))
         return AskedSentence(replace(read.inquiry, of=of), tuple(map(stand.back, read.notes)))
-    language = language_of(text)
-    if language is not None:
+    if language := language_of(text):
         raise QueryError(ASK.format(language=language))
     sentence = Sentence(_where_it_sounds(text), given)
-    named = by_name(sentence)
-    if named is not None:
+    if named := by_name(sentence):
         return named
     reader = learned_reader()
     return asked(sentence, reader.question(sentence.tokens), reader.limits)
@@ -85,11 +80,10 @@ def read_question(text: str, given: Attachments | None = None) -> AskedSentence:
 
 def _where_it_sounds(text: str) -> str:
     found = pattern(_TABLE, "what_sounds").match(text.lower())
-    if found is None or found["verb"] in listed("silent") or found["verb"] not in sounding_forms():
+    ing = sounding_forms().get(found["verb"]) if found else None
+    if not found or not ing or found["verb"] in listed("silent"):
         return text
-    if not found["is"] and found["verb"] not in third_forms():
-        return text
-    return f"where is what is {sounding_forms()[found['verb']]}{found['rest']}"
+    return f"where is what is {ing}{found['rest']}" if found["is"] or found["verb"] in third_forms() else text
 
 
 def by_name(sentence: Sentence) -> AskedSentence | None:
@@ -110,12 +104,10 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> A
             raise QueryError(_NO_USE)
         return _resolved(_for_use(sentence, use, limits), sentence)
     if not reads or (reads[0].meaning is None and not reads[0].is_purpose):
-        file = lacks_file(sentence.tokens)
-        if file is not None:
+        if file := lacks_file(sentence.tokens):
             raise QueryError(file.question)
-        cannot = "A map cannot answer this. It answers where things, sounds or rooms are, and how many; ask it like: "
-        cannot += f"{_EXAMPLE}."
-        raise QueryError(unanswered(sentence.tokens) or cannot)
+        answers = "It answers where things, sounds or rooms are, and how many; ask it"
+        raise _refused(sentence, f"A map cannot answer this. {answers}")
     named = reads[0].meaning.of if isinstance(reads[0].meaning, Inquiry) else ()
     as_thing = any(one.name.endswith(use or "?") and not is_known(one.name) for one in named)  # "somewhere to sleep"
     if use is not None and (reads[0].is_purpose or as_thing):
@@ -128,16 +120,19 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> A
     return _resolved(_likely(plain, sentence, limits), sentence)
 
 
+def _refused(sentence: Sentence, otherwise: str) -> QueryError:
+    found = claimed("unanswered", sentence.tokens)
+    return QueryError(getattr(found, "question", f"{otherwise} like: {_EXAMPLE}."))
+
+
 def _likely(reads: Sequence[Read], sentence: Sentence, limits: ReadingLimits) -> Inquiry:
     best = reads[0].meaning
     assert isinstance(best, Inquiry)
     others = [(one.meaning, one.probability) for one in reads if isinstance(one.meaning, Inquiry)]
     alike = sum(likely for one, likely in others if one.of == best.of and (best.of or one.ask is best.ask))
     if alike < (limits.question_doubtful if is_doubtful(sentence.tokens, reads[0].used) else limits.question):
-        cannot = f"{sentence.text.strip()[:80]!r} is not understood; say it like: {_EXAMPLE}."
-        raise QueryError(unanswered(sentence.tokens) or cannot)
-    back = unmet_by(sentence.tokens, best, reads[0].used)
-    if back is not None:
+        raise _refused(sentence, f"{sentence.text.strip()[:80]!r} is not understood; say it")
+    if back := unmet_by(sentence.tokens, best, reads[0].used):
         raise QueryError(back)
     return best
 
@@ -196,8 +191,5 @@ def _from_nowhere(sentence: Sentence, targets: Sequence[Target]) -> tuple[str, .
     if any(near.kind is not TargetKind.AREA for target in targets for near in target.near):
         return ()
     said = {token.text: None for token in sentence.tokens if token.text in ("nearest", "closest")}
-    return tuple(
-        f"{FROM_NOWHERE} '{word}' from: the likeliest comes first. Say what it is near, or give a place to count from "
-        "(near)."
-        for word in said
-    )
+    remedy = "the likeliest comes first. Say what it is near, or give a place to count from (near)."
+    return tuple(f"{FROM_NOWHERE} '{word}' from: {remedy}" for word in said)

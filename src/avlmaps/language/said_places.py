@@ -44,9 +44,8 @@ def said_storeys(sentence: str) -> tuple[SaidStorey, ...]:
     if which := _storey("which").match(sentence.strip()):
         return (SaidStorey("", f"where is {which['what']}"),)
     found = list(_storey("said").finditer(sentence))
-    if not found:
-        return ()
-    rest = _tidied(_storey("said").sub(" ", sentence))
+    rest = re.sub(r"\s+([?.!,])", r"\1", " ".join(_storey("said").sub(" ", sentence).split()))
+    rest = re.sub(r"(?:,| and| or| but| (?:that|which) (?:is|are))+(?=[?.!]*$)", "", rest).strip(" ,")
     lists = not rest or _storey("everything").match(rest) is not None
     return tuple(dict.fromkeys(_said(one, rest, lists) for one in found))
 
@@ -61,19 +60,14 @@ def _said(one: re.Match[str], rest: str, lists: bool) -> SaidStorey:
     word = (one["ordinal"] or one["number"]).casefold()
     if word == "upper":
         return SaidStorey(words, rest, None, True, isnt, lists)
-    number = _numbers().get(word)
-    return SaidStorey(words, rest, int(word) if number is None else number, None, isnt, lists)
+    number = _numbers()[word] if word in _numbers() else int(word)
+    return SaidStorey(words, rest, number, None, isnt, lists)
 
 
 @cache
 def _numbers() -> dict[str, int]:
     ordinals = enumerate(table("storey_words")["ordinals"])
     return {word: number for number, words in ordinals for word in words.split()} | table("storey_words")["ends"]
-
-
-def _tidied(rest: str) -> str:
-    rest = re.sub(r"\s+([?.!,])", r"\1", " ".join(rest.split()))
-    return re.sub(r"(?:,| and| or| but| (?:that|which) (?:is|are))+(?=[?.!]*$)", "", rest).strip(" ,")
 
 
 def asks_for_source(text: str, sound: Collection[str] = ()) -> bool:
@@ -87,9 +81,8 @@ def asks_for_source(text: str, sound: Collection[str] = ()) -> bool:
         return True
     if _source("heard").search(text):
         return False
-    return _source("maker").search(text) is not None or (
-        _source("sound_of").search(text) is None and _sounds_itself(text, sound)
-    )
+    is_sound = _source("sound_of").search(text) is not None
+    return _source("maker").search(text) is not None or (not is_sound and _sounds_itself(text, sound))
 
 
 def _sounds_itself(text: str, sound: Collection[str]) -> bool:
@@ -108,12 +101,13 @@ def _sounds_itself(text: str, sound: Collection[str]) -> bool:
     return False
 
 
-def seeks_source(tokens: Sequence[Token], own: Sequence[int], others: Collection[int] = ()) -> bool:
-    """Return whether a command means where the sound came from that its ``own`` words name; ``others`` name the rest.
+def seeks_source(tokens: Sequence[Token], own: Sequence[int], used: Collection[int] = ()) -> bool:
+    """Return whether a command means where the sound came from that its ``own`` words name; ``used`` are of any name.
 
     Only the words round the sound count, up to the next step or the next thing that is named, and what refers to it
     behind: "the dog barks, go to where it comes from".
     """
+    others = set(used) - set(own)
     if not own or tokens[own[0]].start == tokens[own[0]].end:  # a file that came along stands behind the sentence
         own = [number for number, token in enumerate(tokens) if token.text in _words("recordings")][:1]
     if not own:

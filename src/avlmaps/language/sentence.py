@@ -9,10 +9,9 @@ in the place of each, since what was learnt reads such words best; what was read
 
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Any
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
@@ -32,14 +31,6 @@ ASK = "This seems to be {language}. Commands and questions have to be in English
 _ANOTHER = "another language than English"
 _LATIN = "LATIN"
 _SEVERAL = 3  # words; fewer may be a name that English borrowed
-# What says where beside a thing, or in a room, another is. A map knows how far it is, and whether it is in the room.
-_SIDE = (
-    r"\b((?:(?:at|on|to|in) the )?(?:left|right|north|south|east|west|front|far end|end|back|top|bottom|foot|head|edge|"
-    r"corner|middle|centre|center|other side|side) of|in front of|on top of|behind|opposite(?: to| of)?|across from|"
-    r"underneath|under|beneath|below|above|over|along|against|facing|outside{0}) "
-    r"(?:(?:the|a|an|my|our|this|that) )?{1}\b"
-)
-_ON_THINGS = "|on|onto|upon|in|inside|into"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,32 +44,21 @@ class Attachments:
     own: tuple[OwnName, ...] = ()
     no_sources: Callable[[], str] = lambda: ""  # why the map knows no sources; "" where it does, or no map is known yet
 
-    def tokens(self, words: Iterable[str], at: int) -> list[Token]:
-        """Return files that a sentence may speak of as tokens behind it, so that "this photo" can point to one."""
-        said = frozenset(words)
-        files = (("image", self.image, "of_pictures"), ("clip", self.clip, "of_recordings"))
-        return [
-            Token(name, name, kind, at, at)
-            for kind, name, means in files
-            if name and said & (claimed_words(means) | claimed_words("points"))
-        ]
-
 
 class Sentence:
     """A tokenised sentence, with the files that came along behind it."""
 
     def __init__(self, text: str, given: Attachments | None = None) -> None:
-        given = given or Attachments()
-        self.text = text
+        self.text, self.given = text, given or Attachments()
         plain, self.order_notes = rewritten(as_meant(text))
         tokens, self.respelt = respelt(tokenise(plain))
         self.tokens = in_figures(tokens)
-        self.tokens += given.tokens((token.text for token in self.tokens), len(text))
-        self.given = given
-
-    def knows(self, name: str) -> bool:
-        """Return whether the map's encoder knows a name."""
-        return bool(self.given.knows and self.given.knows(name))
+        # A file of which it speaks is a token behind it, so that "this photo" can point to one.
+        said, at = frozenset(token.text for token in self.tokens), len(text)
+        files = (("image", self.given.image, "of_pictures"), ("clip", self.given.clip, "of_recordings"))
+        for kind, name, means in files:
+            if name and said & (claimed_words(means) | claimed_words("points")):
+                self.tokens.append(Token(name, name, kind, at, at))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -91,7 +71,8 @@ class Sentence:
         for near in (near for target in targets for near in target.near if not near.is_file):
             is_room = near.kind is TargetKind.AREA
             read = "'in': the room counts, the place in it" if is_room else "'near': distance counts, the side"
-            sides = re.findall(_SIDE.format("" if is_room else _ON_THINGS, re.escape(near.name)), words)
+            side = words_of("rewrites")["room_side" if is_room else "side"]
+            sides = re.findall(rf"\b({side}) (?:(?:the|a|an|my|our|this|that) )?{re.escape(near.name)}\b", words)
             notes |= dict.fromkeys(f"'{side}' is read as {read} does not." for side in sides)
         return tuple(notes)
 
@@ -121,12 +102,13 @@ def rewritten(text: str, *, only_robot: bool = False) -> tuple[str, list[str]]:
 
     With ``only_robot`` only what is said of the robot is said to it.
     """
-    notes: list[str] = []
-    for says, row in _forms(text.lower(), only_robot=only_robot):
-        found = says.search(text)
-        if found is not None:
+    notes, lower = list[str](), text.lower()
+    for row in table("rewrites")["row"]:
+        # A row of which no word of `has` is said cannot fit, and is not compiled.
+        may_fit = "has" not in row or any(word in lower for word in row["has"].split())
+        if may_fit and (row.get("robot") or not only_robot) and (found := _form(row["says"]).search(text)):
             notes += [found.expand(row["note"])] if "note" in row else []
-            text = says.sub(row["to"], text)
+            text = _form(row["says"]).sub(row["to"], text)
     return text if only_robot else _sounding().sub(_whatever, text), notes
 
 
@@ -134,9 +116,8 @@ def rewritten(text: str, *, only_robot: bool = False) -> tuple[str, list[str]]:
 def _sounding() -> re.Pattern[str]:
     """Return what finds a thing that has no name but its sound: "the thing that rings", "the beeping device"."""
     nameless, generic = "|".join(listed("nameless")), "|".join(listed("nameless") | listed("generic"))
-    silent = listed("silent")
-    rings = "|".join(sorted(third_forms() - silent))
-    ringing = "|".join(sorted({ing for ing in sounding_forms().values() if ing not in silent}))
+    rings = "|".join(sorted(third_forms() - listed("silent")))
+    ringing = "|".join(sorted({*sounding_forms().values()} - listed("silent")))
     return re.compile(
         rf"(?:(?:\b(?:the|an?|some|any) )?\b(?:{generic}) (?:that|which|who)|\bwhat(?:ever)?|\bwhoever) "
         rf"(?P<rings>{rings})\b"
@@ -152,26 +133,18 @@ def _whatever(found: re.Match[str]) -> str:
     return f"whatever is {sound}"
 
 
-def _forms(text: str, *, only_robot: bool) -> Iterator[tuple[re.Pattern[str], Mapping[str, Any]]]:
-    """Yield the rows; those of which no word of `has` is in the text cannot fit it and are not compiled."""
-    for row in table("rewrites")["row"]:
-        has = row.get("has", "").split()
-        if (row.get("robot") or not only_robot) and (not has or any(word in text for word in has)):
-            yield _form(row["says"]), row
-
-
 @cache
 def _form(says: str) -> re.Pattern[str]:
-    words = {**words_of("rewrites"), "order": "|".join(sorted(_order_words()))}
-    return re.compile(filled(says, words), re.IGNORECASE)
+    return re.compile(filled(says, {**words_of("rewrites"), "order": _order_words()}), re.IGNORECASE)
 
 
 @cache
-def _order_words() -> frozenset[str]:
+def _order_words() -> str:
     classes = load_word_classes().words
     names = ("GO", "TURN", "FACE", "WAIT", "CIRCLE", "RETURN", "BACK_UP")
     begins = {phrase.split()[0] for name in names for phrase in classes[name]}
-    return frozenset(map(re.escape, begins - {"the", "a", "be", "is", "to", "you", "your", "in", "on", "and", "with"}))
+    others = {"the", "a", "be", "is", "to", "you", "your", "in", "on", "and", "with"}
+    return "|".join(sorted(map(re.escape, begins - others)))
 
 
 def is_reserved(name: str) -> bool:
@@ -204,14 +177,14 @@ def language_of(text: str) -> str | None:
     if letters and len(strange) * 2 > len(letters):
         return _ANOTHER
     found = re.findall(r"[^\W\d_]+", text.lower())
-    counted = {name: sum(word in sure | also for word in found) for name, (sure, also) in _foreign_words().items()}
+    every = {name: sure | also for name, (sure, also) in _foreign_words().items()}
+    counted = {name: sum(word in words for word in found) for name, words in every.items()}
     plainly = (2 * counted[name] >= len(found) and sure & set(found) for name, (sure, _) in _foreign_words().items())
     if not any(plainly):
         return _ANOTHER if _is_unknown(found) else None
     first, second = sorted(counted, key=lambda name: -counted[name])[:2]
-    others = frozenset[str]().union(*(sure | also for name, (sure, also) in _foreign_words().items() if name != first))
-    sure, also = _foreign_words()[first]
-    return first if counted[first] > counted[second] and (sure | also) & set(found) - others else _ANOTHER
+    own = every.pop(first) & set(found)
+    return first if counted[first] > counted[second] and own.difference(*every.values()) else _ANOTHER
 
 
 def _is_unknown(found: list[str]) -> bool:
@@ -221,10 +194,8 @@ def _is_unknown(found: list[str]) -> bool:
     if len(found) < _SEVERAL or not english:
         return False
     usual = [word for word in several if word in class_words() | WORDS | sounding_forms().keys() or is_known(word)]
-    if not usual and len(several) >= _SEVERAL:
-        return True
     strange = any(not word.isascii() for word in several if word not in usual)
-    return strange and 2 * len(usual) < len(several)
+    return (not usual and len(several) >= _SEVERAL) or (strange and 2 * len(usual) < len(several))
 
 
 @cache

@@ -10,16 +10,9 @@ from avlmaps.language.learned.decision import Command
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.sentence import Attachments
 from avlmaps.language.verbalise import verbalise
+from avlmaps.language.word_classes import table
 
 __all__ = ["LearnedTranslator", "Translation", "Translator", "UnclearError", "command_to_program", "explanation"]
-_WHY = {
-    "read": "a reading that is likely enough",
-    "danger": "a refusal for safety",
-    "stop": "the likeliest reading, which stops",
-    "words": "single words, which no reading can outweigh",
-    "gate": "the gate: this may be no order, to the robot, now",
-    "unsure": "nobody: no reading is likely enough",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +29,7 @@ class Translation:
 class Translator(Protocol):
     """Turns what a person says into a program of the robot's vocabulary."""
 
-    @property
-    def name(self) -> str:
-        """The word by which a user chooses this translator, such as `learned` or `chat`."""
-        ...
+    name: str  # the word by which a user chooses this translator, such as `learned` or `chat`
 
     def program_for(self, command: str) -> Translation:
         """Return the program for a command; raises LanguageError where it is not understood or no answer came."""
@@ -104,4 +94,4 @@ def explanation(translator: Translator, command: str) -> list[str]:
         return ["readings: this translator weighs none"]
     read = translator.last_read(command)
     lines = [f"reading {one.probability:5.2f}: {verbalise(one.intents)}" for one in read.readings]
-    return [*lines, f"decided by: {_WHY[read.why]}"]
+    return [*lines, f"decided by: {table('intents')['names']['why'][read.why]}"]

@@ -6,7 +6,7 @@ from typing import Any
 
 from avlmaps.core.lexicon import lexicon
 from avlmaps.language import intents as act
-from avlmaps.language.claims import claimed_words, lacking
+from avlmaps.language.claims import claimed, claimed_words
 from avlmaps.language.intents import Clarify, Intent, Pick, Refuse, Target, TargetKind
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import class_words, is_known, may_name
@@ -20,14 +20,6 @@ MISSING = {
 """The questions for "this photo" and "this recording" where no file came along."""
 _SHORT = 3  # letters; shorter words are spelt like too many others
 _ORDINALS = {2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "sixth"}
-_HEARD = {
-    TargetKind.SOUND: "where {} was heard", TargetKind.CLIP: "where a sound like {} was heard",
-    TargetKind.IMAGE: "where the picture {} was taken", TargetKind.HERE: "here",
-}  # fmt: skip
-_MADE = {
-    TargetKind.SOUND: "where the sound of {} comes from", TargetKind.CLIP: "where a sound like {} comes from"
-}  # fmt: skip
-
 _ALONE: dict[tuple[Intent, ...], str] = {
     (act.Wait(),): "I will stop and stay here.",
     (act.Return(),): "I will stay here, where this command begins; `avlmaps edit MAP --pin home` pins a home.",
@@ -36,10 +28,9 @@ _ALONE: dict[tuple[Intent, ...], str] = {
 
 def verbalise(intents: Sequence[Intent]) -> str:
     """Return one sentence that says what the robot will do, or why it does nothing."""
-    if intents and isinstance(intents[0], Refuse):
-        return intents[0].said
-    if intents and isinstance(intents[0], Clarify):
-        return intents[0].question
+    for stop in intents[:1]:
+        if isinstance(stop, Refuse | Clarify):
+            return stop.said if isinstance(stop, Refuse) else stop.question
     return _ALONE.get(tuple(intents)) or f"I will {_steps(intents)}.".replace(" ,", ",")
 
 
@@ -66,7 +57,8 @@ def phrase(target: Target) -> str:
     if target.kind in (TargetKind.OBJECT, TargetKind.AREA):
         own = f"the {_picked(target)}"
     else:
-        own = (_MADE if target.at == "source" else _HEARD)[target.kind].format(target.name)
+        kind = f"{target.kind} source" if target.at == "source" else target.kind
+        own = table("intents")["names"]["targets"][kind].format(target.name)
     areas = [one for one in target.near if one.kind is TargetKind.AREA]
     others = [one for one in target.near if one.kind is not TargetKind.AREA]
     beside = "near" if target.pick is Pick.NEAREST else "nearest to"
@@ -115,4 +107,6 @@ def unclear(tokens: Sequence[Token]) -> Clarify:
     file, strange = lacks_file(tokens), strange_word(tokens)
     if file is None and strange is not None:
         return unknown(strange)
-    return file or lacking(tokens, frozenset(at for at, token in enumerate(tokens) if is_known(token.text)))
+    found = file or claimed("unclear", tokens, frozenset(at for at, one in enumerate(tokens) if is_known(one.text)))
+    assert isinstance(found, Clarify)  # the last row fits all
+    return found

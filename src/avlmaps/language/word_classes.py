@@ -6,7 +6,7 @@ with ``[optional]`` and ``(one|another)`` parts.
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib.resources import files
@@ -67,7 +67,7 @@ def load_word_classes() -> WordClasses:
     longest: dict[str, int] = {}
     for name, told in data["words"].items():
         texts = told.values() if isinstance(told, dict) else (told,)
-        words[name] = frozenset(phrase for text in texts for phrase in expanded(text))
+        words[name] = frozenset(phrase for text in texts for phrase in _phrases(iter(_pieces(text))) if phrase)
         for phrase in words[name]:
             classes.setdefault(phrase, []).append(name)
             first = phrase.partition(" ")[0]
@@ -78,33 +78,25 @@ def load_word_classes() -> WordClasses:
 listed = partial(word_list, "word_classes")  # the words of a list
 
 
-def expanded(text: str) -> list[str]:
-    """Return the phrases of a list such as ``go [over] (to|towards) | head for``; brackets may nest."""
-    pieces = re.findall(r"[\[\]()|]|[^\s\[\]()|]+", text)
-    phrases, end = _phrases(pieces, 0)
-    if end != len(pieces):
-        raise ValueError(f"the list {text[:60]!r} is malformed")
-    return [phrase for phrase in dict.fromkeys(phrases) if phrase]
+def _pieces(text: str) -> list[str]:
+    return re.findall(r"[\[\]()|]|[^\s\[\]()|]+", text)
 
 
 def pattern_of(text: str) -> str:
     """Return the regular expression of a list of phrases; it takes a blank behind each word, and a mark before it."""
-    pieces = re.findall(r"[\[\]()|]|[^\s\[\]()|]+", text)
     made = {"[": "(?:", "]": ")?", "(": "(?:", ")": ")", "|": "|"}
-    return "".join(made.get(piece) or rf"[\^@$]?{re.escape(piece)} " for piece in pieces)
+    return "".join(made.get(piece) or rf"[\^@$]?{re.escape(piece)} " for piece in _pieces(text))
 
 
-def _phrases(pieces: Sequence[str], at: int) -> tuple[list[str], int]:
-    found: list[str] = []
-    current = [""]
-    while at < len(pieces) and pieces[at] not in ("]", ")"):
-        piece, at = pieces[at], at + 1
+def _phrases(pieces: Iterator[str]) -> list[str]:
+    """Return the phrases of a list such as ``go [over] (to|towards) | head for``, up to the bracket that ends it."""
+    found, current = list[str](), [""]
+    for piece in pieces:
+        if piece in ("]", ")"):
+            break
         if piece == "|":
             found, current = found + current, [""]
             continue
-        inner = [piece]
-        if piece in ("[", "("):
-            within, end = _phrases(pieces, at)
-            inner, at = within if piece == "(" else ["", *within], end + 1
+        inner = ["", *_phrases(pieces)] if piece == "[" else _phrases(pieces) if piece == "(" else [piece]
         current = [f"{before} {after}".strip() for before in current for after in inner]
-    return found + current, at
+    return found + current

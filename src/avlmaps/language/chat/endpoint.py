@@ -52,16 +52,20 @@ class ChatSettings:
 
     def __post_init__(self) -> None:
         for name, kind in get_type_hints(type(self), include_extras=True).items():
-            if name != "replay":
-                try:
+            try:
+                if name != "replay":
                     msgspec.convert(getattr(self, name), kind)
-                except msgspec.ValidationError as fault:
-                    raise LanguageError(f"The chat setting {name} is out of bounds ({fault}); give another.") from None
-        if not self._is_address():
+            except msgspec.ValidationError as fault:
+                raise LanguageError(f"The chat setting {name} is out of bounds ({fault}); give another.") from None
+        try:
+            split = urlsplit(self.base_url)
+            _ = split.port
+            is_address = split.scheme in ("http", "https") and bool(split.hostname)
+        except ValueError:
+            is_address = False
+        if not is_address or not self.base_url.isprintable() or " " in self.base_url:
             shown = "What was given" if "@" in self.base_url else repr(self.base_url)  # a password is not repeated
-            raise LanguageError(
-                f"{shown} is no address of a chat server; give one like {HOSTED_URL} or http://localhost:11434/v1."
-            )
+            raise LanguageError(table("chat/faults")["no_address"].format(shown=shown, hosted=HOSTED_URL))
         if self.hosted and not self.base_url.startswith("https:"):
             raise LanguageError(f"{self.shown_url} would be sent the key in clear; give {HOSTED_URL}.")
         if self.api_key is not None and not (self.api_key.isascii() and self.api_key.isprintable()):
@@ -84,15 +88,6 @@ class ChatSettings:
         if "api_key" not in chosen and chosen["base_url"].rstrip("/") == openai_url.rstrip("/"):
             chosen["api_key"] = environment.get("OPENAI_API_KEY", "").strip() or None
         return cls(**chosen)
-
-    def _is_address(self) -> bool:
-        try:
-            split = urlsplit(self.base_url)
-            _ = split.port
-        except ValueError:
-            return False
-        plain = self.base_url.isprintable() and " " not in self.base_url
-        return plain and split.scheme in ("http", "https") and bool(split.hostname)
 
     @property
     def hosted(self) -> bool:
@@ -160,10 +155,8 @@ class Replay:
         """Return the recorded answer to these very messages; raises LanguageError where they were never asked."""
         answers = self._answers.get(_fingerprint(messages), [])
         if not answers:
-            raise LanguageError(
-                f"The replay file {self.path} holds no answer to {quoted(messages[-1]['content'], 120)}; delete the "
-                "file to record it again."
-            )
+            asked = quoted(messages[-1]["content"], 120)
+            raise LanguageError(table("chat/faults")["no_answer"].format(path=self.path, asked=asked))
         return answers.pop(0) if len(answers) > 1 else answers[0]
 
     def add(self, messages: Messages, answer: ModelReply) -> None:
@@ -234,10 +227,7 @@ class Endpoint:
 
     def __init__(self, settings: ChatSettings) -> None:
         if settings.hosted and not settings.api_key:
-            raise LanguageError(
-                f"There is no key for {settings.shown_url}: set OPENAI_API_KEY, or name a server of your own with "
-                "OPENAI_BASE_URL, such as http://localhost:11434/v1 for Ollama."
-            )
+            raise LanguageError(table("chat/faults")["no_key"].format(url=settings.shown_url))
         self.left_out: list[str] = []
         self._settings = settings
         most = "max_completion_tokens" if settings.hosted else "max_tokens"
@@ -271,9 +261,7 @@ class Endpoint:
         if len(offered) == 1:
             return offered[0]
         choice = _listed(offered) or "the name that the server was started with"
-        raise LanguageError(
-            f"No chat model is named for {self._settings.shown_url}: set AVLMAPS_CHAT_MODEL to {choice}."
-        )
+        raise LanguageError(table("chat/faults")["no_model"].format(url=self._settings.shown_url, choice=choice))
 
     def _models(self) -> tuple[str, ...]:
         try:
@@ -294,10 +282,8 @@ class Endpoint:
         except HTTPError as fault:
             raise _of_status(fault, deadline) from None
         except (OSError, HTTPException) as fault:
-            reason = fault.reason if isinstance(fault, URLError) else fault
-            if isinstance(reason, TimeoutError):
-                raise _Fault("timeout") from None
-            kind = "unreachable" if isinstance(fault, URLError) else "broken"
+            kind, reason = ("unreachable", fault.reason) if isinstance(fault, URLError) else ("broken", fault)
+            kind = "timeout" if isinstance(reason, TimeoutError) else kind
             raise _Fault(kind, str(reason) or type(reason).__name__) from None
 
     def _adapted(self, fault: _Fault) -> bool:
@@ -315,6 +301,7 @@ class Endpoint:
     def _sentence(self, fault: _Fault, model: str) -> str:
         settings = self._settings
         status = f"HTTP {fault.status}: {quoted(fault.told)}" if fault.told else f"HTTP {fault.status}"
+        offered = _listed(self._models()) if fault.kind == "model" and not settings.hosted else ""
         sentence = table("chat/faults")[fault.kind].format(
             url=settings.shown_url,
             model=model,
@@ -322,8 +309,7 @@ class Endpoint:
             told=status if fault.status else fault.told,
             start="start the server there (Ollama: ollama serve)" if settings.on_this_machine else "check the network",
             key="OPENAI_API_KEY" if settings.hosted else "AVLMAPS_CHAT_API_KEY",
-            offered=(_listed(self._models()) if fault.kind == "model" and not settings.hosted else "")
-            or "one that the server has",
+            offered=offered or "one that the server has",
             wait=f"in {fault.retry_after_s:.0f} s" if fault.retry_after_s else "later",
         )
         return self._without_key(sentence)
@@ -352,16 +338,13 @@ def _reply(raw: bytes) -> ModelReply:
     if not completion.choices:
         raise _Fault("other", _message(completion.error), 200)
     choice, usage = completion.choices[0], completion.usage if isinstance(completion.usage, dict) else {}
-    content = choice.message.content or ""
-    parts = [] if isinstance(content, str) else content
+    content, refusal = choice.message.content or "", choice.message.refusal
+    if not isinstance(content, str):
+        refusal = refusal or next((part.refusal for part in content if part.refusal), None)
+        content = "".join(part.text or "" for part in content)
     read, written = (usage.get(f"{name}_tokens") for name in ("prompt", "completion"))
-    return ModelReply(
-        content=content if isinstance(content, str) else "".join(part.text or "" for part in parts),
-        refusal=choice.message.refusal or next((part.refusal for part in parts if part.refusal), None),
-        finish=choice.finish_reason,
-        model=quoted(completion.model or "", 100).strip("“”"),
-        tokens=(read if isinstance(read, int) else 0, written if isinstance(written, int) else 0),
-    )
+    tokens = (read if isinstance(read, int) else 0, written if isinstance(written, int) else 0)
+    return ModelReply(content, refusal, choice.finish_reason, quoted(completion.model or "", 100).strip("“”"), tokens)
 
 
 def _of_status(fault: HTTPError, deadline: float) -> _Fault:

@@ -19,13 +19,12 @@ from avlmaps.language.commands import check_order
 from avlmaps.language.program import ROBOT, Program, parse_program, skills
 from avlmaps.language.program.parser import called
 from avlmaps.language.translator import Translation
+from avlmaps.language.word_classes import table
 
 _MOST_SAID_CHARACTERS = 4000
 _MOST_DONE = 40
-_MOVES_NOTHING = (
-    "The program does not move the robot, so that nothing would be done; write the movements that the command says, "
-    "or `# cannot: ` and the reason."
-)
+_TURNS = table("chat/turns")
+_MOVES_NOTHING = _TURNS["moves_nothing"]
 _LOADERS = frozenset({"load_image", "load_sound"})
 _TAGS = "think|thinking|thought|reasoning"
 # Some servers cut off the tag that begins the thoughts: all before the last tag that ends them is thought.
@@ -65,8 +64,7 @@ class ChatTranslator:
         self._replay = Replay(self._settings.replay) if self._settings.replay else None
         self._endpoint: Endpoint | None = None
         self._model = self._settings.model
-        self._command = ""
-        self._rounds_used = 0
+        self._command, self._rounds_used = "", 0
 
     def program_for(self, command: str) -> Translation:
         """Return the program that the model writes for a command; it parses, but has not run.
@@ -99,19 +97,16 @@ class ChatTranslator:
                 program = program_text(answer)
                 parsed = _parsed(program, answer)
                 check_files(parsed, plain_command(command))
-                if not any(skills()[skill].moves for skill in parsed.skills):
-                    insists = is_last or _MOVES_NOTHING in corrected
-                    if not (insists and parsed.skills):
-                        raise UnusableAnswerError(_MOVES_NOTHING)
+                insists = parsed.skills and (is_last or _MOVES_NOTHING in corrected)
+                if not (insists or any(skills()[skill].moves for skill in parsed.skills)):
+                    raise UnusableAnswerError(_MOVES_NOTHING)
                 return Translation(program, self._notes(answer.model, corrected, read, written))
             except (ProgramError, UnusableAnswerError) as fault:
                 why = quoted(str(fault), 300).strip("“”")  # it may quote what a model wrote
                 if is_last:
                     attempts = f"{self._rounds_used + 1} attempt{'s' * (self._rounds_used > 0)}"
-                    raise LanguageError(
-                        f"The chat model {answer.model or self._model!r} wrote no usable program in {attempts}, the "
-                        f"last time because: {why} Say it in other words, or ask another model."
-                    ) from None
+                    told = {"model": answer.model or self._model, "attempts": attempts, "why": why}
+                    raise LanguageError(table("chat/faults")["unusable"].format_map(told)) from None
                 said = without_thoughts(answer.content).strip()[:_MOST_SAID_CHARACTERS] or "(nothing)"
                 messages = (*messages, _message("assistant", said), _message("user", unusable_message(str(fault))))
                 corrected.append(why)
@@ -151,19 +146,13 @@ def program_text(answer: ModelReply) -> str:
     if answer.refusal or answer.finish == "content_filter":
         raise LanguageError(_refused(answer.refusal or answer.content or "its provider's filter stopped the answer"))
     if answer.finish == "length":
-        raise LanguageError(
-            f"The answer of the chat model was cut off after {answer.tokens[1] or 'too many'} tokens; "
-            "raise AVLMAPS_CHAT_MAX_TOKENS, or the length of context that the server allows."
-        )
+        raise LanguageError(table("chat/faults")["cut_off"].format(tokens=answer.tokens[1] or "too many"))
     said = without_thoughts(answer.content).strip()
     if not said:
-        raise UnusableAnswerError(
-            "The answer is empty. There are no tools: write the program as text in one code block."
-        )
+        raise UnusableAnswerError(_TURNS["empty"])
     program = _only_block(said)
     written = said if program is None else program
-    cannot = _CANNOT.fullmatch(written.strip())
-    if cannot:
+    if cannot := _CANNOT.fullmatch(written.strip()):
         why = quoted(cannot[1]) if cannot[1].strip() else "it does not say why"
         raise LanguageError(f"The chat model says that the command cannot be done: {why}; say it in other words.")
     if program is None and _REFUSAL.match(written):
@@ -175,8 +164,7 @@ def program_text(answer: ModelReply) -> str:
 
 def without_thoughts(content: str) -> str:
     """Return an answer without what a reasoning model thought aloud before it; of endless thoughts nothing is left."""
-    thoughts = _THOUGHTS.match(content)
-    said = content[thoughts.end() :] if thoughts else content
+    said = _THOUGHTS.sub("", content, count=1)
     return "" if _ENDLESS_THOUGHT.match(said) else said
 
 
@@ -195,17 +183,13 @@ def _only_block(said: str) -> str | None:
     fitting = [text for language, text in blocks if language in _PYTHON] or [text for _, text in blocks]
     different = list(dict.fromkeys(text for text in fitting if text.strip()))
     if len(different) > 1:
-        raise UnusableAnswerError(
-            f"There are {len(different)} code blocks that differ; write one block with all steps in it."
-        )
+        raise UnusableAnswerError(_TURNS["differ"].format(count=len(different)))
     return next(iter([*different, *fitting]), None)
 
 
 def check_files(program: Program, command: str) -> None:
     """Raise a ProgramError where a program loads a file which its command does not name, or does not write out."""
-    for call in program.calls:
-        if called(call) not in _LOADERS:
-            continue
+    for call in (call for call in program.calls if called(call) in _LOADERS):
         path = (*call.args, *(each.value for each in call.keywords))[0]
         name = path.value if isinstance(path, ast.Constant) else None
         if not isinstance(name, str) or not name.strip():
@@ -228,11 +212,9 @@ def _parsed(program: str, answer: ModelReply) -> Program:
     try:
         return parse_program(program)
     except ProgramError as fault:
-        if "`" not in answer.content:
-            raise UnusableAnswerError(
-                f"The answer has no code block, and by itself it is no program: {fault}"
-            ) from None
-        raise
+        if "`" in answer.content:
+            raise
+        raise UnusableAnswerError(_TURNS["no_block"].format(fault=fault)) from None
 
 
 @cache
@@ -256,21 +238,14 @@ def plain_command(command: str) -> str:
 
 def unusable_message(fault: str) -> str:
     """Return the turn that asks for a corrected program, none of which has run."""
-    return (
-        f"That cannot be used: {_cut(fault)}\nNothing of it was done. Answer with the whole corrected program in one "
-        "Python code block, and nothing else."
-    )
+    return _TURNS["unusable"].format(fault=_cut(fault))
 
 
 def failed_message(error: str, done: Sequence[str]) -> str:
     """Return the turn that reports that a program failed while it ran, and asks for one that does the rest."""
     steps = "\n".join(f"- {_cut(step, 200)}" for step in done[-_MOST_DONE:])
-    known = f"These steps were done:\n{steps}\n" if done else "What stands before the step that failed was done.\n"
-    return (
-        f"The program failed while it ran: {_cut(error)}\n{known}The robot stands where they left it, and all names "
-        "are forgotten. Do not repeat movements that were done. Answer with a program for what is left to do, in one "
-        "Python code block, and nothing else; or with `# cannot: ` and the reason, if nothing else can be tried."
-    )
+    known = f"These steps were done:\n{steps}" if done else "What stands before the step that failed was done."
+    return _TURNS["failed"].format(error=_cut(error), known=known)
 
 
 def program_message(program: str) -> str:

@@ -13,12 +13,11 @@ from avlmaps.core.question import HeardAt
 from avlmaps.core.wording import option
 from avlmaps.core.words import singulars_of, stem_of
 from avlmaps.language import intents as act
-from avlmaps.language import lexer
 from avlmaps.language.claims import at_each, claimed_words, in_direction, reasons, unmet
 from avlmaps.language.intents import Clarify, Intent, Pick, RefusalReason, Refuse, Target, TargetKind, on_targets
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.reader import Read, ReadingLimits
-from avlmaps.language.lexer import Token
+from avlmaps.language.lexer import Token, number_at
 from avlmaps.language.names import is_known, is_place, may_name, mended, past_forms, sounding_forms
 from avlmaps.language.sentence import Sentence
 from avlmaps.language.verbalise import MISSING, strange_word, unclear, unknown, verbalise
@@ -26,14 +25,9 @@ from avlmaps.language.word_classes import table
 
 EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
 _FAR_M, _LONG_TIMES = 100.0, 50
-_ROOM_WORDS = frozenset({"room", "area", "zone", "hall", "corner", "wing", "bay", "ward", "lab", "office", "aisle"})
 DANGERS = tuple(map(RefusalReason, ("harm", "flying", "endless", "condition", "negation")))
-_SMALL_WORDS = frozenset({"a", "an", "one", "some", "first", "second", "half", "couple", "few", "several"})
 _WORTH_ASKING = 0.1
-_MEANT: dict[type[Intent], tuple[str, ...]] = {
-    act.Wait: ("wait",),
-    act.If: ("if", "unless", "otherwise", "not", "no", "whether", "instead"),
-}
+_MEANT: dict[type[Intent], frozenset[str]] = {act.Wait: frozenset({"wait"}), act.If: claimed_words("conditional")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +59,7 @@ class Command(Meaning):
 
     notes: tuple[str, ...] = ()  # a sentence each: how words were taken, and what has no effect
     readings: tuple[Weighed, ...] = ()  # the likeliest first
-    why: str = "words"  # a key of `translator._WHY`
+    why: str = "words"  # a key of `names.why` in `intents.toml`
 
 
 @dataclass(slots=True)
@@ -86,19 +80,17 @@ class NameResolver:
         return replace(own, near=others)
 
     def _resolved(self, target: Target) -> Target:
-        match target.kind:
-            case TargetKind.IMAGE | TargetKind.CLIP if not target.name:
-                given = self.sentence.given
-                path = given.image if target.kind is TargetKind.IMAGE else given.clip
-                if path is None:
-                    self._ask(MISSING[target.kind])
-                return replace(target, name=path or "", at=self._place(target))
-            case TargetKind.OBJECT | TargetKind.AREA:
-                return self._thing(target)
-            case TargetKind.SOUND:
-                return replace(target, name=_sound(target.name), at=self._place(target))
-            case _:
-                return replace(target, at=self._place(target))
+        name, given = target.name, self.sentence.given
+        if target.kind in (TargetKind.OBJECT, TargetKind.AREA):
+            return self._thing(target)
+        if target.kind is TargetKind.SOUND and len(name.split()) > 1:
+            *before, verb = name.split()
+            verb = sounding_forms().get(verb, verb) if verb in past_forms() else verb
+            name = " ".join([*before, verb])  # "dog barked" is "dog barking"
+        elif target.is_file and not name:
+            name = given.image if target.kind is TargetKind.IMAGE else given.clip
+            self.problem = self.problem or (MISSING[target.kind] if name is None else None)
+        return replace(target, name=name or "", at=self._place(target))
 
     def _place(self, target: Target) -> HeardAt | None:
         """Return the place of a sound that is meant: the one that was chosen for all, else as the words say."""
@@ -112,20 +104,17 @@ class NameResolver:
         return None if why else target.at
 
     def _thing(self, target: Target) -> Target:
-        name = target.name
-        if not is_known(name) and not self.sentence.knows(name):
+        name, knows = target.name, self.sentence.given.knows
+        if not is_known(name) and not (knows and knows(name)):
             better = mended(name)
-            is_room = target.kind is TargetKind.AREA and set(name.split()) & _ROOM_WORDS
+            is_room = target.kind is TargetKind.AREA and set(name.split()) & claimed_words("room_heads")
             if better is None and not is_room and not may_name(name):
-                self._ask(unknown(name))
+                self.problem = self.problem or unknown(name)
                 return target
             if better is not None:
                 self.notes.append(f"'{name}' is read as '{better}'.")
                 name = better
         return replace(target, name=name.replace(" 's", "'s"), kind=kind_of(name, target.kind))
-
-    def _ask(self, question: Clarify) -> None:
-        self.problem = self.problem or question
 
 
 def kind_of(name: str, kind: TargetKind) -> TargetKind:
@@ -143,26 +132,14 @@ def kind_of(name: str, kind: TargetKind) -> TargetKind:
     return TargetKind.AREA if is_place(name) else kind
 
 
-def _sound(name: str) -> str:
-    """Return the name of a sound with its verb as sounds are named: "dog barked" is "dog barking"."""
-    forms = sounding_forms()
-    words = name.split()
-    if len(words) > 1 and words[-1] in past_forms() and words[-1] in forms:
-        words[-1] = forms[words[-1]]
-    return " ".join(words)
-
-
 def weighed(read: Read, names: NameResolver) -> Weighed:
     """Return a reading of a command, checked."""
     assert isinstance(read.meaning, tuple)
-    tokens, intents, stop, overruled = names.sentence.tokens, read.meaning, None, ()
-    refused = next((one for one in intents if isinstance(one, Refuse)), None)
-    if refused is not None:
-        strange = refused.reason is RefusalReason.UNKNOWN and strange_word(tokens)
-        stop = unclear(tokens) if strange else refused
-    elif any(isinstance(one, Clarify) for one in intents):
+    tokens, intents, overruled = names.sentence.tokens, read.meaning, ()
+    stop = Meaning(intents).stops
+    if isinstance(stop, Clarify) or (stop == Refuse(RefusalReason.UNKNOWN) and strange_word(tokens)):
         stop = unclear(tokens)
-    else:
+    elif stop is None:
         intents = at_each(tokens, [on_targets(one, names.resolve) for one in intents])
         stop = names.problem or _too_much(intents)
         if stop is None and (stop := unmet(tokens, intents, read.used)):
@@ -292,6 +269,6 @@ def _is_number(tokens: Sequence[Token], at: int) -> bool:
     """Return whether a number is said at a token that numbers no list: "1. go to the sofa"."""
     token = tokens[at]
     if token.kind != "number":
-        return token.kind == "word" and token.text not in _SMALL_WORDS and bool(lexer.number_at(list(tokens), at))
+        return token.kind == "word" and token.text not in claimed_words("small") and bool(number_at(list(tokens), at))
     begins = at == 0 or tokens[at - 1].kind == "punct"
     return not (begins and [each.text for each in tokens[at + 1 : at + 2]] in (["."], [")"], [":"]))

@@ -9,6 +9,8 @@ import re
 from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
+from importlib.resources.abc import Traversable
+from typing import Any
 
 import numpy as np
 
@@ -17,21 +19,26 @@ from avlmaps.core.errors import BackendError
 from avlmaps.perception.embedded.words import WordPieces
 from avlmaps.perception.networks import open_network
 
+WEIGHTS = files("avlmaps.language.learned").joinpath("weights")
 WIDTH = 384  # numbers of a state
 _MOST_PIECES = 78
 _WORD = re.compile(r"[a-z]+|\d+|[^\w\s]")
+
+
+def loaded(folder: Traversable, what: str, facts: str, graphs: Sequence[str], end: str = "") -> tuple[Any, list[bytes]]:
+    """Return the facts and the graphs of some networks; raises BackendError where a file is missing or is none."""
+    try:
+        read = [folder.joinpath(f"{name}.onnx").read_bytes() for name in graphs]
+        return json.loads(folder.joinpath(f"{facts}.json").read_text(encoding="utf-8")), read
+    except (OSError, ValueError) as fault:
+        raise BackendError(f"{what} lacks its files ({fault}); install the package again{end}.") from fault
 
 
 class English:
     """The layers, and the gate's ``limit``: from this probability of being no order on, a person is asked."""
 
     def __init__(self) -> None:
-        folder = files("avlmaps.language.learned").joinpath("weights")
-        try:
-            facts = json.loads(folder.joinpath("gate.json").read_text(encoding="utf-8"))
-            graphs = [folder.joinpath(f"{name}.onnx").read_bytes() for name in ("gate", "order")]
-        except (OSError, ValueError) as fault:
-            raise BackendError(f"The gate of commands lacks its files ({fault}); install the package again.") from fault
+        facts, graphs = loaded(WEIGHTS, "The gate of commands", "gate", ("gate", "order"))
         self._pieces, self.limit = WordPieces(facts["pieces"]), float(facts["limit"])
         self._layers, self._order = map(open_network, graphs)
 

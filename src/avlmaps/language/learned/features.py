@@ -13,9 +13,8 @@ import numpy as np
 from avlmaps.core.arrays import Float32, Int64
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.words import singulars_of
-from avlmaps.language import lexer
 from avlmaps.language.learned.english import english
-from avlmaps.language.lexer import Token
+from avlmaps.language.lexer import READS, Token
 from avlmaps.language.names import also_things, describing_words, sounding_forms
 from avlmaps.language.word_classes import listed, load_word_classes
 from avlmaps.perception.embedded.words import word_vectors
@@ -71,8 +70,8 @@ def columns() -> tuple[str, ...]:
     return (*spans, *single, "~sounding", "~described", "first", "last")
 
 
-def _marked(tokens: list[Token]) -> Float32[np.ndarray, "n f"]:  # noqa: C901
-    column = {name: at for at, name in enumerate(columns())}
+def _marked(tokens: list[Token]) -> Float32[np.ndarray, "n f"]:
+    book, column = load_word_classes(), {name: at for at, name in enumerate(columns())}
     found = np.zeros((len(tokens), len(column)), np.float32)
 
     def span(name: str, start: int, end: int) -> None:
@@ -80,19 +79,16 @@ def _marked(tokens: list[Token]) -> Float32[np.ndarray, "n f"]:  # noqa: C901
         found[start:end, column[f"in {name}"]] = 1.0
 
     for at, token in enumerate(tokens):
-        for name, end in _classes(tokens, at):
-            span(name, at, end)
         for name, of in _AMOUNTS.items():
-            ends = [end for end, _ in lexer.READS[of](tokens, at)]
+            ends = [end for end, _ in READS[of](tokens, at)]
             if ends:
                 span(f"~{name}", at, max(ends))
-        text = ""
-        for end in range(at, min(at + _MOST_WORDS, len(tokens))):
-            if tokens[end].kind != "word":
-                break
-            text = f"{text} {tokens[end].text}".strip()
-            for kind in _entries(text):
-                span(f"~{kind}", at, end + 1)
+        phrase, is_name, most = "", True, max(_MOST_WORDS, book.longest.get(token.text, 0))
+        for end, other in enumerate(tokens[at : at + most], start=at + 1):
+            phrase = f"{phrase} {other.text}".strip()
+            is_name = is_name and other.kind == "word" and end - at <= _MOST_WORDS
+            for name in (*book.classes.get(phrase, ()), *(_entries(phrase) if is_name else ())):
+                span(name, at, end)
         for name in _listed(token.text):
             found[at, column[name]] = 1.0
         found[at, column[f"={token.kind}"]] = 1.0
@@ -103,33 +99,17 @@ def _marked(tokens: list[Token]) -> Float32[np.ndarray, "n f"]:  # noqa: C901
     return found
 
 
-def _classes(tokens: Sequence[Token], at: int) -> list[tuple[str, int]]:
-    book = load_word_classes()
-    found: list[tuple[str, int]] = []
-    phrase = ""
-    for end in range(at, min(at + book.longest.get(tokens[at].text, 0), len(tokens))):
-        phrase = f"{phrase} {tokens[end].text}" if phrase else tokens[end].text
-        found += [(name, end + 1) for name in book.classes.get(phrase, ())]
-    return found
-
-
 @cache
 def _listed(word: str) -> tuple[str, ...]:
-    found = [name for name in _LISTS if word in listed(name)]
-    if word in sounding_forms():
-        found.append("~sounding")
-    if word in describing_words():
-        found.append("~described")
-    return tuple(found)
+    lists = {name: listed(name) for name in _LISTS} | {"~sounding": sounding_forms(), "~described": describing_words()}
+    return tuple(name for name, words in lists.items() if word in words)
 
 
 @cache
 def _entries(phrase: str) -> tuple[str, ...]:
-    book = lexicon()
-    found = [str(kind) for kind in EntryKind if book.find(phrase, kind) is not None]
-    if "thing" not in found and any(one in also_things() for one in (phrase, *singulars_of(phrase))):
-        found.append("thing")
-    return tuple(found)
+    found = tuple(f"~{kind}" for kind in EntryKind if lexicon().find(phrase, kind) is not None)
+    also = any(one in also_things() for one in (phrase, *singulars_of(phrase)))
+    return (*found, "~thing") if also else found
 
 
 @cache
@@ -139,9 +119,8 @@ def _pieces(word: str) -> tuple[int, ...]:
         return (0,) * MOST_PIECES
     whole = f"<{word}>"
     runs = [whole[at : at + 3] for at in range(len(whole) - 2)]
-    runs = [f"^{whole[:5]}", f"{whole[-5:]}$", *runs][:MOST_PIECES]
-    numbers = [1 + _hashed(run) % (BUCKETS - 1) for run in runs]
-    return (*numbers, *(0 for _ in range(MOST_PIECES - len(numbers))))
+    numbers = [1 + _hashed(run) % (BUCKETS - 1) for run in (f"^{whole[:5]}", f"{whole[-5:]}$", *runs)]
+    return (*numbers, *[0] * MOST_PIECES)[:MOST_PIECES]
 
 
 def _hashed(text: str) -> int:

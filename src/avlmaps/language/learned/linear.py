@@ -158,11 +158,9 @@ class Open:
     names: bool = False
 
     def __contains__(self, symbol: Symbol) -> bool:
-        """Return whether a symbol may follow."""
         return symbol in (self.tokens if isinstance(symbol, int) else self.symbols)
 
     def __or__(self, other: "Open") -> "Open":
-        """Return what may follow either of two lines."""
         return Open(self.symbols | other.symbols, self.tokens | other.tokens)
 
 
@@ -178,13 +176,14 @@ class Pointable:
     def amounts(self, of: str) -> frozenset[int]:
         """Return the tokens where an amount of a kind begins."""
         if of not in self._amounts:
-            self._amounts[of] = frozenset(
-                i for i in range(len(self.tokens)) if (amount(self.tokens, i, of) or 0.0) > 0.0 or
-                (of == "clock" and amount(self.tokens, i, of) is not None)
-            )  # fmt: skip
+            found = {i: amount(self.tokens, i, of) for i in range(len(self.tokens))}
+            said = (i for i, value in found.items() if value is not None and (value > 0.0 or of == "clock"))
+            self._amounts[of] = frozenset(said)
         return self._amounts[of]
 
 
+Meant = tuple[Intent, ...] | Inquiry | None  # of a line; None of a question without an answer
+AtSource = Callable[[Sequence[int]], bool]  # whether the words of a sound mean the place where it came from
 Reading = Generator[Open, Symbol, T]  # says what may follow, takes a symbol, and returns what was read
 _STARTS = Open(frozenset(STARTS))
 _CLOSE = Open(frozenset({"close"}))
@@ -195,20 +194,15 @@ _END = Open(frozenset({"end"}))
 
 
 class Grammar:
-    """The grammar of lines for one sentence: it says what may follow a line, and what a line means.
+    """The grammar of lines for one sentence: it says what may follow a line, and what a line means."""
 
-    ``at_source`` says whether the words of a sound mean the place where it came from.
-    """
-
-    def __init__(
-        self, can: Pointable, *, is_question: bool, at_source: Callable[[Sequence[int]], bool] = lambda _: False
-    ) -> None:
+    def __init__(self, can: Pointable, *, is_question: bool, at_source: AtSource = lambda _: False) -> None:
         self.can, self.is_question, self.at_source = can, is_question, at_source
         self.next: Symbol = ""
         self.kinds = Open(frozenset(KINDS) - ({"here"} if is_question else frozenset()))
 
-    def read(self, line: Iterable[Symbol]) -> "Open | tuple[Intent, ...] | Inquiry | None":
-        """Return what may follow a line; of one that has ended its meaning, None of a question without an answer.
+    def read(self, line: Iterable[Symbol]) -> Open | Meant:
+        """Return what may follow a line; of one that has ended its meaning.
 
         Raises MalformedError where a symbol stands where it may not.
         """
@@ -267,9 +261,8 @@ class Grammar:
             for each in of if isinstance(of, tuple) else (of,):
                 if isinstance(each, Amount | Slot):
                     del left[0]
-                    parts.append((yield from self._field(each, self._begin(left, after), is_last=not left)))
-                else:
-                    parts.append(each)
+                    each = yield from self._field(each, self._begin(left, after), is_last=not left)
+                parts.append(each)
             values[name] = tuple(parts) if isinstance(of, tuple) else parts[0]
         return row.intent(**values)
 
@@ -311,7 +304,7 @@ class Grammar:
         pick, number = PICKS.get(str(self.next), Pick.ANY), 1
         if pick:
             rest = Open(may.symbols - frozenset(PICKS))
-            yield from self._see(rest | Open(frozenset(NUMBERS) if pick is not Pick.OTHER else frozenset()))
+            yield from self._see(rest | Open(frozenset(NUMBERS if pick is not Pick.OTHER else ())))
             if self.next in NUMBERS:
                 number = NUMBERS[str(self.next)]
                 yield from self._see(rest)
@@ -325,26 +318,20 @@ class Grammar:
 
     def _named(self, kind: str, words: Sequence[int], after: Open, *, in_near: bool) -> Open:
         is_file, is_here = kind in ("image", "clip"), kind == "here"
-        tokens = frozenset[int]()
+        tokens, symbols = frozenset[int](), frozenset[str]()
         if is_file and not words:
             tokens = self.can.files[kind]
         elif not is_file and not is_here and len(words) < _MOST_WORDS:
             tokens = self.can.words - frozenset(words)
-        symbols = set[str]()
         if words or is_file or is_here:
-            symbols |= after.symbols
-            symbols |= {"inside"} if in_near else set(PICKS) if kind in ("object", "area") else set()
-            symbols |= set() if is_here else {"near"}
-        return Open(frozenset(symbols), tokens, names=not is_file and not is_here)
+            chosen = {"inside"} if in_near else PICKS.keys() if kind in ("object", "area") else ()
+            symbols = after.symbols.union(chosen, () if is_here else {"near"})
+        return Open(symbols, tokens, names=not is_file and not is_here)
 
 
 def meaning_of(
-    line: Sequence[Symbol],
-    tokens: Sequence[Token],
-    *,
-    is_question: bool,
-    at_source: Callable[[Sequence[int]], bool] = lambda _: False,
-) -> tuple[Intent, ...] | Inquiry | None:
+    line: Sequence[Symbol], tokens: Sequence[Token], *, is_question: bool, at_source: AtSource = lambda _: False
+) -> Meant:
     """Return what a line means, see `Grammar.read`; raises MalformedError where it means nothing."""
     found = Grammar(Pointable(tokens), is_question=is_question, at_source=at_source).read(line)
     if isinstance(found, Open):

@@ -5,11 +5,9 @@ every line that ends means something. Probabilities are the network's own, befor
 nonsense, its readings are unlikely.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
-from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
 
@@ -17,10 +15,9 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import BackendError
-from avlmaps.language.intents import Inquiry, Intent
 from avlmaps.language.learned import linear
+from avlmaps.language.learned.english import WEIGHTS, loaded
 from avlmaps.language.learned.features import columns, features
-from avlmaps.language.learned.linear import INDEX, SYMBOLS
 from avlmaps.language.lexer import Token
 from avlmaps.language.said_places import seeks_source
 from avlmaps.perception.embedded.words import words_checksum
@@ -54,7 +51,7 @@ class Line:
 class Read:
     """One reading of a sentence."""
 
-    meaning: "tuple[Intent, ...] | Inquiry | None"  # None: a question that cannot be answered
+    meaning: linear.Meant
     probability: float  # of all lines that mean this
     used: frozenset[int]  # the tokens that it points at
     is_purpose: bool = False  # names no thing but what it is for: "where can I sit?"
@@ -73,18 +70,19 @@ class LearnedReader:
 
     def __init__(self, folder: Traversable) -> None:
         """Load the networks; raises BackendError where a file is missing or was made for other inputs."""
-        try:
-            facts = json.loads(folder.joinpath("reader.json").read_text(encoding="utf-8"))
-            graphs = [folder.joinpath(f"{name}.onnx").read_bytes() for name in ("words", "step")]
-        except (OSError, ValueError) as fault:
+        end = ", or make them with 'python -m training.language'"
+        facts, graphs = loaded(folder, "The learned reader", "reader", ("words", "step"), end)
+        wanted = {"symbols": list(linear.SYMBOLS), "columns": list(columns()), "word_table": words_checksum()}
+        for name in (name for name, value in wanted.items() if facts.get(name) != value):
             raise BackendError(
-                f"The learned reader lacks its files ({fault}); install the package again, or make them with "
+                f"The learned reader was made for another {name.replace('_', ' ')}; make it again with "
                 "'python -m training.language'."
-            ) from fault
-        _check(facts)
+            )
         self._vocabulary = {word: at for at, word in enumerate(facts["vocabulary"], start=1)}
         self.limits = ReadingLimits(**facts.get("limits", {}))
         self._words, self._step = map(open_network, graphs)
+        # A front may ask for a sentence's lines twice: as a question to lists, then as another.
+        self._kept = lru_cache(maxsize=256)(self._written)
 
     def command(self, tokens: Sequence[Token]) -> list[Read]:
         """Return the readings of a command, the likeliest first; none where it is empty or too long."""
@@ -102,7 +100,7 @@ class LearnedReader:
             # Where a sound is meant to be makes no other reading.
             key = linear.meaning_of(line.symbols, tokens, is_question=is_question), is_purpose
             if key not in found:
-                at_source = partial(_at_source, tokens, used)
+                at_source = partial(seeks_source, tokens, used=used)
                 meaning = linear.meaning_of(line.symbols, tokens, is_question=is_question, at_source=at_source)
                 found[key] = Read(meaning, 0.0, used, is_purpose)
             found[key] = replace(found[key], probability=found[key].probability + float(np.exp(line.log)))
@@ -110,20 +108,19 @@ class LearnedReader:
 
     def lines(self, tokens: Sequence[Token], *, is_question: bool) -> list[Line]:
         """Return the likeliest lines for a sentence, the likeliest first."""
-        return _lines(self, tuple(tokens), is_question=is_question) if 0 < len(tokens) <= _MOST_TOKENS else []
+        return self._kept(tuple(tokens), is_question) if 0 < len(tokens) <= _MOST_TOKENS else []
 
-    def written(self, tokens: Sequence[Token], *, is_question: bool) -> list[Line]:
-        """Return what `lines` does; the networks run each time."""
+    def _written(self, tokens: Sequence[Token], is_question: bool) -> list[Line]:
         grammar = linear.Grammar(linear.Pointable(tokens), is_question=is_question)
         texts = [token.text for token in tokens]
-        start = INDEX["start_question" if is_question else "start_command"]
+        start = "start_question" if is_question else "start_command"
         seen = features(tokens, self._vocabulary)
         sentence: Any = self._words.run(None, {name: array[None] for name, array in seen._asdict().items()})
         states, begin = sentence
         beam = [_Open((), 0.0, begin[0, 0], begin[0, 0])]
         done: list[Line] = []
         for _ in range(linear.MOST_SYMBOLS):
-            last = np.array([[_number(one.symbols[-1]) if one.symbols else start] for one in beam], np.int64)
+            last = np.array([[_number((start, *one.symbols)[-1])] for one in beam], np.int64)
             outputs: Any = self._step.run(
                 None,
                 {"last": last, "states": states, "first": np.stack([one.first for one in beam])[None],
@@ -152,49 +149,25 @@ class LearnedReader:
         return sorted(done, key=lambda line: -line.log)[:_BEAM]
 
 
-@lru_cache(maxsize=256)
-def _lines(reader: LearnedReader, tokens: tuple[Token, ...], *, is_question: bool) -> list[Line]:
-    """Return the lines of a sentence, which a front may ask for twice: as a question to lists, then as another."""
-    return reader.written(tokens, is_question=is_question)
-
-
 def _following(
     may: linear.Open, said: Float32[np.ndarray, " k"], texts: Sequence[str]
 ) -> list[tuple[linear.Symbol, float]]:
     """Return what may follow, likely enough to matter; a name's word may stand at any of its places."""
-    found: list[tuple[linear.Symbol, float]] = [(symbol, float(said[INDEX[symbol]])) for symbol in may.symbols]
-    base = len(SYMBOLS)
-    if may.names:
-        by_word: dict[str, list[int]] = {}
-        for at in sorted(may.tokens):
-            by_word.setdefault(texts[at], []).append(at)
-        for places in by_word.values():
-            logs = said[[base + at for at in places]]
-            found.append((places[int(logs.argmax())], float(np.logaddexp.reduce(logs))))
-    else:
-        found += [(at, float(said[base + at])) for at in may.tokens]
+    found: list[tuple[linear.Symbol, float]] = [(symbol, float(said[linear.INDEX[symbol]])) for symbol in may.symbols]
+    places: dict[str | int, list[int]] = {}
+    for at in sorted(may.tokens):
+        places.setdefault(texts[at] if may.names else at, []).append(at)
+    for alike in places.values():
+        logs = said[[_number(at) for at in alike]]
+        found.append((alike[int(logs.argmax())], float(np.logaddexp.reduce(logs))))
     return [one for one in found if one[1] > _LEAST]
 
 
 def _number(symbol: linear.Symbol) -> int:
-    return INDEX[symbol] if isinstance(symbol, str) else len(SYMBOLS) + symbol
-
-
-def _at_source(tokens: Sequence[Token], used: frozenset[int], own: Sequence[int]) -> bool:
-    return seeks_source(tokens, own, used - frozenset(own))
-
-
-def _check(facts: dict[str, Any]) -> None:
-    wanted = {"symbols": list(SYMBOLS), "columns": list(columns()), "word_table": words_checksum()}
-    for name, value in wanted.items():
-        if facts.get(name) != value:
-            raise BackendError(
-                f"The learned reader was made for another {name.replace('_', ' ')}; make it again with "
-                "'python -m training.language'."
-            )
+    return linear.INDEX[symbol] if isinstance(symbol, str) else len(linear.SYMBOLS) + symbol
 
 
 @cache
 def learned_reader() -> LearnedReader:
     """Return the reader that ships; it is loaded at the first call."""
-    return LearnedReader(files("avlmaps.language.learned").joinpath("weights"))
+    return LearnedReader(WEIGHTS)

@@ -3,7 +3,7 @@
 import ast
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from time import monotonic
 from typing import Any
 
@@ -54,12 +54,13 @@ class Trace:
 
     def to_json(self) -> dict[str, Any]:
         """Return the trace as JSON has it."""
+        steps, elapsed_s = [step.to_json() for step in self.steps], round(self.elapsed_s, 3)
         return {
             "ok": self.ok,
             "error": self.error,
             "error_type": self.error_type,
-            "steps": [step.to_json() for step in self.steps],
-            "elapsed_s": round(self.elapsed_s, 3),
+            "steps": steps,
+            "elapsed_s": elapsed_s,
         }
 
     def lines(self) -> list[str]:
@@ -79,10 +80,8 @@ def told(content: Any) -> str:
             return f"({', '.join(f'{value:.2f}' for value in coordinates)})"
         case {"heat": how}:
             return how
-        case {"picture": path}:
-            return f"picture {path!r}"
-        case {"clip": path}:
-            return f"clip {path!r}"
+        case {"picture": _} | {"clip": _}:
+            return " ".join(f"{kind} {path!r}" for kind, path in content.items())
         case list():
             few = ", ".join(told(each) for each in content[:3])
             return f"[{few}, ... {len(content)} in all]" if len(content) > 3 else f"[{few}]"
@@ -116,19 +115,15 @@ def run_program(
     return Trace(tuple(run.steps), error, error_type, clock() - run.started)
 
 
+def _over(line: int, what: str, remedy: str = "shorten its loops") -> ProgramError:
+    return refused(line, f"the program {what}; {remedy} or raise the budget")
+
+
 class _SkillFailedError(Exception):
     def __init__(self, line: int, what: str, fault: AvlmapsError) -> None:
         asks = isinstance(fault, SeveralFitError)  # a question to the person, who sees no line
         super().__init__(str(fault) if asks else f"Line {line}, {what}: {fault}")
         self.fault = fault
-
-
-class _BreakError(Exception):
-    pass
-
-
-class _ContinueError(Exception):
-    pass
 
 
 class _Run:
@@ -141,41 +136,28 @@ class _Run:
         self.steps: list[Step] = []
         self.computed = self.made = 0
 
-    # ---- the budget
-
     def step(self, line: int, count: int = 1) -> None:
-        """Count computed parts; stop the program that has used them up."""
         before = self.computed
         self.computed += count
         if self.computed > self.budget.steps:
-            raise refused(
-                line, f"the program takes more than {self.budget.steps} steps; shorten its loops or raise the budget"
-            )
+            raise _over(line, f"takes more than {self.budget.steps} steps")
         if before // _STEPS_BETWEEN_LOOKS != self.computed // _STEPS_BETWEEN_LOOKS:
             self.look_at_clock(line)
 
     def keep(self, line: int, elements: int) -> None:
-        """Count elements made; stop the program that has used them up."""
-        self.made += elements
-        if self.made > self.budget.elements:
-            raise refused(
-                line,
-                f"the program makes more than {self.budget.elements} elements of lists, texts and trace; make fewer or "
-                "raise the budget",
-            )
+        self.made, most = self.made + elements, self.budget.elements
+        if self.made > most:
+            raise _over(line, f"makes more than {most} elements of lists, texts and trace", "make fewer")
 
     def look_at_clock(self, line: int) -> None:
-        """Stop the program whose time is over."""
         if self.clock() - self.started > self.budget.seconds:
-            raise refused(line, f"the program takes longer than {self.budget.seconds:g} s; do less or raise the budget")
+            raise _over(line, f"takes longer than {self.budget.seconds:g} s", "do less")
 
-    # ---- statements
+    def block(self, statements: Sequence[ast.stmt]) -> ast.stmt | None:
+        """Run statements; return the ``break`` or ``continue`` that ended them."""
+        return next(filter(None, map(self.statement, statements)), None)
 
-    def block(self, statements: Sequence[ast.stmt]) -> None:
-        for statement in statements:
-            self.statement(statement)
-
-    def statement(self, node: ast.stmt) -> None:
+    def statement(self, node: ast.stmt) -> ast.stmt | None:
         self.step(node.lineno)
         match node:
             case ast.Assign(targets=[target]):
@@ -191,24 +173,16 @@ class _Run:
                 self.value(node.value)
             case ast.If():
                 chosen, otherwise = parser.branches_of(node)
-                self.block(next((each.body for each in chosen if self.truth(each.test)), otherwise))
+                return self.block(next((each.body for each in chosen if self.truth(each.test)), otherwise))
             case ast.For():
-                self.loop(node)
-            case ast.Break():
-                raise _BreakError
-            case ast.Continue():
-                raise _ContinueError
-
-    def loop(self, node: ast.For) -> None:
-        for element in self.needed(node.iter, "walk"):
-            self.step(node.lineno)
-            self.give(node.target, element)
-            try:
-                self.block(node.body)
-            except _ContinueError:
-                continue
-            except _BreakError:
-                return
+                for element in self.needed(node.iter, "walk"):
+                    self.step(node.lineno)
+                    self.give(node.target, element)
+                    if isinstance(self.block(node.body), ast.Break):
+                        break
+            case ast.Break() | ast.Continue():
+                return node
+        return None
 
     def give(self, target: ast.expr, value: Any) -> None:
         names = parser.target_names(target)
@@ -219,8 +193,6 @@ class _Run:
         if len(value) != len(names):
             raise refused(target.lineno, f"{len(names)} names cannot take {len(value)} values; give one value to each")
         self.names.update(zip(names, value, strict=True))
-
-    # ---- expressions
 
     def value(self, node: ast.expr) -> Any:  # noqa: C901 - one case for each form
         line = node.lineno
@@ -245,7 +217,11 @@ class _Run:
             case ast.Compare():
                 return self.comparison(node)
             case ast.BoolOp():
-                return self.logical(node)
+                for operand in node.values[:-1]:
+                    value = self.needed(operand, "truth")
+                    if bool(value) is isinstance(node.op, ast.Or):
+                        return value
+                return self.value(node.values[-1])
             case ast.IfExp():
                 return self.value(node.body if self.truth(node.test) else node.orelse)
             case ast.Subscript():
@@ -253,7 +229,10 @@ class _Run:
             case ast.Call() if called(node) in skills():
                 return self.skill_call(node)
             case ast.Call():
-                return self.function_call(node)
+                name, arguments = called(node), [self.value(each) for each in node.args]
+                if name in ("min", "max"):
+                    self.step(line, sum(len(each) for each in arguments if isinstance(each, (list, tuple, range))))
+                return values.call_function(line, name, arguments)
 
     def name(self, line: int, name: str) -> Value:
         if name not in self.names:
@@ -290,22 +269,6 @@ class _Run:
             left = right
         return True
 
-    def logical(self, node: ast.BoolOp) -> Value:
-        stops_at = isinstance(node.op, ast.Or)
-        for operand in node.values[:-1]:
-            value = self.needed(operand, "truth")
-            if bool(value) is stops_at:
-                return value
-        return self.value(node.values[-1])
-
-    def function_call(self, node: ast.Call) -> Value:
-        name, arguments = called(node), [self.value(each) for each in node.args]
-        if name in ("min", "max"):
-            self.step(node.lineno, sum(len(each) for each in arguments if isinstance(each, (list, tuple, range))))
-        return values.call_function(node.lineno, name, arguments)
-
-    # ---- skills
-
     def skill_call(self, node: ast.Call) -> Value:
         """Call a skill, the one place where a program reaches anything."""
         line, skill = node.lineno, skills()[called(node)]
@@ -313,10 +276,7 @@ class _Run:
         parser.check_arguments(line, skill, {name: values.kind_of(value) for name, value in arguments.items()})
         self.look_at_clock(line)
         if len(self.steps) == self.budget.skill_calls:
-            raise refused(
-                line,
-                f"the program calls more than {self.budget.skill_calls} skills; shorten its loops or raise the budget",
-            )
+            raise _over(line, f"calls more than {self.budget.skill_calls} skills")
         seen = {name: values.shown(value) for name, value in arguments.items()}
         self.keep(line, values.size_of_shown(seen))
         began = self.clock()
@@ -326,10 +286,10 @@ class _Run:
         except AvlmapsError as fault:
             self.record(Step(skill.name, seen, None, line, self.clock() - began, str(fault)))
             raise _SkillFailedError(line, skill.name, fault) from fault
-        how = f"{skill.name}({', '.join(f'{name}={told(value)}' for name, value in seen.items())})"
-        result = values.adopted(skill, returned, how)
+        done = Step(skill.name, seen, None, line, self.clock() - began)
+        result = values.adopted(skill, returned, done.text)
         content = values.shown(result)
-        self.record(Step(skill.name, seen, content, line, self.clock() - began))
+        self.record(replace(done, result=content))
         self.keep(line, values.size_of_shown(content))
         return result
 

@@ -35,12 +35,6 @@ _QUOTED = re.compile(
     r"""#[^\n]*|\b[rR](?:'(?:[^'\\\n]|\\.)*'|"(?:[^"\\\n]|\\.)*")|'(?:[^'\\\n]|\\.)*'|"(?:[^"\\\n]|\\.)*\""""
 )
 _ESCAPE = re.compile(r"\\(?:x[0-9a-fA-F]{2}|u[0-9a-fA-F]{4}|U[0-9a-fA-F]{8}|[\\'\"nt])|(?P<odd>\\)")
-# What may stand in no program outside of strings, and why.
-_STRANGE = (
-    (re.compile(r"[^\x00-\x7f]"), "the character {0!r} (U+{1:04X}) has no meaning here; names are written in the "
-     "letters a to z, phrases between quotes"),
-    (re.compile(r"\w{65,}"), "`{0:.20}...` has more than 64 characters; shorten it"),
-)  # fmt: skip
 _KINDS = {ast.List: ValueType.LIST, ast.Tuple: ValueType.TUPLE, ast.Compare: ValueType.TRUTH}
 _REMEDIES = {name: said for names, said in table("program/refusals")["instead"].items() for name in names.split()}
 
@@ -98,9 +92,11 @@ def _check_text(text: str) -> None:
         if odd and quoted.group()[0] not in "#rR":
             raise _at(text, quoted, "a string has a backslash that makes no character; write `\\\\` for a backslash")
     bare = _QUOTED.sub("''", text)
-    for strange, why in _STRANGE:
-        if found := strange.search(bare):
-            raise _at(bare, found, why.format(found.group(), ord(found.group()[0])))
+    if found := re.search(r"[^\x00-\x7f]", bare):
+        why = "has no meaning here; names are written in the letters a to z, phrases between quotes"
+        raise _at(bare, found, f"the character {found.group()!r} (U+{ord(found.group()):04X}) {why}")
+    if found := re.search(r"\w{65,}", bare):
+        raise _at(bare, found, f"`{found.group():.20}...` has more than 64 characters; shorten it")
 
 
 def _at(text: str, found: re.Match[str], why: str) -> ProgramError:
@@ -138,10 +134,8 @@ def check_arguments(line: int, skill: Skill, kinds: Mapping[str, "Guess"]) -> No
         if isinstance(kind, ValueType) and kind not in skill.kinds[name]:
             wanted = _listed([str(each) for each in ValueType if each in skill.kinds[name]])
             makers = [f"`{other.name}`" for other in skills().values() if {other.returns} == skill.kinds[name]]
-            made = f"; {_listed(makers)} gives one" if makers else ""
-            raise refused(
-                line, f"`{skill.name}` takes {wanted} as its `{name}`, not {kind}; it is {skill.signature}{made}"
-            )
+            known = f"it is {skill.signature}" + (f"; {_listed(makers)} gives one" if makers else "")
+            raise refused(line, f"`{skill.name}` takes {wanted} as its `{name}`, not {kind}; {known}")
     chosen = [kind for name, kind in kinds.items() if name in skill.alternatives]
     surely = sum(isinstance(kind, ValueType) and kind is not ValueType.NOTHING for kind in chosen)
     if skill.alternatives and (surely > 1 or all(kind is ValueType.NOTHING for kind in chosen)):
@@ -151,9 +145,8 @@ def check_arguments(line: int, skill: Skill, kinds: Mapping[str, "Guess"]) -> No
 
 def target_names(target: ast.expr) -> list[str]:
     """Return the names on the left side of an assignment."""
-    return [
-        each.id for each in (target.elts if isinstance(target, ast.Tuple) else [target]) if isinstance(each, ast.Name)
-    ]
+    targets = target.elts if isinstance(target, ast.Tuple) else [target]
+    return [each.id for each in targets if isinstance(each, ast.Name)]
 
 
 Guess = ValueType | None  # the kind of a value; None where only a run can tell
@@ -163,7 +156,7 @@ class _Checker:
     """Refuses a program that has a part that is none, or that must fail wherever it gets to what is wrong."""
 
     def __init__(self, statements: Sequence[ast.stmt]) -> None:
-        self.names = {name for one in statements for node in ast.walk(one) for name in _names_given(node)}
+        self.names = _names_given(statements)
         self.given: set[str] = set()  # the names that a line before gave a value
 
     def block(self, nodes: Sequence[ast.stmt], deep: int = 0, *, in_loop: bool = False) -> None:
@@ -189,7 +182,7 @@ class _Checker:
                 self.value(node.iter)
                 self.give(node.target)
                 # Any round but the first may use what a later line of the body gave.
-                self.given.update(*(_names_given(inner) for inner in ast.walk(node)))
+                self.given |= _names_given(node.body)
                 self.block(node.body, deep, in_loop=True)
             case ast.If():
                 chosen, otherwise = branches_of(node)
@@ -197,9 +190,7 @@ class _Checker:
                     self.value(each.test)
                     self.block(each.body, deep, in_loop=in_loop)
                 self.block(otherwise, deep, in_loop=in_loop)
-            case ast.Pass():
-                pass
-            case ast.Break() | ast.Continue() if in_loop:
+            case ast.Pass() | ast.Break() | ast.Continue() if in_loop or isinstance(node, ast.Pass):
                 pass
             case _:
                 raise _no_part(node)
@@ -278,24 +269,16 @@ class _Checker:
 
 def _constant(line: int, value: bool | str | float | None) -> ValueType:
     if isinstance(value, str) and (found := UNSAFE.search(value.replace("\n", "").replace("\t", ""))):
-        raise refused(
-            line, f"a string has the character U+{ord(found.group()):04X}, which is not seen or turns the direction of "
-            "writing; leave it out"
-        )  # fmt: skip
-    kind = kind_of(value)
-    if kind is ValueType.NUMBER:
+        why = "which is not seen or turns the direction of writing; leave it out"
+        raise refused(line, f"a string has the character U+{ord(found.group()):04X}, {why}")
+    if type(value) in (int, float):
         bounded(line, value)  # type: ignore[arg-type]
-    return kind
+    return kind_of(value)
 
 
-def _names_given(node: ast.AST) -> list[str]:
-    match node:
-        case ast.Assign(targets=targets):
-            return [name for target in targets for name in target_names(target)]
-        case ast.For(target=target) | ast.AugAssign(target=target):
-            return target_names(target)
-        case _:
-            return []
+def _names_given(statements: Sequence[ast.stmt]) -> set[str]:
+    parts = (part for statement in statements for part in ast.walk(statement) if isinstance(part, ast.Name))
+    return {part.id for part in parts if isinstance(part.ctx, ast.Store)}
 
 
 def _no_part(node: ast.stmt | ast.expr, part: ast.AST | None = None) -> ProgramError:

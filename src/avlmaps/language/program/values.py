@@ -32,16 +32,12 @@ def bounded(line: int, value: int | float) -> int | float:
 class Budget:
     """The limits of one run of a program; running past any of them stops it."""
 
-    steps: int = 100_000
-    """Parts of the program that are computed; going through a collection counts each of its elements."""
+    steps: int = 100_000  # parts of the program computed; going through a collection counts each of its elements
     skill_calls: int = 200
-    """Skills called."""
+    # Elements of collections and characters of strings made, also those in the trace; never given back.
     elements: int = 200_000
-    """Elements of collections and characters of strings made, also those in the trace; never given back."""
-    factors: int = 16
-    """Heatmaps multiplied into one."""
-    seconds: float = 1800.0
-    """Wall time, the skills' own included; looked at before each skill and now and then between."""
+    factors: int = 16  # heatmaps multiplied into one
+    seconds: float = 1800.0  # wall time, the skills' own included; looked at before each skill and now and then between
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,15 +59,12 @@ _WITHOUT_TRUTH = frozenset({_PLACE, _HEAT, ValueType.PICTURE, ValueType.CLIP})
 _NUMBERS = {(_NUMBER, _NUMBER): _NUMBER}
 _SAME = {(kind, kind): kind for kind in (_NUMBER, _PLACE, ValueType.STRING, ValueType.LIST, ValueType.TUPLE)}
 _SCALED = {(_PLACE, _NUMBER): _PLACE}
+_MULTIPLIED = _NUMBERS | _SCALED | {(_NUMBER, _PLACE): _PLACE, (_HEAT, _HEAT): _HEAT}
 # Of each operator: the kinds of its two sides and of its result, in words, and what it does.
 _ARITHMETIC: dict[str, tuple[dict[tuple[ValueType, ValueType], ValueType], str, Callable[[Any, Any], Any]]] = {
     "+": (_SAME, "two numbers, Places, strings, lists or tuples", operator.add),
     "-": (_NUMBERS | {(_PLACE, _PLACE): _PLACE}, "two numbers or two Places", operator.sub),
-    "*": (
-        _NUMBERS | _SCALED | {(_NUMBER, _PLACE): _PLACE, (_HEAT, _HEAT): _HEAT},
-        "two numbers, a Place and a number, or two Heats",
-        operator.mul,
-    ),
+    "*": (_MULTIPLIED, "two numbers, a Place and a number, or two Heats", operator.mul),
     "/": (_NUMBERS | _SCALED, "two numbers, or a Place and a number", operator.truediv),
     "//": (_NUMBERS, "two numbers", operator.floordiv),
     "%": (_NUMBERS, "two numbers", operator.mod),
@@ -136,10 +129,9 @@ def compared(line: int, sign: str, left: Value, right: Value) -> int:
     if sign in ("in", "not in"):
         needed(line, "in", right)
     if sign in ("<", "<=", ">", ">="):
-        if kind_of(left) is not kind_of(right) or kind_of(left) not in (_NUMBER, ValueType.STRING):
-            raise refused(
-                line, f"`{sign}` compares two numbers or two strings, not {kind_of(left)} and {kind_of(right)}"
-            )
+        kinds = kind_of(left), kind_of(right)
+        if kinds not in ((_NUMBER, _NUMBER), (ValueType.STRING, ValueType.STRING)):
+            raise refused(line, f"`{sign}` compares two numbers or two strings, not {kinds[0]} and {kinds[1]}")
     elif not sign.startswith("is"):
         needed(line, "compared", left)
         needed(line, "compared", right)

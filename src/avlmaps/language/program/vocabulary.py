@@ -17,7 +17,6 @@ from types import MappingProxyType, NoneType, UnionType
 from typing import Any, Protocol, Union, get_args, get_origin, runtime_checkable
 
 ROBOT = "robot"
-_ROBOT_CLASS = "avlmaps.navigate.skills", "Robot"
 
 
 class ValueType(StrEnum):
@@ -125,8 +124,7 @@ class Skill:
 @cache
 def skills() -> Mapping[str, Skill]:
     """Return the skills of the robot by their names, in the order in which its class declares them."""
-    module, name = _ROBOT_CLASS
-    methods = vars(getattr(import_module(module), name)).items()
+    methods = vars(import_module("avlmaps.navigate.skills").Robot).items()
     return MappingProxyType(
         {name: _skill(name, method) for name, method in methods if not name.startswith("_") and callable(method)}
     )

@@ -3,9 +3,11 @@
 A target that is needed more than once, or in a loop, is looked up once, so that all steps mean the same instance.
 """
 
+import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from keyword import kwlist
 from typing import Any
 
@@ -13,12 +15,9 @@ from avlmaps.language import intents as act
 from avlmaps.language.intents import Intent, Pick, Target, TargetKind, blocks_of, targets_of
 from avlmaps.language.program.parser import BUILTINS
 from avlmaps.language.program.vocabulary import skills
+from avlmaps.language.word_classes import table
 
 _RESERVED = frozenset({*map(str.lower, kwlist), *BUILTINS, "robot", "start", "place", "print"})
-_ARGUMENTS = {
-    TargetKind.OBJECT: "obj={}", TargetKind.SOUND: "sound={}", TargetKind.AREA: "area={}",
-    TargetKind.IMAGE: "img=robot.load_image({})", TargetKind.CLIP: "sound=robot.load_sound({})",
-}  # fmt: skip
 
 
 def write_program(intents: Sequence[Intent]) -> str:
@@ -115,8 +114,6 @@ class _Writer(act.Filled):
             return "robot.current_pos()"
         if target in self.names or self.needed[target] > 1 or target.pick is not Pick.ANY:
             return self.bound(target)
-        if target.kind is TargetKind.OBJECT and not target.near:
-            return _quoted(target.name)
         return self.query(target)
 
     def query(self, target: Target) -> str:
@@ -138,13 +135,11 @@ def _targets(intents: Sequence[Intent]) -> Iterator[Target]:
     return (target for intent in intents for target in targets_of(intent) if target.kind is not TargetKind.HERE)
 
 
-def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{escaped}"'
+_quoted = partial(json.dumps, ensure_ascii=False)
 
 
 def _argument(target: Target) -> str:
     if target.kind is TargetKind.HERE:
         raise ValueError("a program cannot look up where the robot stands")
     at = "" if target.at is None else f', at="{target.at}"'
-    return _ARGUMENTS[target.kind].format(_quoted(target.name)) + at
+    return table("intents")["names"]["arguments"][target.kind].format(_quoted(target.name)) + at
