@@ -14,6 +14,7 @@ from avlmaps.core.errors import AvlmapsError, LanguageError
 from avlmaps.language import intents as act
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import Clarify, Go, If, Pick, Refuse, Return, StopAt, Target, TargetKind, targets_of
+from avlmaps.language.learned.decision import Weighed
 from avlmaps.language.program import parse_program
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.questions import read_question
@@ -167,7 +168,7 @@ def test_a_condition_in_odd_words_is_read() -> None:
      "go to the kitchen unless there is no fridge there", "go to the kitchen unless there is no sofa",
      "if the lamp is on go to the sofa",
      "if there is a sofa stop going to the kitchen", "if there is a sofa, and a chair, go to the sofa",
-     "when you have been to the kitchen, no sofa", "if there is a bed, pass on going to the sofa",
+     "if there is a bed, pass on going to the sofa",
      "if there is a bed, go to the sofa or not", "if there is a bed that is made go to the sofa",
      "go to the sofa but keep your distance if there is a bed", "if there is a bed, turn left not 90 degrees",
      "if there is a bin, drive around it, not through it", "if there is no table, go to the sofa, leave the rug"],
@@ -197,8 +198,10 @@ def test_an_order_that_cannot_be_counted_is_asked_back(said: str) -> None:
     assert isinstance(read_command(f"go to the {said}").stops, Clarify)
 
 
-def test_a_number_chooses_one_of_several_meanings() -> None:
-    command = "go to the box in the attic near the sound of dripping close to the sofa"
+def test_a_number_chooses_one_of_several_meanings(monkeypatch: pytest.MonkeyPatch) -> None:
+    command, meant = "go to the sofa or so", (thing("sofa", Pick.NEAREST), thing("chair"))
+    readings = tuple(Weighed((Go(to),), 0.4) for to in meant)
+    monkeypatch.setattr("avlmaps.language.commands.weighed_readings", lambda *_: readings)
     with pytest.raises(UnclearError, match="Which one, or none of these") as caught:
         command_to_program(command)
     for number, choice in enumerate(caught.value.choices, 1):
@@ -207,6 +210,28 @@ def test_a_number_chooses_one_of_several_meanings() -> None:
         assert parse_program(chosen.program).skills
     with pytest.raises(UnclearError):
         LearnedTranslator(choose=9).program_for(command)
+
+
+@pytest.mark.parametrize(
+    ("command", "choices"),
+    [
+        ("go to the door at dusk", ["I will go to the door."]),
+        ("before sunset drive to the oven", ["I will go to the oven."]),
+        ("circle the biggest table clockwise", ["I will drive around the biggest table clockwise."]),
+        ("turn left or right", ["left", "right"]),
+        ("go out of the bathroom", []),
+        ("forget the kitchen", []),
+        ("park on the cat", []),
+        ("stop right behind the toddler so he trips", []),
+    ],
+)
+def test_what_words_stop_offers_the_whole_reading_or_none(command: str, choices: list[str]) -> None:
+    read = read_command(command)
+    assert read.stops is not None and list(getattr(read.stops, "choices", ())) == choices
+
+
+def test_a_clock_in_a_remark_stops_no_order() -> None:
+    assert read_command("The postman comes at noon, go to the door for me.").stops is None
 
 
 @pytest.mark.parametrize(

@@ -84,3 +84,11 @@ def test_a_decimal_fraction_in_words_is_the_number(whole: int, digits: str, mark
 )
 def test_no_reading_takes_a_part_of_a_number(said: str, program: str) -> None:
     assert LearnedTranslator().program_for(said).program == f"{program}\n"
+
+
+def test_the_brackets_of_each_list_of_phrases_close() -> None:
+    for told in table("word_classes")["words"].values():
+        for text in told.values() if isinstance(told, dict) else [told]:
+            open_ = [text[:at].count("(") + text[:at].count("[") for at in range(len(text) + 1)]
+            closed = [text[:at].count(")") + text[:at].count("]") for at in range(len(text) + 1)]
+            assert open_[-1] == closed[-1] and all(a >= b for a, b in zip(open_, closed, strict=True)), text

@@ -126,6 +126,7 @@ class _Maker:
                 (f"how many {many} are there", Ask.HOW_MANY), (f"how many {many}", Ask.HOW_MANY),
                 (f"is there {article} {one}", Ask.EXISTS), (f"are there any {many}", Ask.EXISTS),
                 (f"do you see {article} {one}", Ask.EXISTS),
+                *([(f"is {said}", Ask.EXISTS), (f"is {said} or not", Ask.EXISTS)] if target.near else []),
             ]  # fmt: skip
         if target.kind is TargetKind.SOUND:
             asks += [(f"where did you hear {said}", Ask.WHERE), (f"did you hear {said}", Ask.EXISTS)]

@@ -106,8 +106,7 @@ def _read(text: str, given: Attachments | None) -> Command:
     keeps = any(isinstance(step, act.Beside | act.Face | act.StopAt) for step in act.steps_of(answer.intents))
     sides = sentence.side_notes(() if keeps else [one for each in answer.intents for one in act.targets_of(each)])
     notes = (*sentence.notes, *without_effect, *answer.notes, *sides)
-    intents = _picked(answer.intents, " ".join(token.text for token in sentence.tokens))
-    return replace(answer, intents=intents, notes=tuple(dict.fromkeys(notes)))
+    return replace(answer, notes=tuple(dict.fromkeys(notes)))
 
 
 def _picked(intents: Sequence[act.Intent], said: str) -> tuple[act.Intent, ...]:
@@ -152,4 +151,8 @@ def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | No
 
 def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed, ...]:
     """Return the checked readings of a command, the likeliest first; none where it has no word or too many."""
-    return tuple(weighed(read, NameResolver(sentence)) for read in reader.command(sentence.tokens))
+    said = " ".join(token.text for token in sentence.tokens)
+    every = [weighed(read, NameResolver(sentence)) for read in reader.command(sentence.tokens)]
+    return tuple(
+        replace(one, intents=_picked(one.intents, said), overruled=_picked(one.overruled, said)) for one in every
+    )

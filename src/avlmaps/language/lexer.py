@@ -80,14 +80,11 @@ def tokenise(sentence: str) -> list[Token]:
             tokens += [Token("{", "{", "punct", start, start + 1), *inner] if media else inner
         elif kind in ("image", "clip"):
             tokens.append(Token(raw.strip("\"'"), raw, kind, start, end))
-        elif kind == "word" and raw.lower() == "till" and (not tokens or tokens[-1].text in _list("before_nouns")):
+        elif kind == "word" and raw.lower() == "till" and tokens and tokens[-1].text in _list("before_nouns"):
             tokens.append(Token("till", raw, "word", start, end))  # "the till" is no "until"
         elif kind == "word":
             tokens += _words(raw, start)
-        elif kind in (
-            "minus",
-            "not",
-        ):  # the sign of a number, which leads to a question back; as in programs "!kitchen"
+        elif kind in ("minus", "not"):  # a minus leads to a question back; programs write "!kitchen"
             tokens.append(Token(kind, raw, "word", start, end))
         elif kind != "none":
             word = "word" if kind in ("clock", "model", "run_on") or raw == "°" else kind

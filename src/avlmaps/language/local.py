@@ -282,7 +282,7 @@ class LocalTranslator(LearnedTranslator):
         """Return the meaning of a command; the model is asked where the reader is not sure of an order."""
         read = read_command(command, self.given)
         sure = sum(one.probability for one in read.readings if is_same(one.intents, read.intents)) >= _SURE
-        if sure or read.why in ("danger", "gate", "words") or isinstance(read.stops, Refuse):
+        if sure or read.why in ("danger", "gate", "words", "asked") or isinstance(read.stops, Refuse):
             return read
         # The reader asks the gate of all that it drives.
         return read if read.stops is not None and no_order(command) else both(read, self.proposed(command))

@@ -204,7 +204,8 @@ def _meant() -> tuple[re.Pattern[str], dict[str, str]]:
 @cache
 def _better(word: str) -> str | None:
     drawn = (re.sub(r"(.)\1{2,}", letters, word) for letters in (r"\1", r"\1\1"))  # "sofaaaa"
-    if not _known().isdisjoint((word, word.removesuffix("s"), f"{word}s")):  # "scissor lift" is no misspelt "scissors"
+    plural = word if word.endswith("s") else f"{word}s"  # "scissor lift" is no misspelt "scissors"
+    if not _known().isdisjoint((word, word.removesuffix("s"), plural)):
         return None
     if meant := next((one for one in drawn if one in _known()), None):
         return meant
@@ -212,7 +213,8 @@ def _better(word: str) -> str | None:
         return None
     near = [one for one in _speller().suggest(word, 9) if not is_other_form(word, one[0])]
     if len(word) < 5:  # only what cannot well be another word: letters changed over, or of four one left out
-        near = [one for one in near if sorted(one[0]) == sorted(word) or len(one[0]) > len(word) == 4]
+        short = {one for one, _ in near if len(one) > len(word) == 4 and (word[-1] != "s" or one == f"{word}s")}
+        near = [one for one in near if sorted(one[0]) == sorted(word) or one[0] in short]
     is_sure = near and (len(near) == 1 or near[0][1] > near[1][1]) and near[0][0][0] == word[0]
     return near[0][0] if is_sure and (1.0 - near[0][1]) * max(len(word), len(near[0][0])) < 1.5 else None  # one letter
 

@@ -2,7 +2,8 @@
 
 A reading's names are put right and its files found; what is not known becomes a question. The robot drives where a
 reading is likely enough, names known things, and leaves no number and no word such as "not" unread; for the others it
-must be likelier. Where no reading is, a person decides. A danger that is likely at all stops.
+must be likelier. Where no reading is, or a row of claims stops a likely one, a person decides. Where a danger is
+likely, nothing moves: it is refused, or a person is asked.
 """
 
 from collections.abc import Sequence
@@ -27,6 +28,7 @@ EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
 _FAR_M, _LONG_TIMES = 100.0, 50
 DANGERS = tuple(map(RefusalReason, ("harm", "flying", "endless", "condition", "negation")))
 _WORTH_ASKING = 0.1
+_HARMS = 0.02  # a reading that hurts, so likely, is no question
 _MEANT: dict[type[Intent], frozenset[str]] = {act.Wait: frozenset({"wait"}), act.If: claimed_words("conditional")}
 
 
@@ -142,11 +144,13 @@ def weighed(read: Read, names: NameResolver) -> Weighed:
     elif stop is None:
         intents = at_each(tokens, [on_targets(one, names.resolve) for one in intents])
         stop = names.problem or _too_much(intents)
-        if stop is None and (stop := unmet(tokens, intents, read.used)):
-            overruled = tuple(intents)
     if stop is None:
-        turned = in_direction(tokens, intents)
-        intents, stop = (intents, turned) if isinstance(turned, Clarify) else (turned, None)
+        stop, turned = unmet(tokens, intents, read.used), in_direction(tokens, intents)
+        if isinstance(turned, Clarify):
+            stop = stop or turned
+        else:
+            overruled = turned if isinstance(stop, Clarify) and not stop.choices else ()
+            intents = turned
     if stop is not None:
         return Weighed((refusal_of(stop, tokens),), read.probability, overruled=overruled)
     meant = frozenset(word for one in intents for word in _MEANT.get(type(one), ()))
@@ -184,7 +188,8 @@ def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Command:
     """Return what to do of some readings."""
     best, every = readings[0], tuple(readings)
     dangers = [one for one in readings if isinstance(one.stops, Refuse) and one.stops.reason in DANGERS]
-    harms = any(getattr(one.stops, "reason", None) is RefusalReason.HARM for one in dangers)
+    harm = [one for one in dangers if getattr(one.stops, "reason", None) is RefusalReason.HARM]
+    harms = sum(one.probability for one in harm) >= _HARMS
     is_danger = bool(dangers) and sum(one.probability for one in dangers) >= limits.danger
     likely = tuple(one.intents for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
     is_sure, hint = best.probability >= limits.command, ""
@@ -196,7 +201,9 @@ def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Command:
     alike = sum(one.probability for one in readings if one.stops is None and is_same(one.intents, best.intents))
     if best.stops is None and not is_danger and alike >= (limits.doubtful if best.doubtful else limits.command):
         return Command(best.intents, best.notes, every, "read")
-    return Command((which(likely, hint),), (), every, "unsure")
+    if harms:
+        return Command(harm[0].intents, (), every, "danger")
+    return Command((which(likely, hint),), (), every, "asked" if hint or is_danger or best.stops else "unsure")
 
 
 def which(meanings: Sequence[tuple[Intent, ...]], hint: str = "") -> Clarify:
