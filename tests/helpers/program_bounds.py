@@ -21,13 +21,9 @@ from typing import Any
 _MOST = 20_000
 # Names by the kind of value that they keep, so that most programs pass the checks and run.
 _NAMES = {
-    "number": ("n", "m"),
-    "truth": ("p", "q"),
-    "list": ("a", "b"),
-    "tuple": ("u", "v"),
-    "string": ("s", "t"),
+    "number": ("n", "m"), "truth": ("p", "q"), "list": ("a", "b"), "tuple": ("u", "v"), "string": ("s", "t"),
     "heat": ("h",),
-}
+}  # fmt: skip
 _LEAVES = {
     "number": ("1", "0", "2.5", "7"),
     "truth": ("True", "False", "n < m", "1 in a", "u == v"),

@@ -14,19 +14,9 @@ from typing import Any
 from avlmaps.navigate.skills import Robot
 
 _PURE = {
-    "load_image",
-    "load_sound",
-    "get_major_map",
-    "get_map",
-    "get_pos",
-    "get_max_pos_3d",
-    "get_contour",
-    "get_nearest_pos",
-    "get_all_pos",
-    "get_nth_pos",
-    "exists",
-    "get_distance",
-}
+    "load_image", "load_sound", "get_major_map", "get_map", "get_pos", "get_max_pos_3d", "get_contour",
+    "get_nearest_pos", "get_all_pos", "get_nth_pos", "exists", "get_distance",
+}  # fmt: skip
 _WHERE_IT_STANDS = "current_pos"
 _MOST_TURNS_OF_A_LOOP = 50
 

@@ -34,17 +34,11 @@ REACHED = {
 
 # Of every other sentence of many speakers: as many are right at least, and misread at most.
 SPEAKERS = {
-    "speakers_commands.jsonl": (254, 4),
-    "speakers_commands_2.jsonl": (54, 2),
-    "speakers_commands_3.jsonl": (34, 2),
-    "speakers_commands_4.jsonl": (31, 2),
-    "speakers_commands_5.jsonl": (30, 2),
-    "speakers_questions.jsonl": (110, 3),
-    "speakers_questions_2.jsonl": (29, 2),
-    "speakers_questions_3.jsonl": (19, 2),
-    "speakers_questions_4.jsonl": (17, 2),
+    "speakers_commands.jsonl": (254, 4), "speakers_commands_2.jsonl": (54, 2), "speakers_commands_3.jsonl": (34, 2),
+    "speakers_commands_4.jsonl": (31, 2), "speakers_commands_5.jsonl": (30, 2), "speakers_questions.jsonl": (110, 3),
+    "speakers_questions_2.jsonl": (29, 2), "speakers_questions_3.jsonl": (19, 2), "speakers_questions_4.jsonl": (17, 2),
     "speakers_questions_5.jsonl": (17, 2),
-}
+}  # fmt: skip
 
 
 @pytest.mark.few(6)
@@ -215,16 +209,12 @@ def test_a_number_chooses_one_of_several_meanings(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize(
     ("command", "choices"),
     [
-        ("go to the door at dusk", ["I will go to the door."]),
-        ("before sunset drive to the oven", ["I will go to the oven."]),
+        ("go to the door at dusk", ["I will go to the door."]), ("forget the kitchen", []), ("park on the cat", []),
+        ("before sunset drive to the oven", ["I will go to the oven."]), ("turn left or right", ["left", "right"]),
         ("circle the biggest table clockwise", ["I will drive around the biggest table clockwise."]),
-        ("turn left or right", ["left", "right"]),
-        ("go out of the bathroom", []),
-        ("forget the kitchen", []),
-        ("park on the cat", []),
-        ("stop right behind the toddler so he trips", []),
+        ("go out of the bathroom", []), ("stop right behind the toddler so he trips", []),
     ],
-)
+)  # fmt: skip
 def test_what_words_stop_offers_the_whole_reading_or_none(command: str, choices: list[str]) -> None:
     read = read_command(command)
     assert read.stops is not None and list(getattr(read.stops, "choices", ())) == choices

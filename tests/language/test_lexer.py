@@ -1,5 +1,7 @@
 """Amounts in words and figures: lengths in metres, times in seconds, and where each ends."""
 
+from itertools import accumulate
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -89,6 +91,5 @@ def test_no_reading_takes_a_part_of_a_number(said: str, program: str) -> None:
 def test_the_brackets_of_each_list_of_phrases_close() -> None:
     for told in table("word_classes")["words"].values():
         for text in told.values() if isinstance(told, dict) else [told]:
-            open_ = [text[:at].count("(") + text[:at].count("[") for at in range(len(text) + 1)]
-            closed = [text[:at].count(")") + text[:at].count("]") for at in range(len(text) + 1)]
-            assert open_[-1] == closed[-1] and all(a >= b for a, b in zip(open_, closed, strict=True)), text
+            depths = accumulate({"(": 1, "[": 1, ")": -1, "]": -1}.get(mark, 0) for mark in text)
+            assert min(found := [0, *depths]) == 0 == found[-1], text

@@ -36,22 +36,17 @@ OPPOSITES = (
     "go to the {1} furthest away from the {0}", "keep away from the {0}", "go anywhere but the {0}",
 )  # fmt: skip
 DELAYS = (
-    "go to the door {} from now",
-    "in {} go to the door",
-    "after {} go to the door",
-    "go to the door in {}",
+    "go to the door {} from now", "in {} go to the door", "after {} go to the door", "go to the door in {}",
     "go to the door after {}",
-)
+)  # fmt: skip
 FEW = settings(deadline=None)
 
 
 def intents(command: str) -> tuple[object, ...]:
-    """Return what a command asks for."""
     return read_command(command).intents
 
 
 def stops(command: str, given: Attachments | None = None) -> Command:
-    """Return a reading that does not move the robot."""
     read = read_command(command, given)
     assert read.stops is not None, f"{command!r} drives: {verbalise(read.intents)}"
     return read

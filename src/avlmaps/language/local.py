@@ -306,7 +306,8 @@ def both(read: Command, proposed: Weighed | None) -> Command:
     if likely and (read.stops is not None or is_same(read.intents, proposed.intents)):
         notes = (*read.notes, *likely[0].notes, "The language model reads it likewise.")
         return replace(read, intents=likely[0].intents, notes=tuple(dict.fromkeys(notes)), why="read")
-    meanings = (proposed.intents,) if read.stops is not None else (read.intents, proposed.intents)
+    own = (read.intents,) if read.stops is None else getattr(read.stops, "meanings", ())[:2]
+    meanings = (*own, proposed.intents)
     return replace(read, intents=(which(meanings),), why="unsure")
 
 
