@@ -16,8 +16,8 @@ NAMED = {
 }  # fmt: skip
 # Words of several languages, or of one that the book does not hold.
 UNNAMED = [
-    "va a la x", "vai a la porta", "ir a la mesa", "gå til køkkenet", "jdi do kuchyně", "menj a konyhába", "台所へ", "去厨房",
-    "иди на кухню", "اذهب إلى المطبخ",
+    "va a la x", "vai a la porta", "ir a la mesa", "gå til køkkenet", "jdi do kuchyně", "menj a konyhába", "台所へ",
+    "去厨房", "иди на кухню", "اذهب إلى المطبخ",
 ]  # fmt: skip
 ENGLISH = ["go to the café", "find the piñata", "dove", "the metro", "a sedan", "the chaise longue", "go to the salón"]
 
