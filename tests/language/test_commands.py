@@ -230,7 +230,7 @@ def test_a_clock_in_a_remark_stops_no_order() -> None:
         ("There's a draught coming from the bathroom", "remark"),
         ("'Go to the window,' she whispered, and the curtain fell", "tells of a drive"),
         ("At quarter past three the lads will be going to the kitchen", "no order that the robot understands"),
-        ("go to the kitchen tomorrow", "waits for no event"),
+        ("go to the kitchen in the morning", "knows no clock"),
         ("if it rains go to the sofa", "waits for no event"),
         ("go to each door, turn around and wait 2 seconds at each", "knows only to wait"),
         ("drive in a square", "say its sides"),

@@ -188,22 +188,22 @@ def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Command:
     """Return what to do of some readings."""
     best, every = readings[0], tuple(readings)
     dangers = [one for one in readings if isinstance(one.stops, Refuse) and one.stops.reason in DANGERS]
-    harm = [one for one in dangers if getattr(one.stops, "reason", None) is RefusalReason.HARM]
-    harms = sum(one.probability for one in harm) >= _HARMS
+    harms = [one for one in dangers if one.stops == Refuse(RefusalReason.HARM)]
+    hurts = sum(one.probability for one in harms) >= _HARMS
     is_danger = bool(dangers) and sum(one.probability for one in dangers) >= limits.danger
-    likely = tuple(one.intents for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
-    is_sure, hint = best.probability >= limits.command, ""
-    if best.overruled and is_sure:  # a person decides between the words of a row and the networks
-        likely, is_sure, hint = (best.overruled,), False, f"{verbalise(best.intents)} "
-    asks = likely and not harms and (best.stops is None or hint or not (is_sure or is_danger))
-    if (is_danger or best.stops is not None) and not asks:
-        return Command((dangers[0] if is_danger else best).intents, (), every, "danger" if is_danger else "stop")
     alike = sum(one.probability for one in readings if one.stops is None and is_same(one.intents, best.intents))
     if best.stops is None and not is_danger and alike >= (limits.doubtful if best.doubtful else limits.command):
         return Command(best.intents, best.notes, every, "read")
-    if harms:
-        return Command(harm[0].intents, (), every, "danger")
-    return Command((which(likely, hint),), (), every, "asked" if hint or is_danger or best.stops else "unsure")
+    likely = tuple(one.intents for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
+    is_sure, hint = best.probability >= limits.command, ""
+    if best.overruled and is_sure:  # a person decides between the words of a row and the networks
+        likely, hint = (best.overruled,), f"{verbalise(best.intents)} "
+    asks = likely and (best.stops is None or hint or not (is_sure or is_danger))
+    if (is_danger or best.stops is not None) and (hurts or not asks):
+        return Command((dangers[0] if is_danger else best).intents, (), every, "danger" if is_danger else "stop")
+    if hurts:
+        return Command(harms[0].intents, (), every, "danger")
+    return Command((which(likely, hint),), (), every, "asked" if is_danger or best.stops else "unsure")
 
 
 def which(meanings: Sequence[tuple[Intent, ...]], hint: str = "") -> Clarify:
