@@ -163,6 +163,7 @@ def test_a_condition_in_odd_words_is_read() -> None:
      "if the lamp is on go to the sofa",
      "if there is a sofa stop going to the kitchen", "if there is a sofa, and a chair, go to the sofa",
      "if there is a bed, pass on going to the sofa",
+     pytest.param("when you have been to the kitchen, no sofa", marks=pytest.mark.xfail(reason=".87, limit .85")),
      "if there is a bed, go to the sofa or not", "if there is a bed that is made go to the sofa",
      "go to the sofa but keep your distance if there is a bed", "if there is a bed, turn left not 90 degrees",
      "if there is a bin, drive around it, not through it", "if there is no table, go to the sofa, leave the rug"],

@@ -9,10 +9,9 @@ from avlmaps.language.intents import Clarify
 from avlmaps.language.sentence import language_of
 
 NAMED = {
-    "va a la cocina": "Spanish", "va en la cuisine": "French", "va alla porta": "Italian",
+    "va a la cocina": "Spanish", "va en la cuisine": "French", "va alla porta": "Italian", "alto!": "Spanish",
     "gehe in die Küche": "German", "va para a cozinha": "Portuguese", "ga naar de keuken": "Dutch",
-    "gå till köket": "Swedish",
-    "idź do kuchni": "Polish", "mutfağa git": "Turkish", "pergi ke dapur": "Indonesian", "alto!": "Spanish",
+    "gå till köket": "Swedish", "idź do kuchni": "Polish", "mutfağa git": "Turkish", "pergi ke dapur": "Indonesian",
 }  # fmt: skip
 # Words of several languages, or of one that the book does not hold.
 UNNAMED = [
