@@ -27,6 +27,7 @@ from avlmaps.language.word_classes import table
 EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
 _FAR_M, _LONG_TIMES = 100.0, 50
 DANGERS = tuple(map(RefusalReason, ("harm", "flying", "endless", "condition", "negation")))
+_OFFERS_NONE = (RefusalReason.HARM, RefusalReason.FLYING, RefusalReason.UNKNOWN)
 _WORTH_ASKING = 0.1
 _HARMS = 0.02  # a reading that hurts, so likely, is no question
 _MEANT: dict[type[Intent], frozenset[str]] = {act.Wait: frozenset({"wait"}), act.If: claimed_words("conditional")}
@@ -149,7 +150,7 @@ def weighed(read: Read, names: NameResolver) -> Weighed:
         if isinstance(turned, Clarify):
             stop = stop or turned
         else:
-            overruled = turned if isinstance(stop, Clarify) and not stop.choices else ()
+            overruled = () if getattr(stop, "choices", ()) or getattr(stop, "reason", "") in _OFFERS_NONE else turned
             intents = turned
     if stop is not None:
         return Weighed((refusal_of(stop, tokens),), read.probability, overruled=overruled)
@@ -194,15 +195,14 @@ def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Command:
     alike = sum(one.probability for one in readings if one.stops is None and is_same(one.intents, best.intents))
     if best.stops is None and not is_danger and alike >= (limits.doubtful if best.doubtful else limits.command):
         return Command(best.intents, best.notes, every, "read")
-    likely = tuple(one.intents for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
-    is_sure, hint = best.probability >= limits.command, ""
-    if best.overruled and is_sure:  # a person decides between the words of a row and the networks
-        likely, hint = (best.overruled,), f"{verbalise(best.intents)} "
-    asks = likely and (best.stops is None or hint or not (is_sure or is_danger))
-    if (is_danger or best.stops is not None) and (hurts or not asks):
-        return Command((dangers[0] if is_danger else best).intents, (), every, "danger" if is_danger else "stop")
-    if hurts:
-        return Command(harms[0].intents, (), every, "danger")
+    # A person decides where a refusal is not sure, and between the words of a row and the networks.
+    is_sure, hint = best.probability >= limits.command, f"{verbalise(best.intents)} " if best.overruled else ""
+    drives = (one.overruled or one.intents for one in readings if one.probability >= _WORTH_ASKING)
+    likely = (best.overruled,) if hint and is_sure else tuple(one for one in drives if Meaning(one).stops is None)
+    is_refused = (best.stops is not None and is_sure and not hint) or not likely or hurts
+    if is_refused and (is_danger or best.stops is not None or hurts):
+        first = dangers[0] if is_danger else best if best.stops is not None else harms[0]
+        return Command(first.intents, (), every, "danger" if first in dangers else "stop")
     return Command((which(likely, hint),), (), every, "asked" if is_danger or best.stops else "unsure")
 
 
@@ -213,7 +213,7 @@ def which(meanings: Sequence[tuple[Intent, ...]], hint: str = "") -> Clarify:
     if len(choices) > 1:
         each = " ".join(f"{number}: {choice}" for number, choice in enumerate(choices, 1))
         by_number = f"Choose it by its number ({option('choose', '1')})."
-        return Clarify(f"This can mean several things. {each} Which one, or none of these? {by_number}", choices, meant)
+        return Clarify(f"{hint}This can mean several things. {each} Which one, or none of these? {by_number}", choices, meant)
     if choices:
         return Clarify(f"{hint}Is this what you mean? {choices[0]} If not, say it in other words.", choices, meant)
     return Clarify("This is not clear. Can you say it in other words?")
