@@ -7,7 +7,7 @@ reader takes the state of each word in its sentence behind three layers, the gat
 import json
 import re
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
@@ -41,6 +41,7 @@ class English:
         facts, graphs = loaded(WEIGHTS, "The gate of commands", "gate", ("gate", "order"))
         self._pieces, self.limit = WordPieces(facts["pieces"]), float(facts["limit"])
         self._layers, self._order = map(open_network, graphs)
+        self._run = lru_cache(maxsize=64)(self._states_of)  # the gate and the reader often ask for one line
 
     def no_order(self, text: str) -> float:
         """Return how likely a sentence is no order; pictures in it say nothing."""
@@ -51,7 +52,7 @@ class English:
 
     def sentence(self, text: str) -> Float32[np.ndarray, "n 384"]:
         """Return the states of a sentence's pieces, of its begin and of its end."""
-        return self._run(self._rows(text)[:_MOST_PIECES])
+        return self._run(tuple(self._rows(text)[:_MOST_PIECES]))
 
     def states(self, words: Sequence[str]) -> Float32[np.ndarray, "n 384"]:
         """Return the state of each word in its sentence, the mean of its pieces'; 0 for words beyond the last piece."""
@@ -59,7 +60,7 @@ class English:
         owners = np.repeat(np.arange(len(each)), [len(rows) for rows in each])[:_MOST_PIECES]
         found = [row for rows in each for row in rows][:_MOST_PIECES]
         states = np.zeros((len(words), WIDTH), np.float32)
-        np.add.at(states, owners, self._run(found)[1:-1])
+        np.add.at(states, owners, self._run(tuple(found))[1:-1])
         return states / np.maximum(np.bincount(owners, minlength=len(words)), 1)[:, None].astype(np.float32)
 
     def _rows(self, text: str) -> list[int]:
@@ -67,7 +68,7 @@ class English:
         unknown = [self._pieces.rows["[UNK]"]]
         return [row for word in _WORD.findall(plain) for row in self._pieces.rows_of_word(word) or unknown]
 
-    def _run(self, found: list[int]) -> Float32[np.ndarray, "n 384"]:
+    def _states_of(self, found: tuple[int, ...]) -> Float32[np.ndarray, "n 384"]:
         rows = self._pieces.rows
         line = np.array([[rows["[CLS]"], *found, rows["[SEP]"]]], np.int64)
         return np.asarray(self._layers.run(["states"], {"pieces": line})[0])[0]
