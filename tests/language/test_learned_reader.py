@@ -206,7 +206,7 @@ def test_a_refusal_beside_a_likely_drive_asks_about_the_drive_and_harm_refuses(
     drives, stops = Weighed(first, likely), Weighed(second, 1.0 - likely)
     answer = decided(sorted([drives, stops], key=lambda one: -one.probability), ReadingLimits())
     refuses = second == (Refuse(RefusalReason.HARM, "no"),)
-    refuses = refuses or (stops.probability > likely and getattr(second[0], "reason", None) in DANGERS)
+    refuses = refuses or stops.probability >= ReadingLimits().command
     assert answer.intents == second if refuses else getattr(answer.intents[0], "meanings", ()) == (first,)
 
 

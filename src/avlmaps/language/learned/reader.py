@@ -61,6 +61,7 @@ class Read:
 class _Open:
     symbols: tuple[linear.Symbol, ...]
     log: float
+    last: linear.Symbol  # what the line goes on from
     first: Float32[np.ndarray, " d"]
     second: Float32[np.ndarray, " d"]
 
@@ -117,31 +118,31 @@ class LearnedReader:
         seen = features(tokens, self._vocabulary)
         sentence: Any = self._words.run(None, {name: array[None] for name, array in seen._asdict().items()})
         states, begin = sentence
-        beam = [_Open((), 0.0, begin[0, 0], begin[0, 0])]
+        beam = [_Open((), 0.0, start, begin[0, 0], begin[0, 0])]
         done: list[Line] = []
         for _ in range(linear.MOST_SYMBOLS):
-            last = np.array([[_number((start, *one.symbols)[-1])] for one in beam], np.int64)
+            last = np.array([[_number(one.last)] for one in beam], np.int64)
             outputs: Any = self._step.run(
                 None,
                 {"last": last, "states": states, "first": np.stack([one.first for one in beam])[None],
                  "second": np.stack([one.second for one in beam])[None]},
             )  # fmt: skip
             said, first, second = outputs
-            after: list[tuple[float, int, linear.Symbol]] = []
+            after: list[tuple[float, int, linear.Symbol, linear.Symbol]] = []
             for at, one in enumerate(beam):
                 may = grammar.read(one.symbols)
                 assert isinstance(may, linear.Open)
-                after += [(one.log + log, at, symbol) for symbol, log in _following(may, said[at], texts)]
+                after += [(one.log + log, at, *each) for *each, log in _following(may, said[at], texts, one.last)]
             after.sort(key=lambda each: (-each[0], each[1], str(each[2])))
             opened: list[_Open] = []
-            for log, at, symbol in after[: _BEAM * 2]:
+            for log, at, symbol, goes_on in after[: _BEAM * 2]:
                 if log < _LEAST or len(opened) == _BEAM:
                     break
                 symbols = (*beam[at].symbols, symbol)
                 if symbol == "end":
                     done.append(Line(symbols, log))
                 else:
-                    opened.append(_Open(symbols, log, first[0, at], second[0, at]))
+                    opened.append(_Open(symbols, log, goes_on, first[0, at], second[0, at]))
             best = max((line.log for line in done), default=-np.inf)
             beam = [one for one in opened if one.log > best - 4.0]
             if not beam or len(done) >= 2 * _BEAM:
@@ -150,17 +151,25 @@ class LearnedReader:
 
 
 def _following(
-    may: linear.Open, said: Float32[np.ndarray, " k"], texts: Sequence[str]
-) -> list[tuple[linear.Symbol, float]]:
-    """Return what may follow, likely enough to matter; a name's word may stand at any of its places."""
-    found: list[tuple[linear.Symbol, float]] = [(symbol, float(said[linear.INDEX[symbol]])) for symbol in may.symbols]
+    may: linear.Open, said: Float32[np.ndarray, " k"], texts: Sequence[str], last: linear.Symbol
+) -> list[tuple[linear.Symbol, linear.Symbol, float]]:
+    """Return what may follow, likely enough to matter, each with what the line goes on from.
+
+    A name's word may stand at any of its places. The line goes on from the place that training takes (`align.py`): the
+    first, of a further word the one closest behind the word before.
+    """
+    found: list[tuple[linear.Symbol, linear.Symbol, float]] = [
+        (symbol, symbol, float(said[linear.INDEX[symbol]])) for symbol in may.symbols
+    ]
     places: dict[str | int, list[int]] = {}
     for at in sorted(may.tokens):
         places.setdefault(texts[at] if may.names else at, []).append(at)
+    before = last if isinstance(last, int) else -len(texts)
     for alike in places.values():
         logs = said[[_number(at) for at in alike]]
-        found.append((alike[int(logs.argmax())], float(np.logaddexp.reduce(logs))))
-    return [one for one in found if one[1] > _LEAST]
+        goes_on = min(alike, key=lambda at: abs(at - before - 1))
+        found.append((alike[int(logs.argmax())], goes_on, float(np.logaddexp.reduce(logs))))
+    return [one for one in found if one[2] > _LEAST]
 
 
 def _number(symbol: linear.Symbol) -> int:
