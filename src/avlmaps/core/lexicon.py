@@ -147,9 +147,9 @@ class Lexicon:
             return None
         for start, end in ((at, end) for at in range(_link(words)) for end in range(len(words) - 1, at, -1)):
             name, rest = " ".join(words[start:end]), " ".join(words[end:])
-            room, thing = self.find(name, EntryKind.ROOM), self.head(rest, EntryKind.THING)
-            is_place = room is not None and not room.generic and name not in self.room_kinds
-            if is_place and thing is not None and self.find(name, EntryKind.THING) is None and own in (None, thing):
+            room, thing = self.find(name), self.head(rest, EntryKind.THING)  # what is a thing too is no place
+            is_place = room is not None and room.kind is EntryKind.ROOM and name not in self.room_kinds
+            if is_place and thing and own in (None, thing):
                 return " ".join([*words[:start], rest]), name
         return None
 

@@ -127,7 +127,7 @@ def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
 
 def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
     how = "on" if said["how"].startswith("on") else said["how"] and "near"
-    how = "in" if pattern(_TABLE, "in").fullmatch(said["how"]) else how
+    how = "rooms" if said["names"] else "in" if pattern(_TABLE, "in").fullmatch(said["how"]) else how
     said["room" if of is Listed.CHANGES or how == "in" else "thing"] += said["place"]
     room, thing = mended(said["room"]) or said["room"], said["thing"]
     is_room = not room or lexicon().find(room, EntryKind.ROOM) is not None
@@ -137,7 +137,6 @@ def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
     change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(said["change"])), "")
     thing = _several(thing) if of is Listed.ROOMS_WITH else thing
     name, since = room or thing or said["seen"], said["visit"] + said["date"]
-    how = "rooms" if said["names"] else how
     return ListQuestion(of, name, counts=bool(said["counts"]), since=since, change=change, how=how, other=said["other"])
 
 
@@ -169,8 +168,8 @@ def said_alternatives(text: str) -> tuple[str, ...]:
     names = [re.sub(f"^{words_of(_TABLE)['article']}", "", found[name]) for name in ("one", "other")] if found else []
     if found is None or not all(map(lexicon().head, names)):
         return said_each(text, "or")
-    hows = found["how"], found["also"] or found["how"]
-    return tuple(f"{found['begin']} {how} the {name}" for how, name in zip(hows, names, strict=True))
+    begin, how, also = found.group("begin", "how", "also")
+    return f"{begin} {how} the {names[0]}", f"{begin} {also or how} the {names[1]}"
 
 
 def said_each(text: str, joins: str = "and") -> tuple[str, ...]:
@@ -179,8 +178,7 @@ def said_each(text: str, joins: str = "and") -> tuple[str, ...]:
     "When did you hear the dog and the phone": what is asked comes first, in words that name nothing.
     """
     first, *others = (one.split() for one in re.split(f",? {joins} |, ?", _plain(text)))
-    articles = frozenset(words_of(_TABLE)["articles"].split())
-    asking = articles | frozenset(words_of(_TABLE)["asking"].split())
+    articles, asking = (frozenset(words_of(_TABLE)[name].split()) for name in ("articles", "asking"))
     begin = next((number for number, word in enumerate(first) if word not in asking), len(first))
     # "How many beds and how many sofas" asks again.
     again = (words[begin if words[:begin] == first[:begin] else 0 :] for words in others)
