@@ -106,6 +106,26 @@ def test_the_head_is_the_longest_known_tail_before_what_describes_it(phrase: str
     assert (head.name if head else None) == name
 
 
+@pytest.mark.parametrize(
+    ("phrase", "placed"),
+    [
+        ("red kitchen chairs", ("red chairs", "kitchen")), ("bathroom sink", ("sink", "bathroom")),
+        ("living room sofa", ("sofa", "living room")), ("kitchen chest of drawers", ("chest of drawers", "kitchen")),
+        *dict.fromkeys(["kitchen cabinet", "kitchen cabinets", "office chair", "sofa bed", "office kitchen", "gym bag",
+                        "garden chair", "toilet brush", "kitchen", "chair", "bottle of kitchen cleaner"]).items(),
+    ],
+)  # fmt: skip
+def test_a_room_before_a_thing_says_where_it_is_unless_the_whole_is_a_thing(
+    phrase: str, placed: tuple[str, str] | None
+) -> None:
+    assert KNOWN.in_room(phrase) == placed
+
+
+@given(st.sampled_from(ENTRIES))
+def test_an_entry_is_in_no_room(entry: Entry) -> None:
+    assert all(KNOWN.in_room(name) is None for name in (entry.name, *entry.synonyms))
+
+
 def test_one_word_may_have_several_senses_and_several_kinds() -> None:
     assert [entry.name for entry in KNOWN.senses("hall", EntryKind.ROOM)] == ["hallway", "entrance hall"]
     assert {entry.kind for entry in KNOWN.senses("toilet")} == {EntryKind.THING, EntryKind.ROOM}

@@ -8,9 +8,11 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import QueryError
 from avlmaps.language.commands import read_command
+from avlmaps.language.intents import Go, Target, TargetKind
 from avlmaps.language.list_questions import said_alternatives
 from avlmaps.language.questions import read_question
 from avlmaps.language.sentence import Attachments
+from avlmaps.language.verbalise import MISSING
 from avlmaps_sim.bench.language import Judged, judge, read_list
 
 LISTS = Path(__file__).parent / "commands"
@@ -73,12 +75,6 @@ def test_what_a_map_holds_is_asked_of_both_names(thing: str, room: str, asks: st
     assert [target.name, *(near.name for near in target.near)] == [thing, room]
 
 
-@given(how=st.sampled_from(["near", "in", "beside", "next to"]), one=THINGS, other=THINGS)
-def test_either_of_two_places_is_asked_for(how: str, one: str, other: str) -> None:
-    found = said_alternatives(f"is there a chair {how} the {one} or the {other}")
-    assert found == (f"is there a chair {how} the {one}", f"is there a chair {how} the {other}")
-
-
 @pytest.mark.parametrize("name", ["heat gun", "label maker", "yoga mat"])
 @pytest.mark.parametrize("asks", ["do we have a {}", "where did I leave the {}", "where do we keep the {}"])
 def test_a_name_that_no_list_has_is_no_purpose(name: str, asks: str) -> None:
@@ -123,10 +119,22 @@ def test_a_thing_is_not_chosen_by_its_hand(side: str) -> None:
     assert is_refused(f"where is the {side} hand lamp")
 
 
-@given(one=THINGS, room=ROOMS)
-def test_alternatives_may_have_prepositions_of_their_own(one: str, room: str) -> None:
-    found = said_alternatives(f"is there a chair by the {one} or in the {room}")
-    assert found == (f"is there a chair by the {one}", f"is there a chair in the {room}")
+@given(one=THINGS, room=ROOMS, how=st.sampled_from(["by", "near", "next to"]), also=st.sampled_from(["", "in "]))
+def test_either_of_two_places_is_asked_for(one: str, room: str, how: str, also: str) -> None:
+    found = said_alternatives(f"is there a chair {how} the {one} or {also}the {room}")
+    assert found == (f"is there a chair {how} the {one}", f"is there a chair {also or how + ' '}the {room}")
+
+
+@pytest.mark.parametrize("name", ["picture", "photo", "photograph"])
+def test_a_picture_is_a_thing_where_no_file_is_meant(name: str) -> None:
+    order, room = f"go to the {name} in the living room", Target(TargetKind.AREA, "living room")
+    (go,) = read_command(order).intents
+    assert go == Go(Target(TargetKind.OBJECT, name, (room,)))
+    assert read_question(f"where is the {name}?").inquiry.of == (Target(TargetKind.OBJECT, name),)
+    for said in (f"go to where the {name} was taken", f"go to this {name}", f"go to the place in the {name}"):
+        assert read_command(said).stops == MISSING[TargetKind.IMAGE]
+        (go,) = read_command(said, Attachments("view.png")).intents
+        assert go == Go(Target(TargetKind.IMAGE, "view.png"))
 
 
 @given(st.sampled_from(["milk", "water", "coffee"]), ROOMS)

@@ -19,7 +19,7 @@ UNDERSTOOD = {
     "go to the barking of a dog": [("sound", "dog barking")],
     "the sound of a baby crying": [("sound", "baby crying")],
     "the table in the kitchen": [("object", "table"), ("area", "kitchen")],
-    "the kitchen table": [("object", "kitchen table")],
+    "the kitchen table": [("object", "table"), ("area", "kitchen")],
     "show me the living room": [("area", "living room")],
     "the chair near this photo ./x.png": [("object", "chair"), ("image", "./x.png")],
     'the chair beside "my photos/a b.JPG"': [("object", "chair"), ("image", "my photos/a b.JPG")],

@@ -1,5 +1,6 @@
 """Which chair is meant, where it is and what it covers, asked of a map; which files a program may read."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,7 +19,7 @@ from avlmaps.language.program.vocabulary import Picture, Place
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.file_access import Readable, named_files, offered_by
 from avlmaps.navigate.footprint import Outline, middle_between
-from avlmaps.navigate.grounding import Destination, nearest
+from avlmaps.navigate.grounding import Destination, fit_equally, nearest
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.voxel_space import Space
 from helpers.kinematic import KinematicDriver
@@ -228,8 +229,9 @@ def test_things_that_are_never_together_are_told_apart_from_things_that_are_miss
     views = np.array([[1.0, 0.0]], np.float32)
     robot = furnished_robot(views=FakeViews(), keyframes=keyframes_at(np.array([[60.0, 60.0, 1.2]]), views))
     heat = robot.get_major_map(obj="chair") * robot.get_map(area="kitchen")
-    with pytest.raises(GoalNotFoundError, match="do not come together anywhere"):
-        robot.move_to(heat)
+    for target in (heat, robot.get_major_map(obj="kitchen chair"), "kitchen chair"):
+        with pytest.raises(GoalNotFoundError, match=r"'chair' near 'kitchen' .*do not come together anywhere"):
+            robot.move_to(target)
 
 
 def test_exactly_one_thing_is_asked_for_at_a_time() -> None:
@@ -332,6 +334,8 @@ def test_no_thing_is_nearest_that_is_less_than_half_as_likely_as_the_best(
     ]
     chosen = nearest(things, np.zeros(2))
     assert 2.0 * chosen.probability >= things[0].probability
+    half = fit_equally([replace(one, half=True) for one in things])
+    assert [one.place[0] for one in half] == [one.place[0] for one in things if one.found] or len(half) == 1
     near = [one for one in things if one.found and 2.0 * one.probability >= things[0].probability]
     assert all(chosen.place[0] <= one.place[0] for one in near)
 

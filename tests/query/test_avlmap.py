@@ -185,6 +185,10 @@ def test_an_area_is_told_from_other_areas() -> None:
     stored = furnished_map(keyframes=keyframes_at(places, view), views=FakeViews())
     m = asked(stored)
     assert m.area("kitchen").found
+    placed = m.ask("the chair in the kitchen")
+    assert {m.ask(said).text for said in ("kitchen chair", "the kitchen chair")} == {placed.text}
+    assert m.ask(object="kitchen chair").goals == placed.goals != m.ask("the chair").goals
+    assert m.object("kitchen chair", primary=True).probability == placed.probability > 0.0
     assert m.area("kitchen", primary=True).goals()[0].position == pytest.approx(tuple(stored.data.keyframes.centre[0]))
     from_camera = asked(stored, settings=QuerySettings(areas=AreaSettings(anchor="camera")))
     assert from_camera.area("kitchen", primary=True).goals()[0].position == pytest.approx((1.0, 1.0, 1.4))

@@ -1,5 +1,7 @@
 """What an answer says agrees with what was asked, with itself, and with what other ways to ask say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from query_fakes import FakePixels, FakeSounds, asked, box, fake_encoders, fake_map, voxels_of
@@ -8,7 +10,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.query.answer import WHICH, PartAnswer, absent_text, fitting, found_text
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.goals import Goal
+from avlmaps.query.goals import Goal, alike
 
 PLACE = Goal((1.0, 2.0, 0.0), 0.6, (0.0, 0.0, 0.0), {}, 0.6)
 
@@ -88,6 +90,19 @@ def test_rooms_and_colours_are_named_as_people_do() -> None:
 )
 def test_a_relation_that_is_read_as_another_is_said_found_or_not(m: AVLMap, sentence: str, said: str) -> None:
     assert said in m.ask(sentence).text
+
+
+def test_of_several_where_a_word_is_not_understood_each_fits() -> None:
+    goals = [replace(PLACE, probability=p) for p in (0.9, 0.6, 0.4)]
+    assert [len(alike(goals, 0.5, is_half=half)) for half in (False, True)] == [1, 2]
+
+
+def test_all_that_are_asked_for_with_and_are_answered(m: AVLMap) -> None:
+    both = m.ask("the chair and the table")
+    assert both.found and {"chair", "table"} == {part.part.query for part in both.parts}
+    for sentence in ("the table and the bed", "the table and the old bed"):
+        missing = m.ask(sentence)
+        assert not missing.found and "The table is" in missing.text and "bed is found" in missing.text
 
 
 def test_between_takes_two_things(m: AVLMap) -> None:

@@ -81,6 +81,7 @@ class Lexicon:
     def __init__(self, source: Mapping[str, Any]) -> None:
         self.colours = _listed(source.get("colours", ""))
         self.materials = _listed(source.get("materials", ""))
+        self.room_kinds = frozenset(_listed(source.get("room_kinds", "")))  # areas that say of a thing what it is for
         self.ambiguous: dict[EntryKind, dict[str, tuple[str, ...]]] = {
             kind: {squeezed(word): _listed(names) for word, names in source.get("ambiguous", {}).get(kind, {}).items()}
             for kind in EntryKind
@@ -134,6 +135,22 @@ class Lexicon:
             for start in range(link):
                 if (found := self.find(" ".join(words[start:end]), kind)) is not None:
                     return found
+        return None
+
+    def in_room(self, phrase: str) -> tuple[str, str] | None:
+        """Return the thing and the room that a phrase names in one: ``red kitchen chair``, a red chair in the kitchen.
+
+        None for what is an entry, wherever it is (an office chair), and for a room that says its kind (a gym bag).
+        """
+        words, own = phrase.split(), self.find(phrase)
+        if own is not None and not any(own.is_compound(one) for one in (phrase, *singulars_of(phrase))):
+            return None
+        for start, end in ((at, end) for at in range(_link(words)) for end in range(len(words) - 1, at, -1)):
+            name, rest = " ".join(words[start:end]), " ".join(words[end:])
+            room, thing = self.find(name), self.head(rest, EntryKind.THING)  # what is a thing too is no place
+            is_place = room is not None and room.kind is EntryKind.ROOM and name not in self.room_kinds
+            if is_place and thing and own in (None, thing):
+                return " ".join([*words[:start], rest]), name
         return None
 
     def wider(self, name: str, kind: EntryKind | None = None) -> tuple[Entry, ...]:

@@ -42,7 +42,7 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
         )
     if is_stop(text):
         return Command((act.Wait(),))
-    read = _read(text, given)
+    read = _read(text, given or Attachments())
     stop = read.stops
     closed = no_order(text)
     if closed is None or (stop is not None and (closed.kind == UNSURE or stop == _HARM)):
@@ -79,10 +79,10 @@ def _not_ordered(closed: NoOrder) -> str:
     return f"{closed.answer} Say what to do now, such as: go to the kitchen."
 
 
-def _read(text: str, given: Attachments | None) -> Command:
-    stand = stand_ins(text, () if given is None else given.own)
+def _read(text: str, given: Attachments) -> Command:
+    stand = stand_ins(text, given.own, pictures=given.image is None)
     if stand.own:
-        read = _read(stand.text, replace(given or Attachments(), own=()))
+        read = _read(stand.text, replace(given, own=()))
         intents = tuple(_back(act.on_targets(one, stand.target), stand) for one in read.intents)
         return replace(read, intents=intents, notes=tuple(map(stand.back, read.notes)))
     if language := language_of(text):
@@ -133,7 +133,7 @@ def _back(intent: act.Intent, stand: StandIns) -> act.Intent:
     return replace(intent, question=stand.back(intent.question), choices=tuple(map(stand.back, intent.choices)))
 
 
-def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | None) -> Command | None:
+def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments) -> Command | None:
     """Return a command whose one target is on a storey, by the target's name: "bed upstairs"; None for any other."""
     if len(storeys) != 1 or pattern("storey_words", "changes").search(text.lower()):
         return None

@@ -16,8 +16,8 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.words import plural_of, singulars_of
 from avlmaps.language.intents import Ask, Inquiry, Target, TargetKind
 from avlmaps.language.lexer import without_spoken_end
-from avlmaps.language.names import mended, sounding_forms
-from avlmaps.language.sentence import OwnName, stand_ins
+from avlmaps.language.names import as_meant, is_entry, mended, sounding_forms
+from avlmaps.language.sentence import OwnName, rewritten, stand_ins
 from avlmaps.language.verbalise import phrase
 from avlmaps.language.word_classes import filled, pattern, table, words_of
 
@@ -106,7 +106,6 @@ def _several(name: str) -> str:
 
 _TABLE = "list_questions"
 _TYPED = {"u": "you", "ya": "you", "ur": "your", "r": "are"}
-_NO_NAMES = frozenset({"i", "you", "we", "have", "has", "do", "is", "are", "was", "can", "in", "on", "near", "by"})
 
 
 @cache
@@ -127,16 +126,17 @@ def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
 
 
 def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
-    how = said["how"] and ("in" if pattern(_TABLE, "in").fullmatch(said["how"]) else said["how"])
-    how = how if how in ("", "in") else "on" if how.startswith("on") else "near"
+    how = "on" if said["how"].startswith("on") else said["how"] and "near"
+    how = "rooms" if said["names"] else "in" if pattern(_TABLE, "in").fullmatch(said["how"]) else how
     said["room" if of is Listed.CHANGES or how == "in" else "thing"] += said["place"]
     room, thing = mended(said["room"]) or said["room"], said["thing"]
     is_room = not room or lexicon().find(room, EntryKind.ROOM) is not None
-    if not is_room or pattern(_TABLE, "photo").search(thing) or " or " in thing:
+    is_thing = of is not Listed.ROOMS_WITH or lexicon().find(thing, EntryKind.THING) is not None
+    if not is_room or not is_thing or pattern(_TABLE, "photo").search(thing) or " or " in thing:
         return None
     change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(said["change"])), "")
+    thing = _several(thing) if of is Listed.ROOMS_WITH else thing
     name, since = room or thing or said["seen"], said["visit"] + said["date"]
-    how = "rooms" if said["names"] else how
     return ListQuestion(of, name, counts=bool(said["counts"]), since=since, change=change, how=how, other=said["other"])
 
 
@@ -164,55 +164,45 @@ def said_alternatives(text: str) -> tuple[str, ...]:
     whole = _plain(text)
     if whole.startswith(("how ", "shall ", "should ", "which ", "what ")):
         return ()
-    plain = pattern(_TABLE, "where").sub("", whole)
-    whether = "" if whole.startswith(("where", "find")) or plain == whole else "is there a "
-    tail = pattern(_TABLE, "tail").search(plain)
-    head, rest = (plain, "") if tail is None else (plain[: tail.start()].strip(), f" {tail[0]}")
-    if " or " in head and " or " not in rest:
-        names, phrase = re.split(r",| or ", head), f"{whether}{{}}{rest}"
-        hows = [""] * len(names)
-    elif " or " in rest and " or " not in head and (places := pattern(_TABLE, "places").fullmatch(rest.strip())):
-        begin = whole[: len(whole) - len(rest.strip())].strip()
-        names, phrase = [places["one"], places["other"]], f"{begin} {{}}"
-        hows = [f"{places['how']} the ", f"{places['also'] or places['how']} the "]
-    else:
-        return ()
-    told = [(how, one.strip()) for how, one in zip(hows, names, strict=True) if one.strip()]
-    told = [(how, re.sub(rf"^(?:either )?{words_of(_TABLE)['article']}", "", name)) for how, name in told]
-    known = all(lexicon().head(name) is not None and _NO_NAMES.isdisjoint(name.split()) for _, name in told)
-    return tuple(phrase.format(how + name) for how, name in told) if known and len(told) > 1 else ()
+    found = pattern(_TABLE, "places").fullmatch(whole)
+    names = [re.sub(f"^{words_of(_TABLE)['article']}", "", found[name]) for name in ("one", "other")] if found else []
+    if found is None or not all(map(lexicon().head, names)):
+        return said_each(text, "or")
+    begin, how, also = found.group("begin", "how", "also")
+    return f"{begin} {how} the {names[0]}", f"{begin} {also or how} the {names[1]}"
 
 
-def said_both(text: str) -> tuple[str, ...]:
-    """Return the questions of a sentence that asks the same of two things; () where it names one, placed or not.
+def said_each(text: str, joins: str = "and") -> tuple[str, ...]:
+    """Return the questions of a sentence that asks the same of several things; () where it names one, placed or not.
 
     "When did you hear the dog and the phone": what is asked comes first, in words that name nothing.
     """
-    words = _plain(text).replace(",", "").split()
-    articles, asks_for = (frozenset(words_of(_TABLE)[name].split()) for name in ("articles", "asks_for"))
-    asking = articles | asks_for | frozenset(words_of(_TABLE)["asking"].split())
-    if "and" not in words or asks_for.isdisjoint(words):
+    first, *others = (one.split() for one in re.split(f",? {joins} |, ?", _plain(text)))
+    articles, asking = (frozenset(words_of(_TABLE)[name].split()) for name in ("articles", "asking"))
+    begin = next((number for number, word in enumerate(first) if word not in asking), len(first))
+    # "How many beds and how many sofas" asks again.
+    again = (words[begin if words[:begin] == first[:begin] else 0 :] for words in others)
+    *names, last = (list(dropwhile(articles.__contains__, words)) for words in (first[begin:], *again))
+    end = next((end for end in range(len(last), 0, -1) if _is_named(" ".join(last[:end]))), 0)
+    told = [" ".join(words).removesuffix(" are there") for words in (*names, last[:end])]
+    if not names or not all(map(_is_named, told)) or lexicon().senses(f" {joins} ".join(told)):
         return ()
-    at = words.index("and")
-    begin = next((number for number, word in enumerate(words) if word not in asking), len(words))
-    name, behind = " ".join(words[begin:at]).removesuffix(" are there"), words[at + 1 :]
-    again = begin if behind[:begin] == words[:begin] else 0  # "how many beds and how many sofas"
-    behind = list(dropwhile(articles.__contains__, behind[again:]))
-    end = next((end for end in range(len(behind), 0, -1) if _is_named(" ".join(behind[:end]))), 0)
-    if not end or not _is_named(name):
-        return ()
-    asked, rest = " ".join(words[:begin]), " ".join(behind[end:])
-    return tuple(f"{asked} {one} {rest}".strip() for one in (name, " ".join(behind[:end])))
+    asked, rest = " ".join(word for word in first[:begin] if word != "either"), " ".join(last[end:])
+    return tuple(f"{asked} {one} {rest}".strip() for one in told)
 
 
 def _is_named(name: str) -> bool:
     *before, last = name.split() or [""]
     sounds = last == "sound" or last in sounding_forms()
-    return bool(lexicon().senses(name)) or (sounds and lexicon().head(" ".join(before), EntryKind.SOUND) is not None)
+    return (
+        bool(lexicon().senses(name))
+        or is_entry(name)
+        or (sounds and lexicon().head(" ".join(before), EntryKind.SOUND) is not None)
+    )
 
 
 def _plain(text: str) -> str:
-    words = " ".join(re.sub(r"[^\w' ,./-]", " ", text.casefold()).split()).strip(" .,")
+    words = " ".join(re.sub(r"[^\w' ,./-]", " ", rewritten(as_meant(text))[0].casefold()).split()).strip(" .,")
     words = re.sub(r"\b(?:u|ya|ur|r)\b(?!')", lambda found: _TYPED[found[0]], without_spoken_end(words))
     words = re.sub(r"\b(\w+)(?: \1)+\b", r"\1", words)  # a word said twice: "the the"
     polite, end = pattern(_TABLE, "polite"), pattern(_TABLE, "polite_end")

@@ -61,8 +61,9 @@ def read_question(text: str, given: Attachments | None = None) -> AskedSentence:
         raise QueryError(
             f"The sentence has {len(text)} characters, more than {MOST_CHARACTERS}; say it shorter, like: {_EXAMPLE}."
         )
-    stand = stand_ins(text, () if given is None else given.own)
-    if stand.own and given is not None:
+    given = given or Attachments()
+    stand = stand_ins(text, given.own, pictures=given.image is None)
+    if stand.own:
         try:
             read = read_question(stand.text, replace(given, own=()))
         except QueryError as refused:

@@ -20,7 +20,7 @@ from avlmaps.language.intents import Target, TargetKind
 from avlmaps.language.lexer import WORDS, Token, in_figures, tokenise
 from avlmaps.language.names import as_meant, class_words, is_known, respelt, sounding_forms, third_forms
 from avlmaps.language.verbalise import phrase
-from avlmaps.language.word_classes import filled, listed, load_word_classes, table, words_of
+from avlmaps.language.word_classes import filled, listed, load_word_classes, pattern, table, words_of
 from avlmaps.perception.embedded.words import is_word
 
 OwnName = tuple[str, bool]
@@ -156,17 +156,22 @@ def is_reserved(name: str) -> bool:
     return bool(said) and (is_order or said[0] in claimed_words("leading"))
 
 
-def stand_ins(text: str, names: Sequence[OwnName]) -> StandIns:
-    """Return a sentence with a known word for each own name that the lexicon does not have."""
+def stand_ins(text: str, names: Sequence[OwnName], *, pictures: bool = False) -> StandIns:
+    """Return a sentence with a known word for each own name that the lexicon does not have.
+
+    With ``pictures`` no file came along: a picture that hangs in a room is read so too.
+    """
     out, own = text, dict[str, Target]()
-    for name, is_room in sorted(names, key=lambda one: -len(one[0])):
-        if is_reserved(name) or lexicon().find(name, EntryKind.ROOM if is_room else EntryKind.THING) is not None:
+    hung = pattern("rewrites", "pictured").findall(text.lower())[:1] if pictures else []
+    for name, is_room in sorted([*names, *((one, False) for one in hung)], key=lambda one: -len(one[0])):
+        known = lexicon().find(name, EntryKind.ROOM if is_room else EntryKind.THING)
+        if name not in hung and (is_reserved(name) or (known is not None and lexicon().in_room(name) is None)):
             continue
         kind, words = (TargetKind.AREA, _ROOMS) if is_room else (TargetKind.OBJECT, _THINGS)
         word = next((one for one in words if one not in own and one not in text.casefold()), None)
-        said = re.compile(rf"(?<![\w-])(?:(?:the|a|an|my|your|our) )?{re.escape(name)}(?![\w-])", re.IGNORECASE)
+        said = re.compile(rf"(?<![\w-])((?:the|a|an|my|your|our) )?{re.escape(name)}(?![\w-])", re.IGNORECASE)
         if word is not None and said.search(out):
-            out, own[word] = said.sub(f"the {word}", out), Target(kind, name)
+            out, own[word] = said.sub(rf"\1{word}" if name in hung else f"the {word}", out), Target(kind, name)
     return StandIns(out, own)
 
 

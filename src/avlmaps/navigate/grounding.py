@@ -20,7 +20,7 @@ from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
 from avlmaps.query.answer import fitting
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.factors import Factor, NearThings
+from avlmaps.query.factors import UNDERSTOOD_ONLY, Factor, NearThings
 from avlmaps.query.goals import MOST_GOALS, Goal, as_likely
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.lists import at_storey, storeys_meant
@@ -69,6 +69,7 @@ class Destination:
     probability: float = 1.0  # that it is what was meant
     solid: bool = False  # whether it is a thing with an extent, rather than a place
     found: bool = True  # whether it is likely enough, by the map's settings
+    half: bool = False  # whether a word of the name is not understood, so that each that is found may be meant
     spread: "Spread | None" = None  # how well the place is known, where it is the source of a sound
 
 
@@ -125,6 +126,11 @@ def likely(things: Sequence[Destination], one: bool) -> Sequence[Destination]:
     return things[:1] if one else [thing for thing in things if thing.found] or things[:1]
 
 
+def fit_equally(things: Sequence[Destination]) -> Sequence[Destination]:
+    """Return the things of which no word says that one is meant rather than the likeliest."""
+    return likely(things, one=False) if things[0].half else as_likely(things)
+
+
 def same_thing(a: Destination, b: Destination) -> bool:
     """Return whether two are one and the same thing."""
     return a.solid and b.solid and np.allclose(a.outline.centre, b.outline.centre, atol=1e-6)
@@ -133,13 +139,14 @@ def same_thing(a: Destination, b: Destination) -> bool:
 def _thing(heat: Heatmap, lead: Factor, goal: Goal) -> Destination:
     position = np.array(goal.position)
     instance = int(lead.instance[np.argmin(np.linalg.norm(lead.anchors - position, axis=1))])
-    place, found = heat.space.level(position), goal.probability >= heat.found_at
+    name, place, found = describe_query(heat), heat.space.level(position), goal.probability >= heat.found_at
     if not isinstance(lead, NearThings):
-        name, outline = describe_query(heat), Outline.at(place[:2])
-        return Destination(name, outline, place, goal.probability, found=found, spread=goal.spread)
+        return Destination(name, Outline.at(place[:2]), place, goal.probability, found=found, spread=goal.spread)
     own = heat.space.level(lead.anchors[lead.instance == instance])
     outline = Outline.round(own[:, :2], heat.space.grid.voxel_size_m)
-    return Destination(describe_query(heat), outline, place, goal.probability, solid=True, found=found)
+    return Destination(
+        name, outline, place, goal.probability, solid=True, found=found, half=UNDERSTOOD_ONLY in lead.note
+    )
 
 
 def explain_absence(heat: Heatmap, guess: bool = False) -> str:
@@ -285,12 +292,12 @@ class Seeker:
     def nearest(self, target: Target, here: Float[np.ndarray, "2"]) -> Destination:
         """Return the thing nearest to a robot of those that a target may mean."""
         things, one = self._candidates(target)
-        among = things if not one else as_likely(things) if self._asks else things[:1]
+        among = things if not one else fit_equally(things) if self._asks else things[:1]
         return self._chosen(nearest(among, here), len(things))
 
     def _of_equal(self, things: list[Destination]) -> Destination:
         """Return the likeliest thing; of several that fit equally the one that was chosen."""
-        equal = as_likely(things)
+        equal = fit_equally(things)
         name = equal[0].name
         if len(equal) > 1 and name not in self._meant and self._numbers:
             self._meant[name] = self._numbers.pop(0)

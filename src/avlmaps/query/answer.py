@@ -16,6 +16,7 @@ from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.core.wording import place_text, the_room
 from avlmaps.core.words import singulars_of
+from avlmaps.query.factors import UNDERSTOOD_ONLY
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.schema import AlternativeAnswer, PartOutcome, QueryAnswer, row_of
@@ -134,7 +135,6 @@ WHICH = "Say which is meant, such as by what it is near."
 _MOST_NAMED = 3
 _ONE_PLACE_M = 0.5
 _HEAD = re.compile(r" (?:with|of|from|for|in|on) ")  # what is before it is the thing: "shelf with books"
-UNDERSTOOD_ONLY = "understood only"
 _PLURALS = {Modality.OBJECT: EntryKind.THING, Modality.AREA: EntryKind.ROOM}
 _PHOTO, _CLIP = "the place of the photo", "a sound like the clip"
 

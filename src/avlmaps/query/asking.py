@@ -23,8 +23,8 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.wording import coordinates, option
 from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.answer import WHICH, Alternative, Answer, PartAnswer, absent_text, found_text, placed
-from avlmaps.query.contents import NOWHERE, own_names
-from avlmaps.query.factors import Factor, NearAnchors, NearThings
+from avlmaps.query.contents import NOWHERE, in_room, own_names
+from avlmaps.query.factors import UNDERSTOOD_ONLY, Factor, NearAnchors, NearThings
 from avlmaps.query.goals import MOST_GOALS, Goal, alike
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities import Attachment, Photo, read_picture
@@ -42,14 +42,6 @@ _STOREY_STEMS = ("floor", "stor", "level", "stair")
 _READ_AS = re.compile("is read as '(?:near|in)': ")  # in notes
 _BETWEEN = re.compile(r"\bbetween\b", re.IGNORECASE)
 _NEAR = r"\b(?:near|next to|beside|by|close to)(?: the)?"
-# "There is no chair in the kitchen, right?" and "no chairs in the kitchen, right?".
-_STATED = re.compile(
-    r"(?:so,? |and )?(?:there (?P<verb>is|are)(?P<not>n't| not| no)?(?: any)?|(?P<bare>no|an?|some|any)) (?P<what>.+?)"
-    r"(?(bare),|,?) ?\b"
-    r"(?:right|correct|yes|no|true|is (?:that|this) (?:right|so|true|correct)|isn't (?:it|there|that so)|is there|"
-    r"are there|aren't there)[ ?.!]*",
-    re.IGNORECASE,
-)
 _DENIES = re.compile(r"\b(?:no|not|none|without)\b|n't\b", re.IGNORECASE)
 _ANY = re.compile(r"\bany(?:where)?\b", re.IGNORECASE)
 _AND = " and "
@@ -238,9 +230,9 @@ def _of_storeys(asking: _Asking) -> Answer | None:
 def _of_both(asking: _Asking) -> Answer | None:
     if _AND not in asking.asked.sentence.lower():
         return None
-    from avlmaps.language.list_questions import said_both
+    from avlmaps.language.list_questions import said_each
 
-    said = said_both(asking.asked.sentence)
+    said = said_each(asking.asked.sentence)
     return _together([asking.but(sentence=one).answer(_of_both) for one in said], asking.asked.top) if said else None
 
 
@@ -295,19 +287,7 @@ def _of_lists(asking: _Asking) -> Answer | None:
 
 
 def _about(asking: _Asking, words: str) -> Answer:
-    asked = asking.asked
-    if asked.image is not None and asked.clip is None and words == "this photo":
-        photo = Part(Modality.IMAGE, asked.image, is_file=True)
-        return _answered(asking.avlmap, Question.of([photo]), asked)
     return _read(asking.but(sentence=words, primary=None, top=MOST_GOALS))
-
-
-def _of_claims(asking: _Asking) -> Answer | None:
-    stated = _STATED.fullmatch(asking.asked.sentence.strip())
-    if stated is None:
-        return None
-    verb, no = stated["verb"] or "is", "no " if stated["not"] or (stated["bare"] or "").lower() == "no" else ""
-    return asking.but(sentence=f"{verb.lower()} there {no}{stated['what']}").answer()
 
 
 def _read(asking: _Asking) -> Answer:
@@ -335,6 +315,10 @@ def _read(asking: _Asking) -> Answer:
             )
         wanted = replace(asked, top=MOST_GOALS) if counted else asked
         answers.append((question, _answered(avlmap, question, wanted, counted=counted)))
+    words = asked.sentence.lower()
+    is_all = kind is Ask.WHERE and _AND in words and " or " not in words and len(answers) > 1
+    if is_all and all(question.lead.query.lower() in words for question, _ in answers):  # none is what serves a purpose
+        return _together([replace(one, notes=(*notes, *one.notes)) for _, one in answers], asked.top)
     answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
     best, others = answers[0][1], answers[1:]
     alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)
@@ -353,7 +337,7 @@ def _read(asking: _Asking) -> Answer:
     )  # fmt: skip
 
 
-KINDS: tuple[_Kind, ...] = (_of_storeys, _of_both, _of_parts, _of_sources, _of_lists, _of_claims, _read)
+KINDS: tuple[_Kind, ...] = (_of_storeys, _of_both, _of_parts, _of_sources, _of_lists, _read)
 """The kinds of question, in the order in which they are tried."""
 
 
@@ -405,11 +389,15 @@ def _related(sentence: str, question: Question) -> Question:
         raise QueryError("Between what does it lie? Name two things, like: the chair between the sofa and the table.")
     named = dict(zip(map(id, ends), ENDS, strict=False))
     rooms = "near" if question.lead.modality is Modality.AREA else ""
-    near = {id(part): "near" for part in context if re.search(rf"{_NEAR} {re.escape(part.query)}\b", sentence, re.I)}
+    others = "|".join(re.escape(part.query) for part in question.parts)  # "near the kitchen window" is in the kitchen
+    said_near = {part: rf"{_NEAR} {re.escape(part.query)}\b(?! (?:{others})\b)" for part in context}
+    near = {id(part): "near" for part, says in said_near.items() if re.search(says, sentence, re.I)}
     return Question(tuple(replace(part, relation=(near | named).get(id(part), rooms)) for part in question.parts))
 
 
 def _answered(avlmap: "AVLMap", question: Question, asked: Asked, *, counted: bool = False) -> Answer:
+    if all(part.modality is not Modality.AREA for part in question.parts):
+        question = Question(tuple(dict.fromkeys(one for part in question.parts for one in in_room(avlmap, part))))
     camera, question = asked.camera_of(question), _related(asked.sentence, question)
     heats = [avlmap.heat(replace(part, relation=""), camera, asked.attachments) for part in question.parts]
     # Of what is counted in an area, the things that lists have in it count.
@@ -417,7 +405,7 @@ def _answered(avlmap: "AVLMap", question: Question, asked: Asked, *, counted: bo
     several, found = tuple(heat.goals(max(asked.top, _MOST_ALIKE))), heat.found
     if several and found and several[-1].probability >= heat.found_at:  # there may be more
         several = tuple(heat.goals(MOST_GOALS))
-    goals, equal = several[: asked.top], alike(several, heat.found_at)
+    goals, equal = several[: asked.top], alike(several, heat.found_at, is_half=UNDERSTOOD_ONLY in heat.lead.note)
     count = sum(goal.probability >= heat.found_at for goal in several)
     said = (replace(part, at=factor.part.at) for part, factor in zip(question.parts, factors, strict=True))
     question = Question(tuple(said))

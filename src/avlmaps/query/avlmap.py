@@ -26,7 +26,7 @@ from avlmaps.query import contents, modalities
 from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch, Whereabouts, part_named
 from avlmaps.query.edits import Edited, means
 from avlmaps.query.findings import MapNames, MapRooms
-from avlmaps.query.heatmap import HeatCache, Heatmap
+from avlmaps.query.heatmap import HeatCache, Heatmap, product
 from avlmaps.query.modalities import Attachment, Photo
 from avlmaps.query.objects import Instances
 from avlmaps.query.settings import QuerySettings
@@ -185,7 +185,8 @@ class AVLMap:
 
         ``QueryError``: neither the encoder nor a person knows the word.
         """
-        heat = self._object_heat(word, primary, vocabulary)
+        thing, *rooms = contents.in_room(self, Part(Modality.OBJECT, word))
+        heat = product([self._object_heat(thing.query, primary, vocabulary), *(self.area(one.query) for one in rooms)])
         contents.require_known(lambda _: bool(heat.factors[0].understood), [word])
         return heat
 

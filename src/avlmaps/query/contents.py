@@ -18,6 +18,7 @@ from avlmaps.core.arrays import Bool, Float, Int, UInt8
 from avlmaps.core.errors import AvlmapsError, QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import FRAME, plain_point
+from avlmaps.core.question import Modality, Part
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.modalities import sound_features
@@ -475,6 +476,13 @@ def part_named(avlmap: "AVLMap", phrase: str) -> str | None:
     if not _NUMBERED.search(phrase) or avlmap.edited.knows(phrase):
         return None
     return _numbered(avlmap).get(plain_name(phrase))
+
+
+def in_room(avlmap: "AVLMap", part: Part) -> list[Part]:
+    """Return "kitchen chair" as a chair in the kitchen, unless a person called something so; other parts alone."""
+    is_thing = part.modality is Modality.OBJECT and not avlmap.edited.knows(part.query)
+    placed = lexicon().in_room(part.query) if is_thing else None
+    return [part] if placed is None else [replace(part, query=placed[0]), Part(Modality.AREA, placed[1])]
 
 
 def own_names(avlmap: "AVLMap", sentence: str) -> tuple[tuple[str, bool], ...]:

@@ -27,6 +27,9 @@ _FEW_PAIRS = 65_536
 # Pairs of a point and an anchor that are compared at once: some megabytes.
 _PAIRS = 1 << 18
 
+UNDERSTOOD_ONLY = "understood only"
+"""Begins the note on a name of which a word is not understood: each of several that are found may be meant."""
+
 
 class Factor(ABC):
     """The heat of one part of the query."""

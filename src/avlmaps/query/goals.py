@@ -171,9 +171,10 @@ class HasProbability(Protocol):
 _Likely = TypeVar("_Likely", bound=HasProbability)
 
 
-def alike(goals: Sequence[Goal], found_at: float) -> list[Goal]:
-    """Return the goals that are found and fit as well as the likeliest."""
-    return as_likely([goal for goal in goals if goal.probability >= found_at and goal.probability > 0.0])
+def alike(goals: Sequence[Goal], found_at: float, *, is_half: bool) -> list[Goal]:
+    """Return the goals that are found and fit as well as the likeliest; all where half of the name is understood."""
+    found = [goal for goal in goals if goal.probability >= found_at and goal.probability > 0.0]
+    return found if is_half else as_likely(found)
 
 
 def as_likely(things: Sequence[_Likely]) -> list[_Likely]:

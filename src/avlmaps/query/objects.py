@@ -20,7 +20,7 @@ from avlmaps.core.question import Part
 from avlmaps.core.words import squeezed
 from avlmaps.perception.embedded.colours import COLOURS, ColourWords
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
-from avlmaps.query.factors import NearThings
+from avlmaps.query.factors import UNDERSTOOD_ONLY, NearThings
 from avlmaps.query.settings import FOUND_AT, HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space, boxes, connected, distinct, linked
 from avlmaps.query.words import EncodedWord, Scored, Vocabulary, is_open, scorer_of, unknown_note
@@ -511,7 +511,7 @@ class _Search:
         is_named = not _is_colour_alone(understood, part.query)
         note = "" if found.best >= FOUND_AT else _absence(part.query, len(space), found)
         if understood and not _is_whole(understood, thing):
-            half = f"understood only {said!r} of {part.query!r}"
+            half = f"{UNDERSTOOD_ONLY} {said!r} of {part.query!r}"
             half += "" if is_named else ", and a colour alone is no thing: what has it is a guess"
             note = half + ("; " + note if note else "")
         is_found = found.best >= FOUND_AT and is_named

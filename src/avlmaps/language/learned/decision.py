@@ -75,10 +75,9 @@ class NameResolver:
 
     def resolve(self, target: Target) -> Target:
         """Return a target with the name that is meant; what is not known becomes a question."""
-        near = tuple(map(self.resolve, target.near))
-        own = self._resolved(target)
-        others = tuple(one for one in near if (one.kind, one.name) != (own.kind, own.name))
-        if others != near:
+        own = self._resolved(replace(target, near=tuple(map(self.resolve, target.near))))
+        others = tuple(one for one in own.near if (one.kind, one.name) != (own.kind, own.name))
+        if others != own.near:
             self.notes.append(f"'near {own.name}' has no effect: it has the name of what is near it.")
         return replace(own, near=others)
 
@@ -117,22 +116,18 @@ class NameResolver:
             if better is not None:
                 self.notes.append(f"'{name}' is read as '{better}'.")
                 name = better
+        placed, rooms = lexicon().in_room(name), {one for one in target.near if one.kind is TargetKind.AREA}
+        if placed is not None and rooms <= {room := Target(TargetKind.AREA, placed[1])}:
+            name, target = placed[0], replace(target, kind=TargetKind.OBJECT).with_near(room)  # "kitchen chair"
         return replace(target, name=name.replace(" 's", "'s"), kind=kind_of(name, target.kind))
 
 
 def kind_of(name: str, kind: TargetKind) -> TargetKind:
     """Return whether a name is of a thing or of a room, where only one is possible; else what it was read as."""
-    words = name.split()
-    for start in range(len(words)):
-        tail = " ".join(words[start:])
-        thing, room = (lexicon().find(tail, each) is not None for each in (EntryKind.THING, EntryKind.ROOM))
-        if thing and not room and not start:
-            return TargetKind.OBJECT
-        if room and not thing:
-            return TargetKind.AREA
-        if thing or room:
-            return kind
-    return TargetKind.AREA if is_place(name) else kind
+    thing, room = (lexicon().head(name, each) for each in (EntryKind.THING, EntryKind.ROOM))
+    if thing is not None:
+        return TargetKind.OBJECT if room is None and lexicon().find(name, EntryKind.THING) is thing else kind
+    return TargetKind.AREA if room is not None or is_place(name) else kind
 
 
 def weighed(read: Read, names: NameResolver) -> Weighed:
