@@ -109,6 +109,7 @@ def test_the_nearest_point_of_a_thing_is_gone_to_and_the_thing_looked_at() -> No
     robot.move_to_object("sofa")
     assert robot.moves[-1].goal == pytest.approx((3.0, 0.3, 0.4))
     assert heading_deg(robot) == pytest.approx(degrees(atan2(-0.3, 1.0)))
+    robot = robot_among(GroundPose(0.0, 0.3), sofa=box(4.0, 0.0, width=2.0, depth=2.0))
     robot.move_to_object("sofa", 0.5)
     assert robot.moves[-1].stop == pytest.approx((2.5, 0.3, 0.0)) and robot.moves[-1].distance_m == pytest.approx(0.5)
 
