@@ -130,7 +130,7 @@ def test_every_skill_that_moves_can_be_written() -> None:
     [
         ('robot.move_to_object("sofa")', (Go(SOFA),)),
         ('robot.move_to_object("sofa")\nrobot.face("sofa")', (Beside(SOFA, Side.FRONT),)),
-        ('robot.move_to_object("sofa")\nrobot.face("sofa")\nrobot.move_forward(-2)', (StopAt(SOFA, 2.0),)),
+        ('robot.move_to_object("sofa", 2)', (StopAt(SOFA, 2.0),)),
         ('robot.with_object_on_left("sofa")', (Face(SOFA, Side.LEFT),)),
         ('robot.move_behind("sofa", 1)', (Beside(SOFA, Side.BEHIND, 1.0),)),
         ('start = robot.current_pos()\nrobot.move_to("sofa")\nrobot.move_to(start)', (Go(SOFA), Return())),

@@ -11,6 +11,7 @@ from test_costmap import CELL_M, grid_of, of_states
 
 from avlmaps.maps.obstacles import CellState, ForbiddenArea, Obstacles
 from avlmaps.navigate.costmap import costmap_of
+from avlmaps.navigate.footprint import Outline
 from avlmaps.navigate.planner import BESIDE_M, Planner
 
 
@@ -163,10 +164,19 @@ def test_a_thing_is_approached_from_where_it_is_seen_and_not_through_a_wall():
     obstacles = Obstacles(np.eye(3), np.zeros(2), CELL_M, 0.0, states, tall)
     planner = Planner(costmap_of(obstacles, 0.15))
     back_of_sofa = np.array([1.45, 2.0])
-    for start in ([2.6, 2.0], [0.3, 2.0]):
-        stop = planner.stop_for(np.array(start), back_of_sofa)
+    sofa = Outline(np.array([[0.7, 1.5], [1.55, 1.5], [1.55, 2.5], [0.7, 2.5]]))  # seen a bit into the wall
+    for start in (np.array([2.6, 2.0]), np.array([0.3, 2.0])):
+        stop = planner.stop_for(start, back_of_sofa)
         assert stop.seen and stop.xy[0] < 1.5
-        assert planner.way(np.array(start), stop.xy) is not None
+        assert planner.way(start, stop.xy) is not None
+        for metres in (0.0, 0.5):
+            stop = planner.stop_beside(start, sofa, np.array([1.1, 2.0]), lambda _, edge_m, at=metres: abs(edge_m - at))
+            assert stop.xy[0] < 1.5 and planner.way(start, stop.xy) is not None
+            assert sofa.distance_m(stop.xy) == pytest.approx(max(metres, 0.18), abs=0.05)
+        behind = planner.stop_beside(
+            start, sofa, np.array([1.1, 2.0]), lambda xy, _: np.linalg.norm(xy - [2.05, 2.0], axis=1)
+        )
+        assert behind.xy[0] < 1.5 and behind.beside_m > 0.5  # there is none behind it that sees it
 
 
 def test_of_a_picture_on_a_wall_the_stop_is_on_its_side():

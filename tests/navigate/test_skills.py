@@ -109,6 +109,9 @@ def test_the_nearest_point_of_a_thing_is_gone_to_and_the_thing_looked_at() -> No
     robot.move_to_object("sofa")
     assert robot.moves[-1].goal == pytest.approx((3.0, 0.3, 0.4))
     assert heading_deg(robot) == pytest.approx(degrees(atan2(-0.3, 1.0)))
+    robot = robot_among(GroundPose(0.0, 0.3), sofa=box(4.0, 0.0, width=2.0, depth=2.0))
+    robot.move_to_object("sofa", 0.5)
+    assert robot.moves[-1].stop == pytest.approx((2.5, 0.3, 0.0)) and robot.moves[-1].distance_m == pytest.approx(0.5)
 
 
 @given(poses, places, places)
@@ -124,7 +127,7 @@ def test_a_thing_on_the_left_is_a_quarter_counter_clockwise_from_ahead(pose: Gro
 
 
 RELATIVE = (
-    ("move_to", "a"), ("move_to_object", "a"), ("move_in_between", "a", "b"), ("move_to_left", "a", 0.7),
+    ("move_to", "a"), ("move_to_object", "a", 0.6), ("move_in_between", "a", "b"), ("move_to_left", "a", 0.7),
     ("move_to_right", "a"), ("face", "b"), ("turn", 33.0), ("move_forward", 1.3), ("move_forward", -0.8),
     ("with_object_on_left", "b"), ("with_object_on_right", "b"),
 )  # fmt: skip

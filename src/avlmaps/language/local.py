@@ -83,8 +83,8 @@ _literal = partial(json.dumps, ensure_ascii=False)
 
 _SIDES = {str(side): side for side in Side if side not in (Side.FRONT, Side.AHEAD)}
 _STEPS: Mapping[str, Callable[..., Intent]] = {
-    "move_to": act.Go, "move_to_object": act.Go, "face": act.Face, "move_forward": act.Move, "turn": act.Turn,
-    "wait": act.Wait,
+    "move_to": act.Go, "move_to_object": lambda to, metres=None: act.StopAt(to, metres) if metres else act.Go(to),
+    "face": act.Face, "move_forward": act.Move, "turn": act.Turn, "wait": act.Wait,
     "turn_absolute": lambda heading: act.Turn(None, heading), "move_in_between": lambda a, b: act.Between((a, b)),
     **{f"with_object_on_{side}": lambda to, side=side: act.Face(to, _SIDES[side]) for side in ("left", "right")},
     **{f"move_{side}" if side not in ("left", "right") else f"move_to_{side}":
@@ -145,14 +145,12 @@ def _value(node: ast.expr) -> Any:
 
 
 def _joined(steps: Sequence[Intent]) -> list[Intent]:
-    """Return steps in which "go to it, face it, move back 2 m" stops 2 m from it, and "go to it, face it" before it."""
+    """Return steps in which "go to it, face it" stops before it."""
     found: list[Intent] = []
     for step in steps:
         match found[-1:], step:
             case [act.Go(to=before)], act.Face(to=to, side=Side.AHEAD) if before == to:
                 found[-1] = act.Beside(to, Side.FRONT)
-            case [act.Beside(of=of, side=Side.FRONT, metres=None)], act.Move(metres=metres) if metres < 0.0:
-                found[-1] = act.StopAt(of, -metres)
             case _:
                 found.append(step)
     return found

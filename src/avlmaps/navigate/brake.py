@@ -13,7 +13,9 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.core.printable import printable
 from avlmaps.maps.store.edits import EDITS, in_force, read_edits
 from avlmaps.maps.store.folder import stamp
-from avlmaps.navigate.driver import Arrival, Driver, Holdable
+from avlmaps.navigate.driver import Arrival, Driver, Holdable, Planning
+from avlmaps.navigate.footprint import Outline
+from avlmaps.navigate.planner import Offs, Stop
 from avlmaps.query.avlmap import AVLMap
 
 _STOPPED = "the order was stopped"
@@ -99,6 +101,10 @@ class BrakedDriver:
     def pose(self) -> GroundPose:
         """Where the robot is."""
         return self._driver.pose
+
+    def stop_beside(self, thing: Outline, place: Float[np.ndarray, "3"], off_m: Offs) -> Stop | None:
+        """Return where a driver that plans stops beside a thing; see `Planning`."""
+        return self._driver.stop_beside(thing, place, off_m) if isinstance(self._driver, Planning) else None
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
         """Drive to a place; see `Driver`."""

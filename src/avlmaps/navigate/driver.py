@@ -16,8 +16,9 @@ from avlmaps.core.printable import printable
 from avlmaps.maps.obstacles import BodyShape, Obstacles
 from avlmaps.navigate.controller import ActionController, StallDetector, bearing, turns_for
 from avlmaps.navigate.costmap import BASE, ContactMap, costmap_of
+from avlmaps.navigate.footprint import Outline
 from avlmaps.navigate.interrupts import Halt
-from avlmaps.navigate.planner import ESCAPE_M, Planner, Stop, rooms
+from avlmaps.navigate.planner import ESCAPE_M, Offs, Planner, Stop, rooms
 
 _SAMPLE_M = 0.02  # places along a straight move that are looked at
 _STILL_RAD = 0.01  # smaller turns may not show
@@ -102,6 +103,15 @@ class Holdable(Protocol):
     """Returns why the movement must end, in part of a sentence; "" where it need not. Called all along."""
 
 
+@runtime_checkable
+class Planning(Protocol):
+    """A driver that knows from a map where it can stop beside a thing."""
+
+    def stop_beside(self, thing: Outline, place: Float[np.ndarray, "3"], off_m: Offs) -> Stop | None:
+        """Return where it stops beside a thing with a place in the world, if it may go there; `Planner.stop_beside`."""
+        ...
+
+
 @dataclass(slots=True)
 class _Trip:
     path: list[tuple[float, float]]
@@ -159,6 +169,11 @@ class MapDriver:
 
     def close(self) -> None:
         """Do nothing."""
+
+    def stop_beside(self, thing: Outline, place: Float[np.ndarray, "3"], off_m: Offs) -> Stop | None:
+        """Return where it stops beside a thing; None on another storey, or where a person forbade it."""
+        elsewhere = self.obstacles.elsewhere(place)
+        return None if elsewhere else self.planner.stop_beside(self._xy, thing, self._level(place), off_m)
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
         """Drive to a place; its height says only which storey it is on."""

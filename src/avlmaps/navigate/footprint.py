@@ -9,6 +9,8 @@ from typing import cast
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from avlmaps.query.floor_plan import in_polygon
+
 # Pairs of points whose distance differs by less are equally near; their middle is taken (two cupboards that face).
 _AS_NEAR_M = 0.03
 _FINE = 3  # cells of the raster along the edge of a voxel, so that an outline is right to a sixth of a voxel
@@ -45,6 +47,13 @@ class Outline:
         corners = corner + (line.reshape(-1, 2).astype(np.float64) + 0.5) * cell_m
         return cls(corners if _signed_area_m2(corners) >= 0.0 else corners[::-1])
 
+    def within(self, margin_m: float) -> "Outline | None":
+        """Return the outline of what lies so far inside it; None where nothing does."""
+        low, high = self.corners.min(axis=0), self.corners.max(axis=0)
+        cells = np.stack(np.meshgrid(*map(np.arange, low, high, (0.1, 0.1))), axis=-1).reshape(-1, 2)
+        inside = cells[in_polygon(cells, self.corners) & (self._to_edge_m(cells) >= margin_m)]
+        return Outline.round(inside, 0.1) if len(inside) else None
+
     @property
     def centre(self) -> Float[np.ndarray, "2"]:
         """The middle of its area; that of its corners where it has none."""
@@ -57,14 +66,6 @@ class Outline:
         cross = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
         return first + ((a + b) * cross[:, None]).sum(axis=0) / (6.0 * area)
 
-    def contains(self, xy: Float[np.ndarray, "2"]) -> bool:
-        """Return whether a place lies inside."""
-        x, y = xy
-        a, b = self.corners, np.roll(self.corners, -1, axis=0)
-        spans = (a[:, 1] > y) != (b[:, 1] > y)
-        a, b = a[spans], b[spans]
-        return bool(np.count_nonzero(x < (b[:, 0] - a[:, 0]) * (y - a[:, 1]) / (b[:, 1] - a[:, 1]) + a[:, 0]) % 2)
-
     def nearest_to(self, xy: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
         """Return the point of its edge that is nearest to a place."""
         feet = self._feet(np.asarray(xy, np.float64).reshape(1, 2))[0]
@@ -72,7 +73,19 @@ class Outline:
 
     def distance_m(self, xy: Float[np.ndarray, "2"]) -> float:
         """Return the distance of a place from it; 0 inside."""
-        return 0.0 if self.contains(xy) else float(np.linalg.norm(self.nearest_to(xy) - xy))
+        return float(self.distances_m(np.asarray(xy, np.float64).reshape(1, 2))[0])
+
+    def distances_m(self, places: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, " m"]:
+        """Return the distance of each place from it; 0 inside."""
+        return np.where(in_polygon(places, self.corners), 0.0, self._to_edge_m(places))
+
+    def _to_edge_m(self, places: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, " m"]:
+        return np.linalg.norm(self._feet(places) - places[:, None], axis=-1).min(axis=1)
+
+    def before(self, xy: Float[np.ndarray, "2"], distance_m: float) -> Float[np.ndarray, "2"]:
+        """Return the place so far from its edge on the straight way to it from a place."""
+        edge, away_m = self.nearest_to(xy), self.distance_m(xy)
+        return edge + (xy - edge) * (distance_m / away_m if away_m else 0.0)
 
     def beside(self, direction: Float[np.ndarray, "2"], distance_m: float) -> Float[np.ndarray, "2"]:
         """Return the place in a direction (unit vector) from its middle, so far beyond its outermost corner there."""

@@ -20,6 +20,7 @@ from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
 from avlmaps.query.answer import fitting
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.contents import NOWHERE
 from avlmaps.query.factors import UNDERSTOOD_ONLY, Factor, NearThings
 from avlmaps.query.goals import MOST_GOALS, Goal, as_likely
 from avlmaps.query.heatmap import Heatmap
@@ -54,6 +55,7 @@ def kind_of(value: object) -> str:
 
 
 _SIDES = {"north": (0.0, 1.0), "south": (0.0, -1.0), "east": (1.0, 0.0), "west": (-1.0, 0.0)}  # of the level frame
+_INSIDE_M = 0.5  # from the walls of a room, on a round in it
 _MOST_LISTED = 9  # things that fit equally, in the sentence that asks which
 Heats = dict[tuple[object, ...], Heatmap]
 """The answers of one map, as it was opened, by the query."""
@@ -71,6 +73,7 @@ class Destination:
     found: bool = True  # whether it is likely enough, by the map's settings
     half: bool = False  # whether a word of the name is not understood, so that each that is found may be meant
     spread: "Spread | None" = None  # how well the place is known, where it is the source of a sound
+    area: bool = False  # whether it stands for a room
 
 
 def describe_query(heat: Heatmap) -> str:
@@ -141,7 +144,8 @@ def _thing(heat: Heatmap, lead: Factor, goal: Goal) -> Destination:
     instance = int(lead.instance[np.argmin(np.linalg.norm(lead.anchors - position, axis=1))])
     name, place, found = describe_query(heat), heat.space.level(position), goal.probability >= heat.found_at
     if not isinstance(lead, NearThings):
-        return Destination(name, Outline.at(place[:2]), place, goal.probability, found=found, spread=goal.spread)
+        area, outline = lead.part.modality is Modality.AREA, Outline.at(place[:2])
+        return Destination(name, outline, place, goal.probability, found=found, spread=goal.spread, area=area)
     own = heat.space.level(lead.anchors[lead.instance == instance])
     outline = Outline.round(own[:, :2], heat.space.grid.voxel_size_m)
     return Destination(
@@ -321,6 +325,18 @@ class Seeker:
         places = np.array([self.avlmap.space.world(thing.place) for thing in things])
         texts = zip(places, map(self.avlmap.where.name_of, places), strict=True)
         return tuple(f"{place_text(place)}{f' in {the_room(room)}' if room else ''}" for place, room in texts)
+
+    def contour(self, thing: Destination) -> Outline:
+        """Return the outline of a thing, or for an area one inside of its room; ``GoalNotFoundError`` without one."""
+        if thing.solid:
+            return thing.outline
+        where, space = self.avlmap.where, self.avlmap.space
+        number = where.rooms_of(space.world(thing.place)[None])[0] if thing.area else NOWHERE
+        corners = np.zeros((0, 3)) if number == NOWHERE else where.rooms[number].outline
+        inside = Outline(space.level(corners)[:, :2]).within(_INSIDE_M) if len(corners) else None
+        if inside is None:
+            raise GoalNotFoundError(f"The map knows no outline of {thing.name or 'that place'} to go round.")
+        return inside
 
     def pair(self, a: Target, b: Target, here: Float[np.ndarray, "2"]) -> tuple[Destination, Destination]:
         """Return the two things that are meant: of several, those nearest to each other and to the robot."""

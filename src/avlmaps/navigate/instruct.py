@@ -240,7 +240,7 @@ class _Run:
         for move in self.robot.moves:
             if move.reached and move.distance_m is not None and move.distance_m > _NEAR_M:
                 what = move.name or move.skill
-                self.note(f"{what}: the nearest place where the robot could stop is {move.distance_m:.2f} m from it")
+                self.note(f"{what}: the robot stopped {move.distance_m:.2f} m from it")
 
     def note(self, note: str) -> None:
         if note not in self.notes:  # a plan carries those of its rehearsal

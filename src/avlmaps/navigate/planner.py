@@ -3,8 +3,10 @@
 Grids are indexed (i, j) for x and y; a place in cells is such that cell (i, j) covers [i, i + 1) x [j, j + 1).
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 import cv2
 import numpy as np
@@ -12,6 +14,7 @@ from jaxtyping import Bool, Float, Float64, Int
 from scipy.sparse import csgraph, csr_array
 
 from avlmaps.navigate.costmap import Costmap
+from avlmaps.navigate.footprint import Outline
 
 _EVERY = 8  # cells of a straight run of a path from which shortcuts may begin
 _SAMPLE = 0.2  # of a line of sight, cells
@@ -25,11 +28,13 @@ _STEPS: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {
 
 ESCAPE_M = 1.0  # how far a body that stands where the map lets none stand may go straight to get out
 BESIDE_M = 2.0  # how far from a place that cannot be stood on the body may stop instead
-# A stop beside a place may be farther from it by this distance for each unit of cost that it saves, metres.
-_ROOMY_M = 0.03
+# A stop may be farther from where it is wanted by these distances for each unit of cost of a metre there that it saves,
+# and for each unit of cost of the way to it, metres.
+_ROOMY_M, _WAY_M = 0.03, 0.05
 # Obstacles within this distance of a place are the thing there itself: the least that lets it be seen, so that a
 # wardrobe is seen through its front and not through its back and the wall. For free floor just the first.
 _OWN_M = (0.075, 0.2, 0.35, 0.5, 0.7)
+Offs = Callable[[Float[np.ndarray, "n 2"], Float[np.ndarray, " n"]], Float[np.ndarray, " n"]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +64,10 @@ class CellGraph:
         ends = np.concatenate([[0], np.cumsum(joined.sum(axis=1))]).astype(np.int32)
         weights = csr_array((weight[joined], near[joined], ends), shape=(len(at), len(at)))
         return cls(number.reshape(grid.shape)[2:-2, 2:-2], np.argwhere(mask), weights)
+
+    def costs(self, first: Int[np.ndarray, "2"]) -> Float64[np.ndarray, " n"]:
+        """Return the cost of the cheapest path from a cell to each; inf where there is none."""
+        return cast("np.ndarray", csgraph.dijkstra(self.weights, indices=int(self.number[tuple(first)])))
 
     def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"]:
         """Return the cells of the cheapest path between two cells of one connected part."""
@@ -244,13 +253,51 @@ class Planner:
         cells, distance_m = cells[order], distance_m[order]
         stands = bool(costmap.is_passable(place))
         things = 1 if costmap.free[tuple(costmap.cell_of(place))] else None  # on free floor there is no thing
-        hidden_m = farthest_opaque(costmap.in_cells(place), cells, costmap.opaque) * costmap.cell_size_m
-        for own_m in _OWN_M[:things]:
-            seen = hidden_m <= own_m
-            if seen.any():
-                best = int(np.argmax(seen))
-                return Stop(costmap.middle_of(cells[best]), float(distance_m[best]), open=stands)
-        return Stop(costmap.middle_of(cells[0]), float(distance_m[0]), seen=False, open=stands)
+        seen = self._seen(place, cells, costmap.opaque, _OWN_M[:things])
+        best = int(np.argmax(seen))
+        return Stop(costmap.middle_of(cells[best]), float(distance_m[best]), bool(seen[best]), stands)
+
+    def stop_beside(
+        self, start: Float[np.ndarray, "2"], thing: Outline, place: Float[np.ndarray, "2"], off_m: Offs
+    ) -> Stop | None:
+        """Return where a body that comes from a start stops beside a thing, None where it comes nowhere near it.
+
+        From there it sees the thing's ``place`` through nothing but the thing. Of such places it is that which is least
+        off from where it is wanted (``beside_m``), unless another saves much of the way; ``off_m`` says of places and
+        their distances from the thing's edge how far off they are.
+        """
+        costmap = self.costmap
+        out = self.entry(start)
+        if out is None or not costmap.holds(place):
+            return None
+        cells = np.argwhere(self._part == self._part[tuple(costmap.cell_of(out))])
+        edge_m = thing.distances_m(costmap.middle_of(cells))
+        wanted_m = off_m(costmap.middle_of(cells), edge_m)
+        near = np.minimum(edge_m, wanted_m) <= BESIDE_M
+        cells, wanted_m = cells[near], wanted_m[near]
+        opaque = costmap.opaque.copy()
+        opaque[costmap.opaque] = thing.distances_m(costmap.middle_of(np.argwhere(opaque))) > 0.0
+        seen = self._seen(place, cells, opaque, _OWN_M)
+        if not seen.any():
+            return None
+        exact = seen & (wanted_m <= costmap.cell_size_m)
+        seen = exact if exact.any() else seen
+        cells, wanted_m = cells[seen], wanted_m[seen]
+        way = self._cells.costs(costmap.cell_of(out))[self._cells.number[tuple(cells.T)]] * costmap.cell_size_m
+        best = int(np.argmin(wanted_m + _ROOMY_M * (costmap.cost[tuple(cells.T)] - 1.0) + _WAY_M * way))
+        return Stop(costmap.middle_of(cells[best]), float(wanted_m[best]))
+
+    def _seen(
+        self,
+        place: Float[np.ndarray, "2"],
+        cells: Int[np.ndarray, "n 2"],
+        opaque: Bool[np.ndarray, "nx ny"],
+        owns_m: Sequence[float],
+    ) -> Bool[np.ndarray, " n"]:
+        """Return from which cells a place is seen over the least that may be the thing there itself."""
+        hidden_m = farthest_opaque(self.costmap.in_cells(place), cells, opaque) * self.costmap.cell_size_m
+        own_m = next((own_m for own_m in owns_m if (hidden_m <= own_m).any()), -np.inf)
+        return hidden_m <= own_m
 
     def _near(
         self, mask: Bool[np.ndarray, "nx ny"], xy: Float[np.ndarray, "2"], reach_m: float

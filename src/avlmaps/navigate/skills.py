@@ -19,14 +19,16 @@ from avlmaps.core.errors import GoalNotFoundError, NavigationError, ProgramError
 from avlmaps.core.motion import Action, wrap_angle
 from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Target
 from avlmaps.navigate.costmap import floor_of_walk, storey_of_walk
-from avlmaps.navigate.driver import Arrival, Driver
+from avlmaps.navigate.driver import Arrival, Driver, Planning
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline, bearing_rad, middle_between, to_the_left
 from avlmaps.navigate.grounding import Destination, Heats, Seeker, kind_of, number_of, text_of
+from avlmaps.navigate.planner import Offs
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 
 _NORTH, _EAST = np.array([0.0, 1.0]), np.array([1.0, 0.0])
+_OFF_M = 0.3  # a stop that is farther off than this from the side or the distance that was asked for is none
 _MOST_M, _MOST_TURNS_DEG, _MOST_WAIT_S = 1000.0, 3600.0, 600.0
 
 
@@ -213,9 +215,9 @@ class Robot:
         return float(np.linalg.norm(near - far))
 
     def get_contour(self, target: Target) -> list[Place]:
-        """Return the outline on the ground of the best instance of an object, counter-clockwise."""
+        """Return the outline on the ground of the best instance of an object, or inside a room, counter-clockwise."""
         thing = self.seeker.best(target)
-        return [self._place(self._on_floor(corner, thing)) for corner in thing.outline.corners]
+        return [self._place(self._on_floor(corner, thing)) for corner in self.seeker.contour(thing).corners]
 
     def current_pos(self) -> Place:
         """Return the place where the robot stands now; keep it to come back later."""
@@ -226,11 +228,15 @@ class Robot:
         thing = self.seeker.best(target)
         self._go("move_to", thing, thing.place, face=thing.place if thing.solid else None)
 
-    def move_to_object(self, name: Target) -> None:
-        """Drive to the nearest point beside the object of that name; where several fit equally it asks which."""
+    def move_to_object(self, name: Target, distance_m: float = 0.0) -> None:
+        """Drive to the nearest place, so far from its edge, that sees the object; where several fit it asks which."""
         thing = self.seeker.referent(name, self._here)
-        beside = np.append(thing.outline.nearest_to(self._here), thing.place[2])
-        self._go("move_to_object", thing, beside, face=self._on_floor(thing.outline.centre))
+        metres = _distance("move_to_object", distance_m)
+        stop = self._stop(thing, metres > 0.0, lambda _, edge_m: np.abs(edge_m - metres))
+        stop = thing.outline.before(self._here, metres) if stop is None else stop
+        edge, height_m = thing.outline.nearest_to(stop), thing.place[2]
+        face = self._on_floor(thing.outline.centre)
+        self._go("move_to_object", thing, np.append(edge, height_m), face, np.append(stop, height_m))
 
     def move_in_between(self, a: Target, b: Target) -> None:
         """Drive to the middle between the nearest points of two things."""
@@ -334,20 +340,36 @@ class Robot:
         distance_m: float,
     ) -> None:
         thing = self.seeker.referent(target, self._here)
-        distance_m = number_of(distance_m, skill, _MOST_M, "metres")
-        if distance_m < 0.0:
-            raise ProgramError(f"{skill} takes a distance of 0 m or more, not {distance_m:g}; go to the other side.")
+        distance_m = _distance(skill, distance_m)
         bearing = bearing_rad(self._here, thing.outline.centre)
         bearing = self.driver.pose.heading_rad if bearing is None else bearing
         side = direction(np.array([np.cos(bearing), np.sin(bearing)]))
-        self._go(skill, thing, self._on_floor(thing.outline.beside(side, distance_m), thing))
+        goal = self._on_floor(thing.outline.beside(side, distance_m), thing)
+        stop = self._stop(thing, True, lambda xy, _: np.linalg.norm(xy - goal[:2], axis=1))
+        self._go(skill, thing, goal, to=None if stop is None else np.append(stop, goal[2]))
+
+    def _stop(self, thing: Destination, exactly: bool, off_m: Offs) -> Float[np.ndarray, "2"] | None:
+        """Return where to stop beside a thing; None where the driver does not know."""
+        if not isinstance(self.driver, Planning):
+            return None
+        stop = self.driver.stop_beside(thing.outline, self.avlmap.space.world(thing.place), off_m)
+        if stop is not None and exactly and stop.beside_m > _OFF_M and not self.settings.persist:
+            what = thing.name or "the place"
+            nearest = f"the nearest place from which it sees {what} is {stop.beside_m:.2f} m off"
+            raise NavigationError(f"The robot cannot stand there: {nearest}; say another side or distance.")
+        return None if stop is None else stop.xy
 
     def _go(
-        self, skill: str, thing: Destination, goal: Float[np.ndarray, "3"], face: Float[np.ndarray, "3"] | None = None
+        self,
+        skill: str,
+        thing: Destination,
+        goal: Float[np.ndarray, "3"],
+        face: Float[np.ndarray, "3"] | None = None,
+        to: Float[np.ndarray, "3"] | None = None,
     ) -> None:
         world = self.avlmap.space.world
         looked_at = None if face is None else world(face)
-        self._done(skill, thing.name, goal, [self.driver.go_to(world(goal), face=looked_at)])
+        self._done(skill, thing.name, goal, [self.driver.go_to(world(goal if to is None else to), face=looked_at)])
 
     def _turn_to_see(self, skill: str, target: Target, at_rad: float) -> None:
         thing = self.seeker.nearest(target, self._here)  # a turn costs less than a question
@@ -380,6 +402,13 @@ class Robot:
         self.moves.append(move)
         if not move.reached and not self.settings.persist:
             raise NavigationError(_not_reached(move))
+
+
+def _distance(skill: str, distance_m: float) -> float:
+    metres = number_of(distance_m, skill, _MOST_M, "metres")
+    if metres < 0.0:
+        raise ProgramError(f"{skill} takes a distance of 0 m or more, not {metres:g}; go to the other side.")
+    return metres
 
 
 def _triple(vector: Float[np.ndarray, "3"]) -> Triple:
