@@ -1,5 +1,7 @@
 """Questions to the lists of a map, which rows read or the networks; all others are left alone."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,17 +19,14 @@ BY_ROWS = {
     "is there more than one bathroom": (Listed.AT_LEAST, "bathrooms", False),
     "are there two chairs over there": (Listed.AT_LEAST, "chairs over there", False),
     "where was the suitcase last seen?": (Listed.LAST_SEEN, "suitcase", False),
+    "how many things are in the kitchen?": (Listed.CONTENTS, "kitchen", False),
     "which room is between the kitchen and the bathroom": (Listed.BESIDE, "kitchen", False),
     "list all objects within 1 m of the desk": (Listed.BESIDE, "desk", False),
 }
 READ = {
-    "when did you hear the phone?": (Listed.HEARD, "phone", False),
     "how often did you hear a dog barking": (Listed.HEARD, "dog barking", False),
     "what did you hear in the kitchen?": (Listed.HEARD, "", False),
-    "What have you in the kitchen heard?": (Listed.HEARD, "", False),
-    "list the sounds in the bathroom": (Listed.HEARD, "", False),
     "did the glass break before the phone rang?": (Listed.HEARD, "glass break", False),
-    "The dog was barking at what time exactly?": (Listed.HEARD, "dog barking", False),
     "did you hear the phone ring? when": (Listed.HEARD, "phone ring", False),
     "what is between the sofa and the tv?": (Listed.BESIDE, "sofa", False),
     "which rooms have at least two beds?": (Listed.ROOMS_WITH, "beds", False),
@@ -36,8 +35,7 @@ READ = {
     "please show me the smallest room": (Listed.ROOM_BY_SIZE, "", True),
     "what did you hear last": (Listed.SOUND_BY_TIME, "", False),
     "what is in the kitchen?": (Listed.CONTENTS, "kitchen", False),
-    "what is in the kichen": (Listed.CONTENTS, "kitchen", False),
-    "what is next to the bed?": (Listed.BESIDE, "bed", False),
+    "what is next to the bed in the bedroom?": (Listed.BESIDE, "bed in the bedroom", False),
     "which room is this photo from?": (Listed.ROOM_OF, "this photo", False),
     "in which room is the sofa?": (Listed.ROOM_OF, "sofa", False),
     "what did you hear?": (Listed.NAMES, "sounds", False),
@@ -50,7 +48,6 @@ READ = {
     "the room where the piano stands": (Listed.ROOM_OF, "piano", False),
     "list all acoustic events in temporal order": (Listed.NAMES, "sounds", False),
     "what was the first sound you you heard today": (Listed.SOUND_BY_TIME, "", True),
-    "which room is the biggest question mark": (Listed.ROOM_BY_SIZE, "", False),
 }
 OTHER = [
     "the chair near the sofa", "bed", "where is the kitchen", "what is in the fridge?", "how many chairs are there",
@@ -65,7 +62,12 @@ OTHER = [
     "question",
     ["which rooms have more than fifteen chairs?", "are there two or three chairs?", "are there 2 to 3 chairs?",
      "what did you not hear in the kitchen?", "when did you not hear the phone?", "are there only two chairs?",
-     "what did you hear in the bedroom next to the kitchen?", "did the dog or the cat bark before the phone rang"],
+     "what did you hear in the bedroom next to the kitchen?", "did the dog or the cat bark before the phone rang",
+     "did the dog bark while the rain fell", "did the dog bark before or after the phone rang",
+     "what was the first sound in the bedroom", "how many sounds were heard in the kitchen",
+     "what is between the second chair and the sofa", "the second largest room", "which are the two smallest rooms",
+     "what was the second sound", "the last but one sound", "the penultimate sound", "the first thing you saw",
+     "which rooms have two doors", "how many of them are there", "is this an office or a home"],
 )  # fmt: skip
 def test_what_no_list_says_is_not_answered_as_what_it_says(question: str) -> None:
     assert read_list(question) is None
@@ -77,7 +79,7 @@ def test_what_no_list_says_is_not_answered_as_what_it_says(question: str) -> Non
 def test_a_question_to_the_lists_is_read(text: str) -> None:
     image = "view.png" if "photo" in text else None
     found = read_list(text) or list_question(read_question(text, Attachments(image)).inquiry)
-    assert found is not None
+    assert found is not None and found.counts is text.startswith("how many things")
     assert (read_list(text) is not None) is (text in BY_ROWS)
     name = found.name or "".join(one.name for one in found.sounds[:1])
     assert (found.of, name, found.first) == (BY_ROWS | READ)[text]
@@ -104,11 +106,8 @@ def test_a_question_says_where_which_came_first_and_how_many(
     assert [*heard, *filter(None, [found.other])] == others
 
 
-SOUND, CHAIR, HALL = (
-    Target(TargetKind.SOUND, "bark"),
-    Target(TargetKind.OBJECT, "chair"),
-    Target(TargetKind.AREA, "hall"),
-)
+NAMED = {TargetKind.SOUND: "bark", TargetKind.OBJECT: "chair", TargetKind.AREA: "hall"}
+SOUND, CHAIR, HALL = (Target(kind, name) for kind, name in NAMED.items())
 FILES = [Target(TargetKind.IMAGE, "x.png"), Target(TargetKind.CLIP, "x.wav")]
 
 
@@ -129,11 +128,6 @@ def test_a_listed_question_is_answered_as_a_whole_or_refused(ask: Ask, of: list[
     assert "x.wav" not in told and (not ask.is_numbered or found.number == number)
 
 
-def test_what_is_beside_a_thing_in_a_room_is_asked_of_that_thing() -> None:
-    found = list_question(read_question("what is next to the bed in the bedroom?").inquiry)
-    assert found is not None and (found.of, found.name) == (Listed.BESIDE, "bed in the bedroom")
-
-
 @pytest.mark.parametrize("text", OTHER)
 def test_all_others_are_left_alone(text: str) -> None:
     assert read_list(text) is None and said_alternatives(text) == ()
@@ -144,6 +138,8 @@ def test_numbers_of_things(number: int, what: str) -> None:
     asked = ListQuestion(Listed.AT_LEAST, what, number=number)
     assert read_list(f"{number} {what}") == read_list(f"where are the {number} {what}?") == asked
     assert read_list(f"is there more than {number - 1} {what}") == read_list(f"{number} or more {what}") == asked
+    assert read_list(f"two {what}") == read_list(f"a pair of {what}") == replace(asked, number=2)
+    assert read_list("two") is None and read_list("2 m") is None and read_list(f"two {what} under the bed") is None
 
 
 @given(st.lists(st.sampled_from(["sofa", "armchair", "bed", "table"]), min_size=2, max_size=3, unique=True),
@@ -173,11 +169,6 @@ def test_each_alternative_has_the_context(names: list[str], tail: str) -> None:
 def test_what_is_asked_of_several_things_is_as_many_questions(text: str, said: list[str]) -> None:
     plain = [" ".join(word for word in one.split() if word != "the") for one in said]
     assert [" ".join(word for word in one.split() if word != "the") for one in said_each(text)] == plain
-
-
-def test_numbers_in_words() -> None:
-    assert read_list("two chairs") == read_list("a pair of chairs") == ListQuestion(Listed.AT_LEAST, "chairs", number=2)
-    assert read_list("two") is None and read_list("2 m") is None
 
 
 @given(st.text(max_size=60))

@@ -1,5 +1,3 @@
-import re
-
 import pytest
 
 from avlmaps.core.errors import QueryError
@@ -37,18 +35,13 @@ UNDERSTOOD = {
 def test_a_sentence_becomes_its_parts_in_order_and_the_first_is_sought(sentence: str) -> None:
     question = parse_sentence(sentence)
     assert [(str(part.modality), part.query) for part in question.parts] == UNDERSTOOD[sentence]
+    assert all(part.is_file is ("." in part.query) for part in question.parts)
     assert [part.role for part in question.parts] == [Role.PRIMARY] + [Role.CONTEXT] * (len(question.parts) - 1)
-
-
-def test_pictures_and_clips_are_files() -> None:
-    parts = parse_sentence("the chair near the sound bark.ogg and the photo x.png").parts
-    assert [part.is_file for part in parts] == [False, True, True]
 
 
 @pytest.mark.parametrize("sentence", ["", "  ?! "])
 def test_an_empty_sentence_is_refused(sentence: str) -> None:
-    expected = "The sentence is empty; say what is sought, such as: the chair near the sound of glass breaking."
-    with pytest.raises(QueryError, match=f"^{re.escape(expected)}$"):
+    with pytest.raises(QueryError, match=r"^The sentence is empty; say what is sought, such as: "):
         parse_sentence(sentence)
 
 

@@ -1,5 +1,6 @@
 """Listing what a map holds: things, sounds and rooms against a furnished map whose contents are known."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -30,10 +31,12 @@ from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.perception.embedded.pixels import EmbeddedPixels, features_of
 from avlmaps.query.answer import Answer, PartAnswer
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.contents import SoundEvent, Thing
+from avlmaps.query.contents import SoundEvent, Thing, find_things
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.goals import Goal
 from avlmaps.query.lists import answer_list
+from avlmaps.query.objects import Instances
+from avlmaps.query.selection import MapLists, Wanted, page_of_things
 from avlmaps.query.settings import QuerySettings
 
 
@@ -129,6 +132,35 @@ def test_an_empty_map_holds_nothing() -> None:
     assert nothing.points.shape == (0, 3)
 
 
+def test_a_side_is_neither_yes_nor_no_and_a_choice_is_no_yes(furnished: AVLMap) -> None:
+    for side in ("under", "behind", "south of", "on"):
+        with pytest.raises(QueryError, match=f"'{side}': a map finds what is near"):
+            furnished.ask(f"is there a chair {side} the table?")
+    assert furnished.ask("is there a chair near the table?").text.startswith("Yes. ")
+    assert furnished.ask("is the chair near the table or near the floor?").text.startswith(
+        "The chair near the table is"
+    )
+
+
+def test_what_is_next_to_a_thing_is_as_far_as_the_list_says(furnished: AVLMap) -> None:
+    (near,) = page_of_things(MapLists(furnished), Wanted(name=["chair"], near="table", top=1))["things"]
+    found = re.fullmatch(r"Next to the table: chair \((.+) m\)\.", furnished.ask("what is next to the table?").text)
+    assert found is not None and near.get("distance_m") == pytest.approx(float(found[1]), abs=0.051)
+
+
+def test_a_thing_that_two_searches_for_a_name_find_is_listed_once() -> None:
+    avlmap = fake_map(
+        voxels_of(box((0, 0, 0), (5, 5, 10)), np.zeros((250, 1))), encoders=fake_encoders(EmbeddedPixels())
+    )
+
+    def search(name: str, alone: bool) -> Instances:
+        rows = np.arange(0, 250, 3 if alone else 1)
+        zeros = np.zeros(len(rows), np.float32)
+        return Instances(rows, zeros.astype(np.int64), zeros, zeros, np.array([0.9 if alone else 0.8], np.float32))
+
+    assert [len(chair.rows) for chair in find_things(avlmap, search, ["chair"])] == [84]
+
+
 def test_a_sentence_is_answered_like_its_parts(furnished: AVLMap) -> None:
     answer = furnished.ask("the chair near the sound of a dog")
     assert answer.parts[0].part.query == "chair"
@@ -151,13 +183,13 @@ def test_a_wall_hides_what_an_open_plan_shows_and_who_asks_for_sounds_is_told_so
         return [goal.name for goal in answer.goals]
 
     heard = [SoundEvent((f"dog {x}",), (0.9,), x, 9.0, (x, 1.5, 0.5), np.zeros((0, 3)), Path()) for x in (2.2, 3.8)]
-    there = [thing("sink", 3.5), thing("chair", 1.9), thing("window", 3.0)]
+    there = [thing("sink", 3.5), thing("chair", 1.9), thing("window", 3.0), thing("picture", 3.0)]
     part = PartAnswer(Part(Modality.OBJECT, "sofa", Role.PRIMARY), 1.0, True)
     sofa = Answer((Goal((2.5, 1.5, 0.5), 0.8, (0.4, 0.4, 0.4), {}, 0.8),), True, (part,))
     near_sofa = Target(TargetKind.SOUND, near=(Target(TargetKind.OBJECT, "sofa"),))
     beside, near = ListQuestion(Listed.BESIDE, "sofa"), ListQuestion(Listed.HEARD, sounds=(near_sofa,))
     assert told(True, beside) == ["window", "chair"] and told(True, near) == ["dog 2.2"]
-    assert told(False, beside) == ["window", "chair", "sink"] and told(False, near) == ["dog 2.2", "dog 3.8"]
+    assert told(False, beside) == ["window", "picture", "chair", "sink"] and told(False, near) == ["dog 2.2", "dog 3.8"]
 
 
 @pytest.mark.parametrize(

@@ -109,8 +109,8 @@ class _Marked:
 
 def _first(kind: str, marked: _Marked, facts: frozenset[str]) -> act.Refuse | act.Clarify | None:
     for row in _rows(kind):
-        found = _pattern(row.says).search(marked.text) if row.of <= facts and row.unless.isdisjoint(facts) else None
-        if found is None:
+        claims = row.unless.isdisjoint(facts) and not any(facts.isdisjoint(one.split("|")) for one in row.of)
+        if not claims or (found := _pattern(row.says).search(marked.text)) is None:
             continue
         start, end = next((found.span(name) for name in found.groupdict() if found[name]), found.span())
         said = marked.said(start, end)

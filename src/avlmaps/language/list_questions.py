@@ -118,7 +118,7 @@ def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
     stand = stand_ins(text, own)
     if stand.own:
         read = read_list(stand.text)
-        return None if read is None else replace(read, name=stand.back(read.name), other=stand.back(read.other))
+        return read and replace(read, name=stand.back(read.name), other=stand.back(read.other))
     plain = _plain(text)
     matched = ((of, found.groupdict("")) for of, says in _rows() if (found := says.fullmatch(plain)))
     questions = (_listed(of, defaultdict(str, said)) for of, said in matched)
@@ -136,7 +136,7 @@ def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
         return None
     change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(said["change"])), "")
     thing = _several(thing) if of is Listed.ROOMS_WITH else thing
-    name, since = room or thing or said["seen"], said["visit"] + said["date"]
+    name, since, how = room or thing or said["seen"], said["visit"] + said["date"], "rooms" if said["names"] else how
     return ListQuestion(of, name, counts=bool(said["counts"]), since=since, change=change, how=how, other=said["other"])
 
 
@@ -147,8 +147,9 @@ def _numbered(plain: str) -> ListQuestion | None:
     what = "" if found is None else plain[found.end() :].strip()
     name = pattern(_TABLE, "tail").sub("", what).strip()
     is_named = any(lexicon().head(name, kind) is not None for kind in (EntryKind.THING, EntryKind.ROOM))
-    what = what.replace(name, _several(name), 1)
-    return ListQuestion(Listed.AT_LEAST, what, number=number) if is_named and number > 1 else None
+    if not is_named or number < 2 or pattern(_TABLE, "sided").search(what):
+        return None
+    return ListQuestion(Listed.AT_LEAST, what.replace(name, _several(name), 1), number=number)
 
 
 def least_said(text: str) -> int:

@@ -178,7 +178,7 @@ def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
     for one in targets:
         if one.pick not in (Pick.ANY, Pick.NEAREST) or one.number > 1:
             raise QueryError(f"A map cannot choose {phrase(replace(one, near=()))!r}; say what it is near.")
-    sides = sentence.side_notes((*inquiry.of, *targets))
+    sides = sentence.side_notes((*inquiry.of, *targets), beside=inquiry.ask in (Ask.BESIDE, Ask.CONTENTS))
     notes = (*sentence.notes, *resolver.notes, *sides, *_from_nowhere(sentence, targets))
     number = (least_said(sentence.text) if inquiry.ask.is_numbered else 0) or inquiry.number
     return AskedSentence(replace(inquiry, of=targets, number=number), tuple(dict.fromkeys(notes)))

@@ -65,10 +65,10 @@ class Sentence:
         """One sentence for each misspelt word, and for each order that is read at another place."""
         return (*(f"'{said}' is read as '{meant}'." for said, meant in self.respelt.items()), *self.order_notes)
 
-    def side_notes(self, targets: Iterable[Target]) -> tuple[str, ...]:
-        """One sentence for each relation of targets to what is near them that is read as a wider one."""
+    def side_notes(self, targets: Iterable[Target], *, beside: bool = False) -> tuple[str, ...]:
+        """One sentence for each relation to what is near targets, or to themselves, that is read as a wider one."""
         words, notes = " ".join(token.text for token in self.tokens), dict[str, None]()
-        for near in (near for target in targets for near in target.near if not near.is_file):
+        for near in (near for one in targets for near in (*one.near, *[one] * beside) if not near.is_file):
             is_room = near.kind is TargetKind.AREA
             read = "'in': the room counts, the place in it" if is_room else "'near': distance counts, the side"
             side = words_of("rewrites")["room_side" if is_room else "side"]

@@ -6,7 +6,7 @@
 import itertools
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING
@@ -43,10 +43,12 @@ _READ_AS = re.compile("is read as '(?:near|in)': ")  # in notes
 _BETWEEN = re.compile(r"\bbetween\b", re.IGNORECASE)
 _NEAR = r"\b(?:near|next to|beside|by|close to)(?: the)?"
 _DENIES = re.compile(r"\b(?:no|not|none|without)\b|n't\b", re.IGNORECASE)
+_WHETHER = re.compile(r"\b(?:there|have|has|had|got|any|see|seen|find|found)\b", re.IGNORECASE)  # not "is it a or b?"
 _ANY = re.compile(r"\bany(?:where)?\b", re.IGNORECASE)
 _AND = " and "
 # A name that ends so is that of a file.
 _FILE = re.compile(r"\.(?:wav|flac|ogg|mp3|m4a|aac|opus|aiff?|png|jpe?g|webp|heic|heif|avif|tiff?|bmp)$", re.IGNORECASE)
+_NO_SIDES = "a map finds what is near or in something, not on which side; ask whether it is near, or where each is."
 _EXAMPLE = "the red cabinet near the sound of a dog barking"
 ENDS = ("between", "and")
 """The relations to the two parts between which goals lie."""
@@ -219,8 +221,7 @@ def _of_storeys(asking: _Asking) -> Answer | None:
 
     if asks_how_many_storeys(sentence):
         return how_many(asking.avlmap)
-    said = said_storeys(sentence)
-    if not said:
+    if not (said := said_storeys(sentence)):
         return None
     return answer_on_storey(
         asking.avlmap, said, asking.asked.top, lambda rest, top: asking.but(sentence=rest, top=top).answer(_of_storeys)
@@ -276,14 +277,24 @@ def _of_lists(asking: _Asking) -> Answer | None:
     from avlmaps.query.lists import answer_list
 
     asked, own = asking.asked, own_names(asking.avlmap, asking.asked.sentence)
-    listed = read_list(asked.sentence, own)
+    listed, notes = read_list(asked.sentence, own), ()
     if listed is None and asked.sentence.strip():
         try:
-            inquiry = _reading(asked, asked.sentence, own).inquiry
+            read = _reading(asked, asked.sentence, own)
         except QueryError:  # `_read` says why a sentence is not understood
             return None
-        listed = list_question(inquiry)
-    return listed and answer_list(asking.avlmap, listed, asked.top, partial(_about, asking), asked.at)
+        listed, notes = list_question(read.inquiry), read.notes
+    answer = listed and answer_list(asking.avlmap, listed, asked.top, partial(_about, asking), asked.at)
+    return answer and _noted(answer, notes, whether=answer.text.startswith("Yes"))
+
+
+def _noted(answer: Answer, notes: Collection[str], *, whether: bool) -> Answer:
+    # Says how words were read. A yes or no does not rest on a distance where a side is asked.
+    sides = [note for note in notes if _READ_AS.search(note)]
+    if whether and sides and all(part.found for part in answer.parts):
+        raise QueryError(f"{sides[0].split(' is read')[0]}: {_NO_SIDES}")
+    every = tuple(dict.fromkeys((*notes, *answer.notes)))
+    return replace(answer, notes=every, text=" ".join(dict.fromkeys((answer.text, *sides))))
 
 
 def _about(asking: _Asking, words: str) -> Answer:
@@ -300,8 +311,7 @@ def _read(asking: _Asking) -> Answer:
     questions = dict.fromkeys(question for one in read for question in one.questions)
     notes, kind = dict.fromkeys(note for one in read for note in one.notes), read[0].inquiry.ask
     counted = kind is Ask.HOW_MANY
-    listed = None if questions else _of_lists(asking)  # "the largest room" in another question
-    if listed is not None:
+    if not questions and (listed := _of_lists(asking)):  # "the largest room" in another question
         return listed
     answers: list[tuple[Question, Answer]] = []
     for question in (_placed(one, asked.at) for one in questions):
@@ -328,13 +338,14 @@ def _read(asking: _Asking) -> Answer:
     text = found_text(best.parts, best.goals[0], count) if best.found and counted else best.text
     if kind is Ask.EXISTS or _ANY.search(asked.sentence):  # any will do
         text = text.removesuffix(f" {WHICH}")
-    # A bare yes to "is there no chair" says nothing, and what was not found may be there.
-    if kind is Ask.EXISTS and not _DENIES.search(asked.sentence):
+    if kind is Ask.EXISTS and others and not _WHETHER.search(asked.sentence):
+        text = " ".join([text, *(one.text for _, one in others if one.found == best.found)])
+    elif kind is Ask.EXISTS and not _DENIES.search(asked.sentence):  # a bare yes to "is there no chair" says nothing
         text = f"{'Yes' if best.found else 'No'}. {text}"
-    return replace(
-        best, goals=best.goals[: asked.top], count=count, notes=(*notes, *best.notes),
-        alternatives=(*best.alternatives, *alternatives), text=" ".join([text, *filter(_READ_AS.search, notes)]),
-    )  # fmt: skip
+    told = replace(
+        best, goals=best.goals[: asked.top], count=count, alternatives=(*best.alternatives, *alternatives), text=text
+    )
+    return _noted(told, notes, whether=kind is Ask.EXISTS)
 
 
 KINDS: tuple[_Kind, ...] = (_of_storeys, _of_both, _of_parts, _of_sources, _of_lists, _read)
@@ -455,9 +466,8 @@ def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
         peak = float(factor.scores.max(initial=0.0))
     elif isinstance(factor, NearThings):
         peak = float(factor.mask.any())
-    own = best if factor.is_named else 0.0
     is_found = factor.found or (whole.found and part.role is Role.PRIMARY)
-    return PartAnswer(part, peak, is_found, factor.understood, factor.note, own)
+    return PartAnswer(part, peak, is_found, factor.understood, factor.note, best if factor.is_named else 0.0)
 
 
 def _alone(question: Question, heats: Sequence[Heatmap]) -> Alternative:

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -23,6 +24,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.modalities import sound_features
 from avlmaps.query.objects import Instances
+from avlmaps.query.places import Box
 from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer, row_of
 from avlmaps.query.settings import FEWEST_VIEWS, FOUND_AT
 from avlmaps.query.voxel_space import middle_of
@@ -222,14 +224,15 @@ def find_things(
         watch("things", number, len(searches))
         for confidence, rows in _confident(search(name, alone), least_confidence):
             claims.append((not alone or confidence < FOUND_AT, -confidence, -len(rows), name, rows))
-    owned = np.zeros(len(avlmap.space), bool)
-    things: list[Thing] = []
-    # A confident "armchair" stays one, though "chair" takes it in and is more confident still.
+    owned, things, boxes = np.zeros(len(avlmap.space), bool), list[Thing](), list[tuple[str, Box]]()
+    # A confident "armchair" stays one, though "chair" is surer still. Two searches for a name may find one thing.
     for _, doubt, _, name, rows in sorted(claims, key=lambda claim: claim[:4]):
         if owned[rows].mean() >= _SAME_SHARE or len(rows) < _FEWEST_VOXELS:
             continue
-        owned[rows] = True
-        things.append(thing_of(avlmap, name, -doubt, rows))
+        owned[rows], thing = True, thing_of(avlmap, name, -doubt, rows)
+        box = Box(avlmap.space, thing.position, thing.size)
+        things += [] if any(other == name and box.overlaps(one) for other, one in boxes) else [thing]
+        boxes.append((name, box))
     return sorted(things, key=lambda thing: -thing.confidence)
 
 
@@ -409,8 +412,7 @@ class Whereabouts:
         named = {one.region: name for name, one in zip(self.names, self.rooms, strict=True)}
         asked = room if isinstance(room, str) else named.get(room.region, room.name)
         self.require(asked)
-        inside = self.inside(asked, [thing.position for thing in things])
-        return [thing for thing, is_in in zip(things, inside, strict=True) if is_in]
+        return list(compress(things, self.inside(asked, [thing.position for thing in things])))
 
     def has(self, asked: str) -> bool:
         """Return whether a word names a room of the map, or a part of one."""

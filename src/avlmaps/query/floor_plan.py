@@ -89,10 +89,10 @@ class FloorPlan:
         i, j = np.floor((level[:, :2] - self.origin_m) / CELL_M).astype(np.int64).T
         return np.ravel_multi_index((storey, i, j), self.wall.shape, mode="clip")
 
-    def parts(self, one: Sequence[float], other: Sequence[float]) -> bool:
-        """Return whether a wall stands between two places; what is in a wall, a window, is on both its sides."""
-        clear = np.flatnonzero(~self.wall.reshape(-1)[self._cells(np.linspace(one, other, 100))])  # steps of a line
-        return bool((np.diff(clear) > 1).any())
+    def parts(self, one: tuple[Sequence[float], bool], other: tuple[Sequence[float], bool]) -> bool:
+        """Return whether a wall stands between two places; what opens a wall, a window (true), is on both its sides."""
+        clear = ~self.wall.reshape(-1)[self._cells(np.linspace(one[0], other[0], 100))]  # steps of a line
+        return bool((np.diff(np.flatnonzero(np.r_[not one[1], clear, not other[1]])) > 1).any())
 
     def storeys_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return the storey of each point, from 0, the lowest."""

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
+from itertools import compress, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,12 +29,12 @@ from avlmaps.query.changes import ChangeKind, Days
 from avlmaps.query.contents import NOWHERE, Whereabouts
 from avlmaps.query.edits import means
 from avlmaps.query.goals import MOST_GOALS, Goal
-from avlmaps.query.places import lies_between
+from avlmaps.query.places import Box, lies_between
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Stay
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.contents import SoundEvent, Thing
+    from avlmaps.query.contents import SoundEvent
 
 BESIDE_M = 1.0  # from box to box, horizontally
 _HEARD_M = 2.5  # from the robot to the box of what it was near
@@ -76,7 +76,7 @@ class _Lists:
     def found(self, words: str) -> Answer:
         """Return the answer of what a question names. ``_AbsentError``: it is not found."""
         subject = self.ask(words)
-        goals = tuple(goal for goal in subject.goals if self.keeps(goal.position))
+        goals = tuple(replace(goal, name=words) for goal in subject.goals if self.keeps(goal.position))
         if not (subject.found and self.likely(goals)):
             text = f"No {words} is found." if subject.found else subject.text
             raise _AbsentError(replace(subject, goals=(), found=False, text=text))
@@ -291,8 +291,7 @@ def _changes(lists: _Lists) -> Answer:
     listed = [one for one in answer["changes"] if one["kind"] in kinds and lists.keeps(one["position"])]
     if question.name:
         lists.avlmap.where.require(question.name)
-        inside = lists.avlmap.where.inside(question.name, [one["position"] for one in listed])
-        listed = [one for one, is_in in zip(listed, inside, strict=True) if is_in]
+        listed = list(compress(listed, lists.avlmap.where.inside(question.name, [one["position"] for one in listed])))
     answer["changes"] = listed
     goals = [_goal(one["position"], one["confidence"], one["name"], one["size"]) for one in listed]
     whole = lists.answer(goals, changes.text_of(answer, kinds, question.name), count=len(listed))
@@ -332,13 +331,12 @@ def _usual(lists: _Lists) -> Answer:
     at_home = changes.usual_place_text(days, name, found, avlmap.where.name_of)
     text = changes.usual_text(found, place) if how else at_home
     whole = lists.answer([_goal(one.stay.position, one.share, one.name, one.stay.size) for one in found], text)
-    is_known = bool(found) and found[0].is_usual
-    return replace(whole, found=is_known, usual=tuple(one.to_json() for one in found))
+    return replace(whole, found=bool(found) and found[0].is_usual, usual=tuple(one.to_json() for one in found))
 
 
 def lies(avlmap: "AVLMap", how: str, stay: "Stay", mark: Goal) -> bool:
     """Return whether a thing lies on or near another."""
-    own, place = _Box(avlmap, stay), _Box(avlmap, mark)
+    own, place = Box(avlmap.space, stay.position, stay.size), Box(avlmap.space, mark.position, mark.size)
     if own.overlaps(place):
         return False
     if how == "near":
@@ -349,23 +347,6 @@ def lies(avlmap: "AVLMap", how: str, stay: "Stay", mark: Goal) -> bool:
     over = bool((np.abs(own.middle - place.middle)[:2] <= place.size[:2] / 2.0).all())
     rises_m = (own.middle[2] - own.size[2] / 2.0) - place.middle[2]
     return over and 0.0 <= rises_m <= place.size[2] / 2.0 + _ON_M
-
-
-class _Box:
-    # The upright box of a thing, level frame, metres.
-
-    def __init__(self, avlmap: "AVLMap", thing: "Stay | Goal | Thing") -> None:
-        self.middle: Float[np.ndarray, 3] = avlmap.space.level(np.array([thing.position]))[0]
-        self.size: Float[np.ndarray, 3] = np.array(thing.size)
-
-    def gap_m(self, other: "_Box") -> float:
-        # Top-down.
-        apart = np.abs(self.middle - other.middle)[:2] - (self.size + other.size)[:2] / 2.0
-        return float(np.linalg.norm(np.maximum(apart, 0.0)))
-
-    def overlaps(self, other: "_Box") -> bool:
-        # Each holds the middle of the other: they are one thing.
-        return bool((np.abs(self.middle - other.middle) < np.minimum(self.size, other.size) / 2.0).all())
 
 
 def _counted(lists: _Lists) -> tuple[list[Goal], str]:
@@ -424,8 +405,7 @@ def _contents(lists: _Lists) -> Answer:
     name = lists.question.name
     subject = lists.found(name)
     where, things = lists.avlmap.where, lists.goals("things")
-    inside = where.inside(name, [thing.position for thing in things])
-    goals = [thing for thing, is_in in zip(things, inside, strict=True) if is_in]
+    goals = list(compress(things, where.inside(name, [thing.position for thing in things])))
     number = f"{len(goals)} thing{'s' * (len(goals) > 1)}: " if lists.question.counts and goals else ""
     text = f"In {the_room(name)}: {number}{counted([goal.name for goal in goals])}."
     text = text if where.has(name) else f"The map shows no room that is a {name} as a whole."
@@ -436,22 +416,23 @@ def _beside(lists: _Lists) -> Answer:
     subject = lists.found(lists.question.name)
     if lists.question.other:
         return _between(lists, subject)
-    goals = lists.goals("things")
-    near = _near(lists, subject.goals[0], goals, BESIDE_M)
-    words = in_words([one.part for one in subject.parts])
+    goals, parts, where = lists.goals("things"), [one.part for one in subject.parts], lists.avlmap.where
+    for room in (part.query for part in parts[1:] if where.has(part.query)):
+        goals = list(compress(goals, where.inside(room, [goal.position for goal in goals])))
+    near, words = _near(lists, subject.goals[0], goals, BESIDE_M), in_words(parts)
     what = ", ".join(f"{goals[number].name} ({gap:.1f} m)" for gap, number in near[:_MOST_NAMED])
-    text = f"Next to {words}: {what or 'no thing that the map is certain of'}."
-    return lists.answer([goals[number] for _, number in near], text, subject)
+    return lists.answer([goals[number] for _, number in near], f"Next to {words}: {what or counted([])}.", subject)
 
 
 def _near(lists: _Lists, mark: Goal, goals: Sequence[Goal], most_m: float) -> list[tuple[float, int]]:
-    # The gap to each goal near a thing and its number, the nearest first. A wall between two
-    # rooms parts things; an open plan, however many rooms it is, parts none.
-    votes, (own, *boxes) = lists.avlmap.room_votes, [_Box(lists.avlmap, one) for one in (mark, *goals)]
-    room, *rooms = lists.avlmap.where.rooms_of(np.array([one.position for one in (mark, *goals)])).tolist()
+    # The gap to each goal near a thing and its number, the nearest first: in an open plan, or on one side of a wall.
+    votes, every = lists.avlmap.room_votes, (*goals, mark)
+    *boxes, own = [Box(lists.avlmap.space, one.position, one.size) for one in every]
+    *rooms, room = lists.avlmap.where.rooms_of(np.array([one.position for one in every])).tolist()
+    mounts = [getattr(lexicon().head(one.name, EntryKind.THING), "mount", "") for one in every]
+    *ends, end = [(one.position, mount == "built in") for one, mount in zip(every, mounts, strict=True)]
     near = [(gap, n) for n, box in enumerate(boxes) if (gap := own.gap_m(box)) <= most_m and not own.overlaps(box)]
-    apart = {n for _, n in near if votes and rooms[n] != room and votes.plan.parts(mark.position, goals[n].position)}
-    return sorted(one for one in near if one[1] not in apart)
+    return sorted(one for one in near if not (votes and rooms[n := one[1]] != room and votes.plan.parts(end, ends[n])))
 
 
 def _between(lists: _Lists, one: Answer) -> Answer:
@@ -464,11 +445,11 @@ def _between(lists: _Lists, one: Answer) -> Answer:
     for name in (question.name, question.other):  # what is in a room is not beside it
         if avlmap.where.has(name):
             fits &= ~avlmap.where.inside(name, [goal.position for goal in goals])
-    boxes = [_Box(avlmap, end.goals[0]) for end in (one, other)]
+    boxes = [Box(avlmap.space, end.goals[0].position, end.goals[0].size) for end in (one, other)]
     inside = [
         replace(goal, probability=min(goal.probability, sure))
         for goal, is_in in zip(goals, fits.tolist(), strict=True)
-        if is_in and not any(box.overlaps(_Box(avlmap, goal)) for box in boxes)
+        if is_in and not any(box.overlaps(Box(avlmap.space, goal.position, goal.size)) for box in boxes)
     ]
     words = " and ".join(in_words([part.part for part in end.parts]) for end in (one, other))
     what = counted([goal.name for goal in inside]) if inside or not question.how else "no room"

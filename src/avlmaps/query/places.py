@@ -19,6 +19,7 @@ from avlmaps.query.words import VoxelNamer, keyframes_that_saw
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.voxel_space import Space
 
 
 def place_of(text: str) -> Float[np.ndarray, " n"]:
@@ -46,6 +47,22 @@ def distance_m(level: Callable[[Any], np.ndarray], point: Sequence[float], place
 def is_place(near: str | Sequence[float]) -> bool:
     """Return whether what things are near to is meant as a place rather than as the name of a thing."""
     return not isinstance(near, str) or not any(letter.isalpha() for letter in near)
+
+
+class Box:
+    """The upright box of a thing, level frame, metres."""
+
+    def __init__(self, space: "Space", position: Sequence[float], size: Sequence[float]) -> None:
+        self.middle, self.size = space.level(np.array(position)), np.array(size)
+
+    def gap_m(self, other: "Box") -> float:
+        """Return how far another box is, top-down; 0 where they meet."""
+        apart = np.abs(self.middle - other.middle)[:2] - (self.size + other.size)[:2] / 2.0
+        return float(np.linalg.norm(np.maximum(apart, 0.0)))
+
+    def overlaps(self, other: "Box") -> bool:
+        """Return whether each holds the middle of the other: they are one thing."""
+        return bool((np.abs(self.middle - other.middle) < np.minimum(self.size, other.size) / 2.0).all())
 
 
 _ASIDE_M = 0.5  # how far from the line between two things what is between them may lie

@@ -7,13 +7,12 @@ from typing import Any, NotRequired, TypedDict, TypeVar
 
 import numpy as np
 
-from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AvlmapsError, QueryError
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import the_room
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Watch, listed_rooms, put_storeys, require_known
-from avlmaps.query.places import distance_m, is_place, place_given
+from avlmaps.query.places import Box, distance_m, is_place, place_given
 from avlmaps.query.schema import ListedThing, NearAnswer, Notes, RoomAnswer, SoundAnswer, ThingAnswer
 from avlmaps.query.sound_sources import with_heard
 from avlmaps.query.words import unknown_note
@@ -81,8 +80,7 @@ class Wanted:
     name: Sequence[str] = ()  # list these things only; by default the pixel encoder's vocabulary
     structure: bool = False  # list walls, floors and the like as well
     room: str | None = None  # a room by its name, or all rooms of a kind
-    # What the things are near to: x,y,z of the recording frame, x,y of the level frame, or the name of a thing. The
-    # nearest come first.
+    # What they are near to, the nearest first: x,y,z of the recording frame, x,y of the level one, or a thing's name.
     near: str | Sequence[float] | None = None
     top: int | None = None  # most things of a page; None for all
     page: int = 1  # which page, counted from 1
@@ -124,8 +122,7 @@ def page_of_things(lists: MapLists, wanted: Wanted) -> ThingsPage:
         rows = [ListedThing(**thing) for thing in lists.wanted(wanted)]
     else:
         chosen, about = selected(lists, wanted)
-        parts = lists.avlmap.where.parts
-        rows = [_row(one, parts[one.part].name if one.part >= 0 else None) for one in chosen]
+        rows = [_row(one, lists.avlmap.where.parts[one.part].name if one.part >= 0 else None) for one in chosen]
     top = max(len(rows), 1) if wanted.top is None else wanted.top
     things, pages = page_of(rows, top, wanted.page, "things")
     answer: ThingsPage = {"things": things, "total": len(rows), "page": wanted.page, "pages": pages}
@@ -150,14 +147,9 @@ def selected(lists: MapLists, wanted: Wanted) -> tuple[list[Selected], NearAnswe
     found = _inside(lists, wanted.room, things_with_rooms(lists, wanted), lambda one: one.thing["position"])
     if wanted.near is None:
         return found, None
-    place, about = _near(lists, wanted.near, wanted.at, wanted.room)
+    away_m, about = _near(lists, wanted.near, wanted.at, wanted.room)
     itself = None if about is None else about["position"]
-    level = lists.avlmap.space.level
-    found = [
-        replace(one, away_m=distance_m(level, one.thing["position"], place))
-        for one in found
-        if one.thing["position"] != itself
-    ]
+    found = [replace(one, away_m=away_m(one.thing)) for one in found if one.thing["position"] != itself]
     return sorted(found, key=lambda one: one.away_m or 0.0), about
 
 
@@ -172,19 +164,18 @@ def page_of(rows: Sequence[Row], top: int, page: int, of: str) -> tuple[list[Row
 
 
 def _row(one: Selected, room: str | None) -> ListedThing:
-    row = ListedThing(**one.thing)
-    row["room"] = room
-    if one.away_m is not None:
-        row["distance_m"] = round(one.away_m, 3)
-    return row
+    row: ListedThing = {**one.thing, "room": room}
+    return row if one.away_m is None else {**row, "distance_m": round(one.away_m, 3)}
 
 
 def _near(
     lists: MapLists, near: str | Sequence[float], at: str | None, room: str | None
-) -> tuple[Float[np.ndarray, " n"], NearAnswer | None]:
-    # The place that is meant, and the thing there if one is named; where the room holds one, that.
+) -> tuple[Callable[[ThingAnswer], float], NearAnswer | None]:
+    # How far a thing is from the place that is meant, and the thing there if one is named: in the room if it can be.
+    space = lists.avlmap.space
     if is_place(near):
-        return place_given(near), None
+        place = place_given(near)
+        return lambda thing: distance_m(space.level, thing["position"], place), None
     name = str(near)
     known = lists.avlmap.knows(name)
     things = lists.things(names=[name], at=at) if known else []
@@ -193,7 +184,8 @@ def _near(
         raise QueryError(f"The map shows no {name[:60]!r} to be near to{why}; give a place as x,y,z, or another name.")
     best = next(iter(_inside(lists, room, things, lambda thing: thing["position"])), things[0])
     about: NearAnswer = {"name": best["name"], "confidence": best["confidence"], "position": best["position"]}
-    return np.array(best["position"]), about
+    own = Box(space, best["position"], best["size"])
+    return lambda thing: own.gap_m(Box(space, thing["position"], thing["size"])), about
 
 
 def _inside(lists: MapLists, room: str | None, rows: Sequence[Row], place: Callable[[Row], list[float]]) -> list[Row]:
