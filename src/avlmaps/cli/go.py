@@ -160,6 +160,8 @@ def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None")
         driver, settings = InstantDriver(avlmap, GroundPose(0.0, 0.0)), robot_settings(verb, translation)
         told = rehearse(verb.sentence, translation, avlmap, driver, settings=settings, readable=None)
         told = replace(told, done=(), moves=(), elapsed_s=0.0)
+    else:
+        told = replace(told, notes=(*told.notes, f"There is no map at {verb.map}: the words alone are checked."))
     if told.error_type == ProgramError.__name__:  # it may depend on what a drive finds out
         told = replace(told, error=None, error_type=None)
     missing = None if told.error is None else error_answer(kind_named(told.error_type or ""), told.error)

@@ -78,6 +78,8 @@ def _main(words: list[str]) -> None:
 
 
 def _run(verb: "Verb") -> int:
+    if swapped := _swapped(verb):
+        return _fail(verb, output.UsageError(swapped), swapped, 2)
     try:
         with _models_in_force(verb), announce_compiling() if verb.compiles else nullcontext():
             verb.run()
@@ -86,7 +88,7 @@ def _run(verb: "Verb") -> int:
     except (output.UsageError, AskError) as error:
         return _fail(verb, error, str(error), 2)
     except AvlmapsError as error:
-        return _fail(verb, error, _swapped(verb) or str(error), 1)
+        return _fail(verb, error, str(error), 1)
     except KeyboardInterrupt as stop:
         if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving; its answer is printed
             return _complain(stop, status)

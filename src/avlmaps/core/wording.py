@@ -19,6 +19,8 @@ class Spelling(Enum):
     """Python: ``overwrite=True``, ``Corrections.depth_unit_m=METRES``."""
     FLAG = "flag"
     """The command line: ``--overwrite``, ``--depth-unit METRES``."""
+    LINE = "line"
+    """The shell: flags, and what a question back asks for is the next line."""
     FIELD = "field"
     """HTTP: ``intrinsics=fx,fy,cx,cy``."""
 
@@ -112,8 +114,8 @@ def option(name: str, value: str = "", argument: str = "", python: str = "") -> 
     ``python`` are its name here and the value in Python, where these are others.
     """
     spelling = _asked_as.get() or _spelling
-    if spelling is Spelling.FLAG:
-        return flag(name, value)
+    if spelling in (Spelling.FLAG, Spelling.LINE):
+        return value if spelling is Spelling.LINE and name == "choose" else flag(name, value)
     plain = name.replace("-", "_")
     named = plain
     if spelling is Spelling.ARGUMENT:
