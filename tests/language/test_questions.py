@@ -47,7 +47,7 @@ def test_pictures_and_clips_are_files() -> None:
 
 @pytest.mark.parametrize("sentence", ["", "  ?! "])
 def test_an_empty_sentence_is_refused(sentence: str) -> None:
-    expected = "The sentence is empty; say what is sought, such as: the chair near the sound of glass breaking."
+    expected = "The sentence has no words; say what is sought, such as: the chair near the sound of glass breaking."
     with pytest.raises(QueryError, match=f"^{re.escape(expected)}$"):
         parse_sentence(sentence)
 

@@ -195,7 +195,7 @@ class MapDriver:
         if trip.fault or abs(left_rad) > _TURNED_RAD:
             return self._arrival(trip, False, trip.fault or f"the turn ended {np.rad2deg(abs(left_rad)):.0f}° off")
         small = not trip.actions and abs(angle_rad) > 0.01
-        return self._arrival(trip, True, "it turns by 5° at a time, so that it did not turn" if small else "")
+        return self._arrival(trip, True, "it turns in steps of 5°, and so small an angle is none" if small else "")
 
     def forward(self, distance_m: float) -> Arrival:
         """Drive straight ahead until an obstacle; for a negative distance it turns round first."""

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from numbers import Real
+from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -80,7 +81,8 @@ def describe_query(heat: Heatmap) -> str:
 
 
 def _name(factor: Factor) -> str:
-    return f"{'the source of ' if factor.part.at == 'source' else ''}{factor.part.query!r}"
+    query = Path(factor.part.query).name if factor.part.is_file else factor.part.query
+    return f"{'the source of ' if factor.part.at == 'source' else ''}{query!r}"
 
 
 def things_in(heat: Heatmap, guess: bool = False) -> list[Destination]:

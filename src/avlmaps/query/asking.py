@@ -95,8 +95,9 @@ class Asked:
                 raise AskError(_no_name(kind, name, self.attachments is None))
         words = bool(self.sentence.strip())
         if words == named and (words or not self.files):
+            both = "not both" if words else "nothing is given"
             raise AskError(
-                "A query takes a sentence, or parts (object, sound, area, photo, clip), and not both; for example: "
+                f"A query takes a sentence, or parts (object, sound, area, photo, clip), and {both}; for example: "
                 f"{_EXAMPLE}."
             )
 
@@ -346,7 +347,7 @@ def _read(asking: _Asking) -> Answer:
         text = text.removesuffix(f" {WHICH}")
     # A bare yes to "is there no chair" says nothing, and what was not found may be there.
     if kind is Ask.EXISTS and not _DENIES.search(asked.sentence):
-        text = f"{'Yes' if best.found else 'No'}. {text}"
+        text = f"Yes. {text}" if best.found else text if text.startswith("No ") else f"No. {text}"
     return replace(
         best, goals=best.goals[: asked.top], count=count, notes=(*notes, *best.notes),
         alternatives=(*best.alternatives, *alternatives), text=" ".join([text, *filter(_READ_AS.search, notes)]),

@@ -15,7 +15,7 @@ from avlmaps.core.poses import FRAME, FrameName
 from avlmaps.core.printable import plot_text
 from avlmaps.core.question import Modality
 from avlmaps.core.wording import place_text
-from avlmaps.query.export import palette
+from avlmaps.query.export import explain_write_errors, palette
 from avlmaps.query.factors import Factor, NearAnchors
 from avlmaps.query.goals import Goal
 from avlmaps.query.settings import FOUND_AT
@@ -347,9 +347,6 @@ def save(figure: "Figure", path: Path | str) -> Path:
     path = user_path(path)
     if path.suffix.lower().lstrip(".") not in figure.canvas.get_supported_filetypes():
         raise QueryError(f"A picture cannot be written as {path.name!r}; give it the suffix .png, .jpg, .svg or .pdf.")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with explain_write_errors(path):
         figure.savefig(path, bbox_inches="tight", pad_inches=0.15)
-    except OSError as fault:
-        raise QueryError(f"The picture {path} cannot be written ({fault.strerror}); choose another place.") from fault
     return path
