@@ -308,9 +308,8 @@ def failure(answer: dict[str, Any]) -> dict[str, Any] | None:
 
 def go_lines(answer: dict[str, Any]) -> list[str]:
     """Lay out the answer of `go`: the program where it was not driven, and the places."""
-    # What was told while it drove is not repeated.
-    told = bool(answer["steps"])
-    lines = [] if told else [*([answer["plan"]] if answer.get("plan") else []), *answer["program"].splitlines()]
+    told = bool(answer["steps"])  # while it drove
+    lines = [] if told else [*filter(None, [answer.get("plan")]), *answer["program"].splitlines()]
     columns: dict[str, Column] = {
         "": "number",
         "went to": lambda goal: goal["name"] or ("a place" if goal["skill"] == "move_to" else "straight on"),

@@ -152,7 +152,7 @@ class Locate(InFrame, MapVerb):
         rows = ["  " + " ".join(f"{value:9.4f}" for value in row) for row in pose]
         return [
             *notes,
-            f"located at {place_text(answer['position'])}{room}, heading {answer['heading_deg']:.0f}°",
+            f"located at {place_text(row[3] for row in pose[:3])}{room}, heading {answer['heading_deg']:.0f}°",
             f"{answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):",
             *rows,
         ]

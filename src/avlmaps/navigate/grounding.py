@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from numbers import Real
-from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -81,8 +80,7 @@ def describe_query(heat: Heatmap) -> str:
 
 
 def _name(factor: Factor) -> str:
-    query = Path(factor.part.query).name if factor.part.is_file else factor.part.query
-    return f"{'the source of ' if factor.part.at == 'source' else ''}{query!r}"
+    return f"{'the source of ' if factor.part.at == 'source' else ''}{factor.part.shown!r}"
 
 
 def things_in(heat: Heatmap, guess: bool = False) -> list[Destination]:

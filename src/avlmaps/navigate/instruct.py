@@ -236,11 +236,11 @@ class _Run:
 
     def judge(self) -> None:
         """Note what a person might take for more than it is."""
-        if self.last is not None and self.last.error is None:
-            if not self.robot.moves:
-                self.note(MOVED_NOTHING)
-            if self.robot.seeker.numbers:
-                self.note(f"{option('choose')} has no effect: nothing is left to choose.")
+        is_done = self.last is not None and self.last.error is None
+        if is_done and not self.robot.moves:
+            self.note(MOVED_NOTHING)
+        if is_done and self.robot.seeker.numbers:
+            self.note(f"{option('choose')} has no effect: nothing is left to choose.")
         for move in self.robot.moves:
             if move.reached and move.distance_m is not None and move.distance_m > _NEAR_M:
                 what = move.name or move.skill

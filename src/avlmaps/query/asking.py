@@ -95,10 +95,9 @@ class Asked:
                 raise AskError(_no_name(kind, name, self.attachments is None))
         words = bool(self.sentence.strip())
         if words == named and (words or not self.files):
-            both = "not both" if words else "nothing is given"
             raise AskError(
-                f"A query takes a sentence, or parts (object, sound, area, photo, clip), and {both}; for example: "
-                f"{_EXAMPLE}."
+                "A query takes a sentence, or parts (object, sound, area, photo, clip), "
+                f"and {'not both' if words else 'nothing is given'}; for example: {_EXAMPLE}."
             )
 
     @property

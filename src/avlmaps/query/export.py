@@ -199,19 +199,17 @@ def explain_write_errors(path: Path) -> Generator[None]:
 
     Only the last folder of its path is made, for a longer one that is missing is likely misspelt.
     """
-    folder, made = path.parent, False
+    folder, is_new = path.parent, not path.parent.exists()
     try:
-        if not folder.exists():
-            folder.mkdir()
-            made = True
+        folder.mkdir(exist_ok=True)
         yield
-        if made:
-            say(f"made the folder {folder}")
     except OSError as fault:
-        with suppress(OSError):
-            if made:  # and empty
+        if is_new:
+            with suppress(OSError):  # it is empty
                 folder.rmdir()
         raise QueryError(f"{path} cannot be written ({fault.strerror or fault}); choose another place.") from fault
+    if is_new:
+        say(f"made the folder {folder}")
 
 
 def _write(path: Path, content: bytes) -> Path:

@@ -138,7 +138,8 @@ def draw_heat(
         _draw_heat(ax, view, factor.shown)
         _draw_anchors(ax, factor)
         note = "" if factor.found else f" · not found, at most {factor.shown.max(initial=0.0):.2f}"
-        ax.set_title(f"{plot_text(_query_text(factor))} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
+        title = plot_text(f"{factor.part.modality}: {factor.part.shown}")
+        ax.set_title(f"{title} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
     if count > 1:
         draw_ground(axes[-1], view, space)
         _draw_heat(axes[-1], view, shown)
@@ -329,11 +330,6 @@ def finish(figure: "Figure", axes: "Sequence[Axes]", with_heat: bool) -> None:
         bar.set_label(HEAT_LABEL, fontsize=8, color=INK)
         bar.ax.tick_params(labelsize=7, colors=INK)
         bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
-
-
-def _query_text(factor: Factor) -> str:
-    query = Path(factor.part.query).name if factor.part.is_file else factor.part.query
-    return f"{factor.part.modality}: {query}"
 
 
 def _rgb(colour: str) -> Float[np.ndarray, "3"]:

@@ -351,7 +351,6 @@ class LocateAnswer(TypedDict):
     """The camera pose of a photo, or null where the photo cannot be located."""
 
     world_from_camera: Matrix | None
-    position: Annotated[Position | None, Meta(description="of the camera")]
     heading_deg: Annotated[float | None, Meta(description="where it looks, from +x to the left in the level frame")]
     room: Annotated[str | None, Meta(description="name of the room that it stands in")]
     inliers: Annotated[int, Meta(description="keypoints that agree with the pose")]
@@ -390,7 +389,6 @@ def locate_answer(located: "Located", avlmap: "AVLMap") -> LocateAnswer:
     ahead = None if pose is None else avlmap.space.level_from_recording[:2, :3] @ pose[:3, 2]
     answer: LocateAnswer = {
         "world_from_camera": None if pose is None else pose.tolist(),
-        "position": place,
         "heading_deg": None if ahead is None else round(math.degrees(math.atan2(ahead[1], ahead[0])), 1),
         "room": None if place is None else avlmap.where.name_of(place),
         "inliers": int(located.inliers),

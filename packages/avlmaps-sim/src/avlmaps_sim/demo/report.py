@@ -358,10 +358,9 @@ def _figure(sheet: Sheet, content: Sequence[str], label: str) -> str:
 
 def _label(answer: "Answer", part: int) -> str:
     one = answer.parts[part]
-    name = Path(one.part.query).name if one.part.is_file else one.part.query
     understood = f", understood as {one.understood}" if one.understood not in ("", one.part.query) else ""
     return (
-        f"{one.part.modality}: {name}"
+        f"{one.part.modality}: {one.part.shown}"
         + ("" if one.part.is_file else understood)
         + ("" if one.found else " (not found)")
     )
@@ -393,7 +392,7 @@ def _said(step: "Step") -> str:
 def _without_folder(note: str, step: "Step") -> str:
     for part in step.ask.question.parts:
         if part.is_file:
-            note = note.replace(part.query, Path(part.query).name)
+            note = note.replace(part.query, part.shown)
     return note
 
 
