@@ -210,7 +210,7 @@ def test_a_number_chooses_one_of_several_meanings(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize(
-    ("spelling", "yes"), [(Spelling.FLAG, "--choose 1"), (Spelling.FIELD, "choose=1"), (Spelling.LINE, "1")]
+    ("spelling", "yes"), [(Spelling.FLAG, "--choose 1"), (Spelling.FIELD, r"choose=\[1\]"), (Spelling.LINE, "1")]
 )
 @pytest.mark.parametrize("order", ["go to the sofa or so", "I might go to the sofa"])
 def test_a_question_with_one_choice_says_how_to_say_yes(

@@ -76,7 +76,7 @@ class LearnedTranslator:
         intents = meanings[number - 1] if chosen else read.intents
         said = verbalise(intents)
         if stop is not None and not chosen:
-            answer = option("choose", "1", argument="LearnedTranslator.choose")
+            answer = option("choose", "1", argument="LearnedTranslator.choose", field="[1]")
             how = f" If so: {answer}." if len(meanings) == 1 else f" Choose it by its number ({answer})."
             none = f"There is no number {number}. " if number and meanings else ""
             raise UnclearError(none + said + (how if meanings else ""), getattr(stop, "choices", ()), bool(meanings))

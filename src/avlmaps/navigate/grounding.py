@@ -307,7 +307,7 @@ class Seeker:
         several = f"{none}{fitting(len(equal), sum(thing.found for thing in things))} {name} equally: {listed}{more}."
         raise SeveralFitError(
             f"{several} Which one? Say the nearest, or what it is near, or choose one by its number "
-            f"({option('choose', '1', python='(1,)')}).",
+            f"({option('choose', '1', python='(1,)', field='[1]')}).",
             self.choices,
         )
 
