@@ -18,6 +18,8 @@ def test_things_are_selected_and_paged(built: Path, answer, run, tmp_path: Path)
     every = answer("things", built, "--least", "0.2")["things"]
     out = run("things", built, "--least", "0.2")[1]
     assert out.startswith("thing ") and "position of the robot" in out
+    named = run("things", built, "--least", "0.2", "--name", every[0]["name"])[1]
+    assert named.startswith("thing ") and "position of the robot" not in named
     words = ("things", built, "--least", "0.2", "--top", "1")
     first = answer(*words, "--csv", tmp_path / "t.csv")
     assert first["total"] == len(every) == first["pages"] and first["things"] == every[:1]

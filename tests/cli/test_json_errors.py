@@ -188,8 +188,8 @@ def test_a_misspelt_map_or_recording_is_answered_with_the_one_beside(built: Path
         assert f"did you mean {built}?" in run(*words)[2]
     assert f"did you mean {walk}?" in run("build", walk.with_name("recc"), "--out", walk.parent / "o.avlmap")[2]
     code, _, err = run("query", "the red thing", built)
-    assert code == 1 and f"avlmaps query {built} 'the red thing'" in err
-    assert "avlmaps go" in run("go", "turn left", built, "--scene", "house:1")[2]
+    assert code == 2 and f"avlmaps query {built} 'the red thing'" in err
+    assert "avlmaps go" in run("go", "turn left", built, "--dry-run")[2]
     assert "Did you mean colours?" in run("build", walk, "--out", walk.parent / "o.avlmap", "--profile", "colors")[2]
 
 

@@ -20,6 +20,8 @@ import cv2
 import pytest
 
 from avlmaps.core.extras import install_command
+from avlmaps.language.intents import Turn
+from avlmaps.language.learned.decision import Weighed
 from helpers.raycast import render
 from helpers.room import Room
 from helpers.walked_room import CAMERA
@@ -111,6 +113,18 @@ def test_a_plan_is_driven_only_when_it_is_confirmed(piped, built: Path, monkeypa
     assert right["heading_rad"] == pytest.approx(1.57, abs=0.1), "the robot stays where it stopped"
     assert "error" in said[5] and err.count("Drive this plan?") == 4
     assert "I will turn left 90 degrees." in err
+
+
+@pytest.mark.parametrize("answer", ["yes", "1"])
+def test_yes_or_a_number_answers_a_question_back(
+    piped, built: Path, monkeypatch: pytest.MonkeyPatch, answer: str
+) -> None:
+    readings = (Weighed((Turn(-90.0),), 0.4),)
+    monkeypatch.setattr("avlmaps.language.commands.weighed_readings", lambda *_: readings)
+    _, out, err = piped(f"go left or so\n2\n{answer}\n", built)
+    assert "If so: 1." in err and "Choose a number, 1 to 1" in err
+    assert "I will turn left 90 degrees." in out
+    assert "cannot answer" in piped(f"go left or so\nthe red thing\n{answer}\n", built)[2]  # the question is over
 
 
 def test_without_a_scene_nothing_is_driven(piped, built: Path) -> None:

@@ -91,7 +91,7 @@ def test_a_map_whose_sound_model_is_not_here_is_described_without_names(
     assert err == "note: the sounds have no names here. The sound model is not installed.\n"
 
 
-def test_a_photo_is_located_to_the_contract(built: Path, answer, tmp_path: Path) -> None:
+def test_a_photo_is_located_to_the_contract(built: Path, answer, run, tmp_path: Path) -> None:
     truth = Room().walk()[146]  # between two frames of the map
     view = render(Room().scene, CAMERA, truth)
     photo = tmp_path / "photo.png"
@@ -99,6 +99,9 @@ def test_a_photo_is_located_to_the_contract(built: Path, answer, tmp_path: Path)
     told = answer("locate", built, photo)
     assert {"world_from_camera", "inliers", "reference", "frame", "elapsed_ms"} <= told.keys()
     pose = np.array(told["world_from_camera"])
+    ahead = truth[:2, 2]
+    assert abs(np.rad2deg(np.arctan2(ahead[1], ahead[0])) - told["heading_deg"]) % 360.0 < 1.5
+    assert f"heading {told['heading_deg']:.0f}°" in run("locate", built, photo)[1]
     assert np.linalg.norm(pose[:3, 3] - truth[:3, 3]) < 0.05
     assert np.rad2deg(rotation_angle_rad(pose, truth)) < 1.0
     given = answer("locate", built, photo, "--intrinsics", f"{CAMERA.fx},{CAMERA.fy},{CAMERA.cx},{CAMERA.cy}")

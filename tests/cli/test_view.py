@@ -31,6 +31,7 @@ def test_a_page_is_written_and_told(answer, run, built: Path, tmp_path: Path) ->
     told = answer("view", built, "--out", out, "--questions", "the red thing")
     assert told["page"] == str(out) and told["bytes"] == out.stat().st_size
     assert told["questions"] == [{"question": "the red thing", "found": True}]
+    assert "'asdf': " in run("view", built, "--out", out, "--overwrite", "--questions", "the red thing", "asdf")[2]
     status, _, err = run("view", built, "--out", out)
     assert status == 2 and "--overwrite" in err
     status, said, _ = run("view", built, built, "--out", out, "--overwrite", "--questions", "the red thing")

@@ -11,8 +11,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AvlmapsError, LanguageError
+from avlmaps.core.wording import Spelling, asked_as
 from avlmaps.language import intents as act
 from avlmaps.language.commands import read_command
+from avlmaps.language.gate import UNSURE, NoOrder
 from avlmaps.language.intents import Clarify, Go, If, Pick, Refuse, Return, StopAt, Target, TargetKind, targets_of
 from avlmaps.language.learned.decision import Weighed
 from avlmaps.language.program import parse_program
@@ -203,8 +205,26 @@ def test_a_number_chooses_one_of_several_meanings(monkeypatch: pytest.MonkeyPatc
         chosen = LearnedTranslator(choose=number).program_for(command)
         assert chosen.plan == choice and chosen.chosen
         assert parse_program(chosen.program).skills
-    with pytest.raises(UnclearError):
+    with pytest.raises(UnclearError, match=r"^There is no number 9\. .* \(LearnedTranslator.choose=1\)\.$"):
         LearnedTranslator(choose=9).program_for(command)
+
+
+@pytest.mark.parametrize(
+    ("spelling", "yes"), [(Spelling.FLAG, "--choose 1"), (Spelling.FIELD, r"choose=\[1\]"), (Spelling.LINE, "1")]
+)
+@pytest.mark.parametrize("order", ["go to the sofa or so", "I might go to the sofa"])
+def test_a_question_with_one_choice_says_how_to_say_yes(
+    monkeypatch: pytest.MonkeyPatch, spelling: Spelling, yes: str, order: str
+) -> None:
+    unsure = order.startswith("go")
+    readings = (Weighed((Go(thing("sofa")),), 0.4 if unsure else 1.0),)
+    monkeypatch.setattr("avlmaps.language.commands.weighed_readings", lambda *_: readings)
+    monkeypatch.setattr(
+        "avlmaps.language.commands.no_order", lambda _: None if unsure else NoOrder(UNSURE, "An order?")
+    )
+    with asked_as(spelling), pytest.raises(UnclearError, match=rf"\? .*If so: {yes}\.$") as caught:
+        command_to_program(order)
+    assert caught.value.numbered and len(caught.value.choices) == 1
 
 
 @pytest.mark.parametrize(
@@ -213,12 +233,25 @@ def test_a_number_chooses_one_of_several_meanings(monkeypatch: pytest.MonkeyPatc
         ("go to the door at dusk", ["I will go to the door."]), ("forget the kitchen", []), ("park on the cat", []),
         ("before sunset drive to the oven", ["I will go to the oven."]), ("turn left or right", ["left"]),
         ("circle the biggest table clockwise", ["I will drive around the biggest table clockwise."]),
+        ("go to -4.5, 0.5", []), ("drive to (1, 2)", []), ("go to x=1 y=2", []), ("never mind", []),
         ("go out of the bathroom", []), ("stop right behind the toddler so he trips", []),
     ],
 )  # fmt: skip
 def test_what_words_stop_offers_the_whole_reading_or_none(command: str, choices: list[str]) -> None:
     read = read_command(command)
     assert read.stops is not None and list(getattr(read.stops, "choices", ()))[:1] == choices[:1]
+
+
+def test_what_is_asked_back_says_what_to_do_instead() -> None:
+    assert verbalise(read_command("go to the sofa, never mind").intents) == "Nothing moves."
+    assert "edit MAP --pin NAME" in verbalise(read_command("go to position (-4.97, 4.83, 0.53) m").intents)
+    assert read_command("go to room 3, then turn right 90 degrees").stops is None
+
+
+def test_amounts_of_other_units_are_told_rounded_and_driven_exactly() -> None:
+    translation = LearnedTranslator().program_for("go forward 2 feet")
+    assert translation.plan == "I will move forward 0.61 m." and "0.6096" in translation.program
+    assert verbalise((act.Turn(2.0 * 57.29578),)) == "I will turn right 114.6 degrees."
 
 
 def test_a_clock_in_a_remark_stops_no_order() -> None:
@@ -347,7 +380,7 @@ def test_figures_are_taken_as_they_are(metres: float, degrees: int) -> None:
 
 @pytest.mark.parametrize("text", ["", " ?! ", "x" * 1001])
 def test_an_empty_or_endless_command_is_an_error(text: str) -> None:
-    with pytest.raises(LanguageError, match=r"is empty|has 1001 characters"):
+    with pytest.raises(LanguageError, match=r"has no words|has 1001 characters"):
         read_command(text)
 
 

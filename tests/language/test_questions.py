@@ -41,7 +41,7 @@ def test_a_sentence_becomes_its_parts_in_order_and_the_first_is_sought(sentence:
 
 @pytest.mark.parametrize("sentence", ["", "  ?! "])
 def test_an_empty_sentence_is_refused(sentence: str) -> None:
-    with pytest.raises(QueryError, match=r"^The sentence is empty; say what is sought, such as: "):
+    with pytest.raises(QueryError, match=r"^The sentence has no words; say what is sought, such as: "):
         parse_sentence(sentence)
 
 

@@ -267,7 +267,7 @@ def test_a_body_that_moves_otherwise_than_told_is_stopped_soon(wrong):
 def test_what_is_too_small_for_an_action_is_told():
     driver = driver_in(BUILDING)
     for arrival in (driver.forward(0.04), driver.turn(np.radians(2.0))):
-        assert arrival.actions == () and "at a time, so that it did not" in arrival.note
+        assert arrival.actions == () and "and stays where less is asked" in arrival.note
     assert not driver.turn(0.001).note
 
 

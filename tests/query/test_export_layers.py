@@ -127,7 +127,9 @@ def test_what_cannot_be_written_leaves_no_folder(tmp_path: Path, monkeypatch: py
 
     monkeypatch.setattr(export, "write_bytes_atomically", full)
     (tmp_path / "there").mkdir()
-    for folder in (tmp_path / "new" / "out", tmp_path / "there"):
+    for folder in (tmp_path / "new", tmp_path / "there"):
         with pytest.raises(QueryError, match="No space left"):
             write_openlex3d(folder, furnished_map())
+    with pytest.raises(QueryError, match="No such file"):  # a longer path is likely misspelt
+        write_openlex3d(tmp_path / "new" / "out", furnished_map())
     assert [path.name for path in tmp_path.iterdir()] == ["there"]

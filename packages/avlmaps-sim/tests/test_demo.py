@@ -21,7 +21,7 @@ from avlmaps_sim.demo import run_demo
 from avlmaps_sim.demo.drive import Drive, command_for
 from avlmaps_sim.demo.evidence import Box, Evidence
 from avlmaps_sim.demo.questions import FURNITURE, RARE, REACH_M, SMALL, SPOKEN, PhotoView, choose_questions
-from avlmaps_sim.demo.report import DemoReport, Step
+from avlmaps_sim.demo.report import DemoReport, Step, to_go_on
 from avlmaps_sim.demo.run import FIRST_SEED, DemoSettings, choose_home, fits, record_settings
 from avlmaps_sim.demo.svg import Sheet, colour_of, envelope, from_above
 from avlmaps_sim.materials import material
@@ -241,6 +241,14 @@ def test_saying_that_there_is_none_is_right_only_where_there_is_none(tmp_path: P
     assert not Step(asks[0], nothing, "p.png").right
     assert Step(asks[0], nothing, "p.png").verdict == "WRONG"
     assert not Step(asks[-1], {"found": True, "goals": [{"position": [0, 0, 0], "score": 1.0}]}, "p.png").right
+
+
+def test_the_report_goes_on_with_what_was_answered(tmp_path: Path) -> None:
+    asks, _ = choose_questions(two_rooms(), [], tmp_path, np.random.default_rng(0))
+    right = {"found": True, "goals": [{"position": [*asks[0].truth[0].high[:2], 0.4], "score": 0.5}]}
+    told = to_go_on([Step(asks[0], right, "p.png")], "house:1")
+    assert asks[0].title in told and "get_nearest_pos" in command_to_program(re.findall('"(.*?)"', told)[1])
+    assert to_go_on([Step(asks[0], {"found": False, "goals": []}, "p.png")], "house:1") == ""
 
 
 @pytest.mark.nightly

@@ -50,7 +50,7 @@ class Go(Asking, MapVerb):
     sentence: Annotated[Positional[str], arg(metavar="SENTENCE")]
     """Command for the robot."""
     scene: Annotated[str | None, arg(metavar="SCENE")] = None
-    """Scene in which the simulated body drives: house:SEED, office:SEED or a file, as for `avlmaps record`."""
+    """Scene in which the simulated body drives, as for `avlmaps record`: house:7, office:3:held-out or a file."""
     language: Literal["learned", "rules", "local", "chat"] = "learned"
     """Translator of the sentence: the reader that ships (also by its former name, rules), it and a language model of
     this machine together (local, with --llm), or a chat model."""
@@ -160,6 +160,8 @@ def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None")
         driver, settings = InstantDriver(avlmap, GroundPose(0.0, 0.0)), robot_settings(verb, translation)
         told = rehearse(verb.sentence, translation, avlmap, driver, settings=settings, readable=None)
         told = replace(told, done=(), moves=(), elapsed_s=0.0)
+    else:
+        told = replace(told, notes=(*told.notes, f"There is no map at {verb.map}: the words alone are checked."))
     if told.error_type == ProgramError.__name__:  # it may depend on what a drive finds out
         told = replace(told, error=None, error_type=None)
     missing = None if told.error is None else error_answer(kind_named(told.error_type or ""), told.error)
@@ -305,19 +307,20 @@ def failure(answer: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def go_lines(answer: dict[str, Any]) -> list[str]:
-    """Lay out the answer of `go`: the program, and the places."""
-    lines = [*([answer["plan"]] if answer.get("plan") else []), *answer["program"].splitlines()]
+    """Lay out the answer of `go`: the program where it was not driven, and the places."""
+    told = bool(answer["steps"])  # while it drove
+    lines = [] if told else [*filter(None, [answer.get("plan")]), *answer["program"].splitlines()]
     columns: dict[str, Column] = {
         "": "number",
-        "went to": lambda goal: goal["name"] or goal["skill"].replace("_", " "),
+        "went to": lambda goal: goal["name"] or ("a place" if goal["skill"] == "move_to" else "straight on"),
         "goal": "goal",
         "stopped at": "stop",
         "away": lambda goal: f"{goal['distance_m']:.2f} m" + ("" if goal["reached"] else ", not reached"),
     }
     goals = [{"number": number, **goal} for number, goal in enumerate(answer["subgoals"], 1)]
     lines += table(columns, goals) if goals else []
-    lines += [f"note: {note}" for note in answer["notes"] if note != answer["error"]]
-    if answer["steps"]:
+    lines += [] if told else [f"note: {note}" for note in answer["notes"] if note != answer["error"]]
+    if told:
         done = "done" if answer["ok"] else "not done"
         lines.append(f"{done}: {answer['path_m']:.1f} m driven, {len(answer['actions'])} actions")
     return [*lines, f"wrote {answer['plot']}"] if "plot" in answer else lines

@@ -66,6 +66,7 @@ def _main(words: list[str]) -> None:
 
     try:
         verb = read_command(words)
+        _require_map_first(verb)
     except (BackendError, output.UsageError) as error:  # BackendError: the verb is of a package that is not installed
         # The line may not be readable: its words alone say whether JSON is wanted.
         if "--json" in (words[: words.index("--")] if "--" in words else words):
@@ -86,7 +87,7 @@ def _run(verb: "Verb") -> int:
     except (output.UsageError, AskError) as error:
         return _fail(verb, error, str(error), 2)
     except AvlmapsError as error:
-        return _fail(verb, error, _swapped(verb) or str(error), 1)
+        return _fail(verb, error, str(error), 1)
     except KeyboardInterrupt as stop:
         if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving; its answer is printed
             return _complain(stop, status)
@@ -102,12 +103,12 @@ def _run(verb: "Verb") -> int:
     return 0
 
 
-def _swapped(verb: "Verb") -> str | None:
-    """Return a sentence where the words of a query or a command stand in the place of its map."""
+def _require_map_first(verb: "Verb") -> None:
+    """Refuse words of a query or a command that stand in the place of its map."""
     place, words = getattr(verb, "map", None), getattr(verb, "sentence", None)
-    if place is None or not words or place.exists() or not Path(words, "map.json").is_file():
-        return None
-    return f"{words} is the map, and it comes first: avlmaps {type(verb).__name__.lower()} {words} {str(place)!r}"
+    if place is not None and words and not place.exists() and Path(words, "map.json").is_file():
+        name = type(verb).__name__.lower()
+        raise output.UsageError(f"{words} is the map, and it comes first: avlmaps {name} {words} {str(place)!r}")
 
 
 def _fail(verb: "Verb", error: BaseException, message: str, status: int) -> int:

@@ -11,7 +11,7 @@ from tyro.conf import Positional, arg
 from avlmaps.cli.output import UsageError, query_lines
 from avlmaps.cli.verb import COUNT, Asking, InFrame, MapVerb, OptionalPath, OptionalText, idle, shown_in
 from avlmaps.core.progress import say
-from avlmaps.core.wording import option
+from avlmaps.core.wording import option, place_text, the_room
 
 if TYPE_CHECKING:
     from avlmaps.query.asking import Asked
@@ -118,6 +118,8 @@ class Query(Asking, InFrame, MapVerb):
 class Locate(InFrame, MapVerb):
     """Find the 6-DoF pose of a photo's camera in the map, or report that the photo cannot be located.
 
+    A photo that is not located is an answer as well, with exit status 0; its `world_from_camera` is null.
+
     Example: avlmaps locate home.avlmap photo.jpg
     """
 
@@ -139,16 +141,18 @@ class Locate(InFrame, MapVerb):
         found = avlmap.locate(rgb, given, None if given is not None else focal_35mm_of(self.image))
         if found.world_from_camera is not None and given is not None and found.camera != given:
             say(f"note: the focal length {given.fx:g} does not fit the photo; {found.camera.fx:.1f} was used.")
-        return shown_in(locate_answer(found, avlmap.data.info.doubts), self.frame, avlmap)
+        return shown_in(locate_answer(found, avlmap), self.frame, avlmap)
 
     def lines(self, answer: Mapping[str, Any]) -> list[str]:
         pose, notes = answer["world_from_camera"], [f"note: {note}" for note in answer.get("notes", [])]
         if pose is None:
             few = f"not located: {answer['inliers']} points agree, too few to fix a place"
             return [*notes, few]
+        room = f" in {the_room(answer['room'])}" if answer["room"] else ""
         rows = ["  " + " ".join(f"{value:9.4f}" for value in row) for row in pose]
         return [
             *notes,
-            f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):",
+            f"located at {place_text(row[3] for row in pose[:3])}{room}, heading {answer['heading_deg']:.0f}°",
+            f"{answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):",
             *rows,
         ]

@@ -26,6 +26,7 @@ from avlmaps.core.extras import install_command
 from avlmaps.core.files import user_path
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars, say
+from avlmaps.core.wording import Spelling, asked_as
 
 if TYPE_CHECKING:
     from avlmaps.core.motion import GroundPose
@@ -94,7 +95,8 @@ class Shell(MapVerb):
         if interactive:
             say(f"{session.opened!r}")
             say("Ask in words; help lists the verbs, Ctrl-D ends.")
-        failed, answered = answer_lines(session, lines, self.json)
+        with asked_as(Spelling.LINE):
+            failed, answered = answer_lines(session, lines, self.json)
         if failed and not interactive:
             raise AnsweredError(f"{failed} of {answered} lines failed.")
 
@@ -116,7 +118,7 @@ class ShellSession:
         self._robot: RobotDriver | None = None
         self._last: Query | None = None
         self._names: tuple[str, ...] | None = None
-        self._unchosen: tuple[str, str, tuple[int, ...]] | None = None
+        self._asked: tuple[str, str, tuple[int, ...], int] | None = None  # a command, its choices, and among how many
         self._lock = Lock()
         self.opened = given.opened()
 
@@ -124,9 +126,14 @@ class ShellSession:
         word, _, rest = line.partition(" ")
         word, rest = word.lower(), rest.strip()
         with self._lock:
-            if self._unchosen is not None and line.isdecimal():
-                said, after, chosen = self._unchosen
-                return self._go(said, after, confirms, (*chosen, int(line)))
+            asked, self._asked = self._asked, None
+            if asked is not None and (line.isdecimal() or line.lower() in YES):
+                said, after, chosen, choices = asked
+                number = int(line) if line.isdecimal() else choices  # yes to the only one
+                if not 1 <= number <= choices or (choices > 1 and not line.isdecimal()):
+                    self._asked = asked
+                    raise UsageError(f"Choose a number, 1 to {choices}, or say it in other words.")
+                return self._go(said, after, confirms, (*chosen, number))
             if word == "go":
                 return self._go(line, rest, confirms)
             if word not in VERBS or not _is_for_verb(word, rest):
@@ -189,7 +196,7 @@ class ShellSession:
     def _go(self, line: str, rest: str, confirms: Callable[[str], bool], choose: tuple[int, ...] = ()) -> Reply:
         """Plan a command, and drive it in the scene where there is one and the user confirms.
 
-        Where it asks which of several things is meant, the next line may be the number.
+        Where it asks which of several meanings or things is meant, the next line may be the number.
         """
         if not rest:
             raise UsageError("go takes a command, such as: go to the sofa, then turn left")
@@ -201,9 +208,15 @@ class ShellSession:
         )  # fmt: skip
         avlmap = self.opened
         translator = going.translator_for(command, avlmap)
-        translation = translator.program_for(command.sentence)
+        from avlmaps.language.translator import UnclearError
+
+        try:
+            translation = translator.program_for(command.sentence)
+        except UnclearError as question:
+            self._asked = (line, rest, choose, len(question.choices)) if question.numbered else None
+            raise
         plan = going.plan_answer(command, translation, avlmap)
-        self._unchosen = (line, rest, choose) if plan["choices"] else None
+        self._asked = (line, rest, choose, len(plan["choices"])) if plan["choices"] else None
         if going.failure(plan) is not None:
             return _driven(plan)
         if given.scene is None:

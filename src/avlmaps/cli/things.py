@@ -88,8 +88,8 @@ class Things(InFrame, MapVerb):
         if "total" in answer:
             page, pages, total = (answer[key] for key in ("page", "pages", "total"))
             return [*lines, f"page {page} of {pages}, {total} things in all"] if pages > 1 else lines
-        lines += ["", *sound_lines(answer["sounds"], frame)] if answer["sounds"] else []
-        return [*lines, "", *room_lines(answer["rooms"], frame)] if answer["rooms"] else lines
+        lines += ["", *sound_lines(answer["sounds"], frame)] if answer["sounds"] and not self.name else []
+        return lines if self.name or not answer["rooms"] else [*lines, "", *room_lines(answer["rooms"], frame)]
 
 
 @dataclass(frozen=True, kw_only=True)

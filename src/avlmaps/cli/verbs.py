@@ -86,6 +86,7 @@ def _any_verb(verbs: dict[str, type[Verb]]) -> Any:
 
 
 CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff)
+_NO_NUMBER = r"invalid literal for int\(\) with base 10|could not convert string to float"  # as Python says it
 V = TypeVar("V", bound=Verb)
 Options = TypeVar("Options")
 
@@ -101,6 +102,7 @@ def usage_sentence(printed: str) -> str:
 def meant(words: Sequence[str], printed: str, verbs: Mapping[str, type[Verb]]) -> str:
     """Return the fault in a command line in one sentence, with the verb or option that was probably meant."""
     sentence, name = usage_sentence(printed), words[0] if words else ""
+    sentence = re.sub(_NO_NUMBER, "no number", sentence)
     if not name or name.startswith("-"):
         return f"a verb comes first: {', '.join(verbs)}."
     if name not in verbs:

@@ -6,6 +6,7 @@ Sentences are parsed into these (``language``), and the map answers them (``quer
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from pathlib import Path
 from typing import Literal
 
 from avlmaps.core.errors import QueryError
@@ -49,6 +50,11 @@ class Part:
     is_file: bool = False
     at: HeardAt | None = None
     relation: str = ""
+
+    @property
+    def shown(self) -> str:
+        """The phrase, or the name of the file."""
+        return Path(self.query).name if self.is_file else self.query
 
     def __post_init__(self) -> None:
         if not isinstance(self.query, str):  # pyright: ignore[reportUnnecessaryIsInstance]

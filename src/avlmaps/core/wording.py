@@ -19,6 +19,8 @@ class Spelling(Enum):
     """Python: ``overwrite=True``, ``Corrections.depth_unit_m=METRES``."""
     FLAG = "flag"
     """The command line: ``--overwrite``, ``--depth-unit METRES``."""
+    LINE = "line"
+    """The shell: flags, and what a question back asks for is the next line."""
     FIELD = "field"
     """HTTP: ``intrinsics=fx,fy,cx,cy``."""
 
@@ -105,17 +107,17 @@ def flag(name: str, value: str = "") -> str:
     return f"--{name} {value}".rstrip()
 
 
-def option(name: str, value: str = "", argument: str = "", python: str = "") -> str:
+def option(name: str, value: str = "", argument: str = "", python: str = "", field: str = "") -> str:
     """Return how the reader of a sentence gives an option, by its name on the command line without dashes.
 
     ``value`` is what to give, such as ``METRES``; "" for a switch, or to name the option alone. ``argument`` and
-    ``python`` are its name here and the value in Python, where these are others.
+    ``python`` are its name here and the value in Python, ``field`` the value over HTTP, where these are others.
     """
     spelling = _asked_as.get() or _spelling
-    if spelling is Spelling.FLAG:
-        return flag(name, value)
+    if spelling in (Spelling.FLAG, Spelling.LINE):
+        return value if spelling is Spelling.LINE and name == "choose" else flag(name, value)
     plain = name.replace("-", "_")
-    named = plain
+    named, value = plain, field if field and spelling is Spelling.FIELD else value
     if spelling is Spelling.ARGUMENT:
         named, value = argument or _ARGUMENTS.get(name, plain), python or value
     given = value or ("True" if name in _SWITCHES else "")

@@ -22,11 +22,14 @@ _HARM = act.Refuse(act.RefusalReason.HARM)
 
 
 class UnclearError(LanguageError):
-    """A command is refused, or needs an answer: one of ``choices``, or any where there are none."""
+    """A command is refused, or needs an answer: one of ``choices``, or any where there are none.
 
-    def __init__(self, message: str, choices: tuple[str, ...] = ()) -> None:
+    Where they are ``numbered``, a number chooses one.
+    """
+
+    def __init__(self, message: str, choices: tuple[str, ...] = (), numbered: bool = False) -> None:
         super().__init__(message)
-        self.choices = choices
+        self.choices, self.numbered = choices, numbered
 
 
 def read_command(text: str, given: Attachments | None = None) -> Command:
@@ -35,7 +38,7 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
     Raises LanguageError where it is empty or too long.
     """
     if not any(mark.isalnum() for mark in text):
-        raise LanguageError(f"The command is empty; say it like: {EXAMPLE}.")
+        raise LanguageError(f"The command has no words; say it like: {EXAMPLE}.")
     if len(text) > MOST_CHARACTERS:
         raise LanguageError(
             f"The command has {len(text)} characters, more than {MOST_CHARACTERS}; give it in several commands."

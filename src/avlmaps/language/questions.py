@@ -56,7 +56,7 @@ def read_question(text: str, given: Attachments | None = None) -> AskedSentence:
     Raises a QueryError where it is empty, too long, or not understood, or where a name or a file is not known.
     """
     if not any(mark.isalnum() for mark in text):
-        raise QueryError(f"The sentence is empty; say what is sought, such as: {_EXAMPLE}.")
+        raise QueryError(f"The sentence has no words; say what is sought, such as: {_EXAMPLE}.")
     if len(text) > MOST_CHARACTERS:
         raise QueryError(
             f"The sentence has {len(text)} characters, more than {MOST_CHARACTERS}; say it shorter, like: {_EXAMPLE}."

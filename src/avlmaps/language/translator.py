@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from avlmaps.core.wording import option
 from avlmaps.language.commands import UnclearError, read_command
 from avlmaps.language.intents import Clarify
 from avlmaps.language.learned.decision import Command
@@ -75,7 +76,10 @@ class LearnedTranslator:
         intents = meanings[number - 1] if chosen else read.intents
         said = verbalise(intents)
         if stop is not None and not chosen:
-            raise UnclearError(said, getattr(stop, "choices", ()))
+            answer = option("choose", "1", argument="LearnedTranslator.choose", field="[1]")
+            how = f" If so: {answer}." if len(meanings) == 1 else f" Choose it by its number ({answer})."
+            none = f"There is no number {number}. " if number and meanings else ""
+            raise UnclearError(none + said + (how if meanings else ""), getattr(stop, "choices", ()), bool(meanings))
         return Translation(write_program(intents), read.notes, said, chosen)
 
     def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:

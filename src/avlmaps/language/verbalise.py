@@ -40,6 +40,8 @@ class _Words(act.Filled):
             return phrase(value).removeprefix("the ") if format_spec == "bare" else phrase(value)
         if isinstance(value, tuple):
             return _steps(value)
+        if isinstance(value, float):
+            value = round(value, 2 if abs(value) < 10.0 else 1)
         names = table("intents")["names"].get(format_spec)
         if names is None:
             return super().format_field(value, format_spec)

@@ -210,7 +210,7 @@ class MapDriver:
         if trip.fault or abs(left_rad) > _TURNED_RAD:
             return self._arrival(trip, False, trip.fault or f"the turn ended {np.rad2deg(abs(left_rad)):.0f}° off")
         small = not trip.actions and abs(angle_rad) > 0.01
-        return self._arrival(trip, True, "it turns by 5° at a time, so that it did not turn" if small else "")
+        return self._arrival(trip, True, "it turns in steps of 5°, and stays where less is asked" if small else "")
 
     def forward(self, distance_m: float) -> Arrival:
         """Drive straight ahead until an obstacle; for a negative distance it turns round first."""
@@ -234,7 +234,7 @@ class MapDriver:
                 trip, False, f"the body stands {off_m:.2f} m from where {distance_m:.2f} m ahead is (check its pose)"
             )
         small = not trip.actions and distance_m > 0.01
-        return self._arrival(trip, True, "it drives 0.1 m at a time, so that it did not move" if small else "")
+        return self._arrival(trip, True, "it drives in steps of 0.1 m, and stays where less is asked" if small else "")
 
     def stop(self) -> Arrival:
         """Stand still; whether the body does is looked at for a tenth of a second."""

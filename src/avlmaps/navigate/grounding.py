@@ -84,7 +84,7 @@ def describe_query(heat: Heatmap) -> str:
 
 
 def _name(factor: Factor) -> str:
-    return f"{'the source of ' if factor.part.at == 'source' else ''}{factor.part.query!r}"
+    return f"{'the source of ' if factor.part.at == 'source' else ''}{factor.part.shown!r}"
 
 
 def things_in(heat: Heatmap, guess: bool = False) -> list[Destination]:
@@ -181,7 +181,7 @@ class Seeker:
     """Finds in a map what a program means.
 
     ``notes`` are what a person should know: words half understood, guesses; ``choices`` the things that fitted equally
-    where the last error asks which is meant.
+    where the last error asks which is meant; ``numbers`` the answers to such questions that none has asked for yet.
     """
 
     def __init__(
@@ -200,7 +200,7 @@ class Seeker:
         order of the program. None: the best or the nearest, without a question.
         """
         self.avlmap, self.guess, self.readable, self._tell = avlmap, guess, readable, tell
-        self._asks, self._numbers = choose is not None, list(choose or ())
+        self._asks, self.numbers = choose is not None, list(choose or ())
         self._meant: dict[str, int] = {}
         self.choices: tuple[str, ...] = ()
         self._storey, self.heats = storey, {} if heats is None else heats
@@ -303,8 +303,8 @@ class Seeker:
         """Return the likeliest thing; of several that fit equally the one that was chosen."""
         equal = fit_equally(things)
         name = equal[0].name
-        if len(equal) > 1 and name not in self._meant and self._numbers:
-            self._meant[name] = self._numbers.pop(0)
+        if len(equal) > 1 and name not in self._meant and self.numbers:
+            self._meant[name] = self.numbers.pop(0)
         number = 1 if len(equal) == 1 else self._meant.get(name, 0)
         if 1 <= number <= len(equal):
             if len(equal) > 1:
@@ -314,10 +314,11 @@ class Seeker:
         self.choices = self._places_of(equal)
         listed = "; ".join(f"{at}: {where}" for at, where in enumerate(self.choices[:_MOST_LISTED], 1))
         more = f"; and {len(equal) - _MOST_LISTED} more" if len(equal) > _MOST_LISTED else ""
-        several = f"{fitting(len(equal), sum(thing.found for thing in things))} {name} equally: {listed}{more}."
+        none = f"There is no number {number}. " if number else ""
+        several = f"{none}{fitting(len(equal), sum(thing.found for thing in things))} {name} equally: {listed}{more}."
         raise SeveralFitError(
             f"{several} Which one? Say the nearest, or what it is near, or choose one by its number "
-            f"({option('choose', '1', python='(1,)')}).",
+            f"({option('choose', '1', python='(1,)', field='[1]')}).",
             self.choices,
         )
 

@@ -15,6 +15,7 @@ from jaxtyping import Float
 from avlmaps.core.errors import GoalNotFoundError, LanguageError, ProgramError, QueryError, SeveralFitError
 from avlmaps.core.motion import Action, GroundPose, Moved
 from avlmaps.core.poses import FRAME
+from avlmaps.core.wording import option
 from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program
 from avlmaps.language.sentence import Attachments
 from avlmaps.language.translator import LearnedTranslator, Translation, Translator
@@ -235,8 +236,11 @@ class _Run:
 
     def judge(self) -> None:
         """Note what a person might take for more than it is."""
-        if self.last is not None and self.last.error is None and not self.robot.moves:
+        is_done = self.last is not None and self.last.error is None
+        if is_done and not self.robot.moves:
             self.note(MOVED_NOTHING)
+        if is_done and self.robot.seeker.numbers:
+            self.note(f"{option('choose')} has no effect: nothing is left to choose.")
         for move in self.robot.moves:
             if move.reached and move.distance_m is not None and move.distance_m > _NEAR_M:
                 what = move.name or move.skill

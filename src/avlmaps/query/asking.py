@@ -90,8 +90,8 @@ class Asked:
         words = bool(self.sentence.strip())
         if words == named and (words or not self.files):
             raise AskError(
-                "A query takes a sentence, or parts (object, sound, area, photo, clip), and not both; for example: "
-                f"{_EXAMPLE}."
+                "A query takes a sentence, or parts (object, sound, area, photo, clip), "
+                f"and {'not both' if words else 'nothing is given'}; for example: {_EXAMPLE}."
             )
 
     @property
@@ -340,8 +340,9 @@ def _read(asking: _Asking) -> Answer:
         text = text.removesuffix(f" {WHICH}")
     if kind is Ask.EXISTS and others and not _WHETHER.search(asked.sentence):
         text = " ".join([text, *(one.text for _, one in others if one.found == best.found)])
-    elif kind is Ask.EXISTS and not _DENIES.search(asked.sentence):  # a bare yes to "is there no chair" says nothing
-        text = f"{'Yes' if best.found else 'No'}. {text}"
+    # A bare yes to "is there no chair" says nothing, and what was not found may be there.
+    elif kind is Ask.EXISTS and not _DENIES.search(asked.sentence):
+        text = f"Yes. {text}" if best.found else text if text.startswith("No ") else f"No. {text}"
     told = replace(
         best, goals=best.goals[: asked.top], count=count, alternatives=(*best.alternatives, *alternatives), text=text
     )

@@ -13,6 +13,7 @@ from avlmaps.core.arrays import Float32, Int, UInt8
 from avlmaps.core.errors import QueryError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.poses import FrameName
+from avlmaps.core.progress import say
 from avlmaps.perception.embedded.colours import COLOURS, example_of
 
 if TYPE_CHECKING:
@@ -194,16 +195,21 @@ def _millis(value: float) -> str:
 
 @contextmanager
 def explain_write_errors(path: Path) -> Generator[None]:
-    """Make the folder of a file that is written then. ``QueryError``: it cannot be written."""
-    made = [folder for folder in path.parents if not folder.exists()]
+    """Make the folder of a file that is written then, and say so; ``QueryError``: the file cannot be written.
+
+    Only the last folder of its path is made, for a longer one that is missing is likely misspelt.
+    """
+    folder, is_new = path.parent, not path.parent.exists()
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(exist_ok=True)
         yield
     except OSError as fault:
-        with suppress(OSError):
-            for folder in made:  # which are empty
+        if is_new:
+            with suppress(OSError):  # it is empty
                 folder.rmdir()
         raise QueryError(f"{path} cannot be written ({fault.strerror or fault}); choose another place.") from fault
+    if is_new:
+        say(f"made the folder {folder}")
 
 
 def _write(path: Path, content: bytes) -> Path:

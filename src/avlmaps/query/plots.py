@@ -15,7 +15,7 @@ from avlmaps.core.poses import FRAME, FrameName
 from avlmaps.core.printable import plot_text
 from avlmaps.core.question import Modality
 from avlmaps.core.wording import place_text
-from avlmaps.query.export import palette
+from avlmaps.query.export import explain_write_errors, palette
 from avlmaps.query.factors import Factor, NearAnchors
 from avlmaps.query.goals import Goal
 from avlmaps.query.settings import FOUND_AT
@@ -138,7 +138,8 @@ def draw_heat(
         _draw_heat(ax, view, factor.shown)
         _draw_anchors(ax, factor)
         note = "" if factor.found else f" · not found, at most {factor.shown.max(initial=0.0):.2f}"
-        ax.set_title(f"{plot_text(_query_text(factor))} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
+        title = plot_text(f"{factor.part.modality}: {factor.part.shown}")
+        ax.set_title(f"{title} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
     if count > 1:
         draw_ground(axes[-1], view, space)
         _draw_heat(axes[-1], view, shown)
@@ -331,11 +332,6 @@ def finish(figure: "Figure", axes: "Sequence[Axes]", with_heat: bool) -> None:
         bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
 
 
-def _query_text(factor: Factor) -> str:
-    query = Path(factor.part.query).name if factor.part.is_file else factor.part.query
-    return f"{factor.part.modality}: {query}"
-
-
 def _rgb(colour: str) -> Float[np.ndarray, "3"]:
     from matplotlib.colors import to_rgb
 
@@ -347,9 +343,6 @@ def save(figure: "Figure", path: Path | str) -> Path:
     path = user_path(path)
     if path.suffix.lower().lstrip(".") not in figure.canvas.get_supported_filetypes():
         raise QueryError(f"A picture cannot be written as {path.name!r}; give it the suffix .png, .jpg, .svg or .pdf.")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with explain_write_errors(path):
         figure.savefig(path, bbox_inches="tight", pad_inches=0.15)
-    except OSError as fault:
-        raise QueryError(f"The picture {path} cannot be written ({fault.strerror}); choose another place.") from fault
     return path

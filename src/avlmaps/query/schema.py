@@ -14,6 +14,7 @@ from msgspec import Meta
 from avlmaps.core.poses import FRAME
 
 if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.locate import Located
 
 T = TypeVar("T")
@@ -350,6 +351,8 @@ class LocateAnswer(TypedDict):
     """The camera pose of a photo, or null where the photo cannot be located."""
 
     world_from_camera: Matrix | None
+    heading_deg: Annotated[float | None, Meta(description="where it looks, from +x to the left in the level frame")]
+    room: Annotated[str | None, Meta(description="name of the room that it stands in")]
     inliers: Annotated[int, Meta(description="keypoints that agree with the pose")]
     reference: Annotated[float | None, Meta(description="time of the keyframe with most of them, seconds")]
     frame: Frame
@@ -379,11 +382,15 @@ class ErrorAnswer(TypedDict):
     error: ErrorDetail
 
 
-def locate_answer(located: "Located", doubts: Sequence[str] = ()) -> LocateAnswer:
+def locate_answer(located: "Located", avlmap: "AVLMap") -> LocateAnswer:
     """Return the answer about a photo, with what is doubtful about the map and the photo's focal length."""
     pose, camera, error = located.world_from_camera, located.camera, located.uncertainty
+    place = None if pose is None else pose[:3, 3].tolist()
+    ahead = None if pose is None else avlmap.space.level_from_recording[:2, :3] @ pose[:3, 2]
     answer: LocateAnswer = {
-        "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
+        "world_from_camera": None if pose is None else pose.tolist(),
+        "heading_deg": None if ahead is None else round(math.degrees(math.atan2(ahead[1], ahead[0])), 1),
+        "room": None if place is None else avlmap.where.name_of(place),
         "inliers": int(located.inliers),
         "reference": located.reference_stamp_s,
         "frame": FRAME,
@@ -393,6 +400,6 @@ def locate_answer(located: "Located", doubts: Sequence[str] = ()) -> LocateAnswe
         "position_error_m": None if error is None or not math.isfinite(error.place_m) else error.place_m,
         "elapsed_ms": located.elapsed_ms,
     }
-    if notes := [*doubts, *located.notes]:
+    if notes := [*avlmap.data.info.doubts, *located.notes]:
         answer["notes"] = notes
     return answer

@@ -208,7 +208,7 @@ def locate(task: WorkInput, query: requests.LocateQuery) -> schema.LocateAnswer:
     camera = None if query.intrinsics is None else Pinhole(*intrinsics_of(query.intrinsics), **size)
     task.watch.step("locating")
     found = task.map.avlmap.locate(photo.rgb, camera, None if camera is not None else photo.focal_35mm)
-    return schema.locate_answer(found, task.map.avlmap.data.info.doubts)
+    return schema.locate_answer(found, task.map.avlmap)
 
 
 def place(task: WorkInput, query: requests.PlaceQuery) -> PlaceAnswer:

@@ -70,7 +70,10 @@ def write_page(
     }
     for one in progress(sentences, "asking", unit="question"):
         sentence, question = (one, None) if isinstance(one, str) else one
-        answers = [on_page.avlmap.ask(question or sentence, TOP) for on_page in shown]
+        try:
+            answers = [on_page.avlmap.ask(question or sentence, TOP) for on_page in shown]
+        except QueryError as fault:
+            raise QueryError(f"{sentence!r}: {fault}") from None
         heat = b"".join(on_page.heat_of(answer) for on_page, answer in zip(shown, answers, strict=True))
         told = [answer.to_dict() for answer in answers]
         data["questions"].append({"question": sentence, "answers": told, "heat": _packed(heat)})

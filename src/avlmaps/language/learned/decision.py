@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
-from avlmaps.core.wording import option
 from avlmaps.core.words import singulars_of, stem_of
 from avlmaps.language import intents as act
 from avlmaps.language.claims import at_each, claimed_words, in_direction, reasons, unmet
@@ -207,8 +206,7 @@ def which(meanings: Sequence[tuple[Intent, ...]], hint: str = "") -> Clarify:
     choices, meant = tuple(by_words), tuple(by_words.values())
     if len(choices) > 1:
         each = " ".join(f"{number}: {choice}" for number, choice in enumerate(choices, 1))
-        by_number = f"Choose it by its number ({option('choose', '1')})."
-        return Clarify(f"{hint}This can mean several things. {each} Which one, or none of these? {by_number}", choices, meant)
+        return Clarify(f"{hint}This can mean several things. {each} Which one, or none of these?", choices, meant)
     if choices:
         return Clarify(f"{hint}Is this what you mean? {choices[0]} If not, say it in other words.", choices, meant)
     return Clarify("This is not clear. Can you say it in other words?")

@@ -358,10 +358,9 @@ def _figure(sheet: Sheet, content: Sequence[str], label: str) -> str:
 
 def _label(answer: "Answer", part: int) -> str:
     one = answer.parts[part]
-    name = Path(one.part.query).name if one.part.is_file else one.part.query
     understood = f", understood as {one.understood}" if one.understood not in ("", one.part.query) else ""
     return (
-        f"{one.part.modality}: {name}"
+        f"{one.part.modality}: {one.part.shown}"
         + ("" if one.part.is_file else understood)
         + ("" if one.found else " (not found)")
     )
@@ -393,7 +392,7 @@ def _said(step: "Step") -> str:
 def _without_folder(note: str, step: "Step") -> str:
     for part in step.ask.question.parts:
         if part.is_file:
-            note = note.replace(part.query, Path(part.query).name)
+            note = note.replace(part.query, part.shown)
     return note
 
 
@@ -406,21 +405,31 @@ def _honest(report: "DemoReport", recording: "Recording") -> str:
         "grows with distance, holes at edges, blur), its poses are true, and sounds reach the microphone "
         "through the rooms, "
         "with echo. The map is made by the very code that maps real recordings, with the small networks that ship with "
-        "the package; they know about a hundred kinds of things and sixteen kinds of rooms. Six questions are a look, "
+        "the package, which know the things, rooms and sounds of homes and offices alone. Six questions are a look, "
         "not a measurement: <code>avlmaps bench</code> measures, over many homes and with intervals.</p>"
         "<h2>Continue from here</h2>"
         f'<p><a href="{PAGE}">Walk through the map in three dimensions</a>: one page with its things, its sounds and '
         "the heat of these questions, without a network.</p>"
         f"<p>The map is <code>{MAP}</code> beside this page. In its folder:</p>"
         f"<pre><code>avlmaps view {MAP} --scene {spec}</code></pre>"
-        f'<pre><code>avlmaps query {MAP} "the lamp near the sofa" --plot heat.png\n'
-        f'avlmaps query {MAP} "the chair in the kitchen" --json\n'
-        f"avlmaps locate {MAP} your_photo.jpg\n"
-        f"avlmaps info {MAP}\n"
-        f'avlmaps go {MAP} "go to the table, then turn left" --scene {spec} --plot way.png\n'
+        f"<pre><code>{to_go_on(report.steps, spec)}"
+        f"avlmaps things {MAP}\n"
+        f"avlmaps locate {MAP} {PHOTO}\n"
         f"avlmaps record --scene {spec} --out another_walk --seed 1\n"
         f"avlmaps build another_walk --out another.avlmap\n"
         f"avlmaps demo --seed 1</code></pre>"
+    )
+
+
+def to_go_on(steps: Sequence[Step], spec: str) -> str:
+    """Return commands to try next, a line each; they speak of what the map has just answered rightly."""
+    title = next((step.ask.title for step in steps if step.ask.kind == "words" and step.right), None)
+    if title is None:
+        return ""
+    nearest = title.replace("the ", "the nearest ", 1)
+    return (
+        f'avlmaps query {MAP} "which room is {title} in?" --json\n'
+        f'avlmaps go {MAP} "go to {nearest}, then turn left" --scene {spec} --plot way.png\n'
     )
 
 

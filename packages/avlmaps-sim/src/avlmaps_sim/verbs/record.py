@@ -28,7 +28,7 @@ class Record(Verb):
     compiles: ClassVar[bool] = True
 
     scene: Annotated[str, arg(metavar="SCENE")]
-    """house:SEED, house:SEED:lived-in or office:SEED, or a .glb file, alone or with Matterport3D's _semantic.ply."""
+    """house:SEED or office:SEED, also :held-out or :lived-in; or a .glb, alone or with Matterport3D's _semantic.ply."""
     out: Annotated[Path, arg(metavar="REC")]
     """Recording folder to write (our format)."""
     rearranged: Annotated[int | None, arg(metavar="DAYS")] = None
