@@ -102,7 +102,7 @@ def test_what_was_heard_and_when_is_answered_with_times(m: avlmaps.AVLMap) -> No
         assert m.ask(f"how often did you hear {sound.names[0]}?").count == answer.count
     other = m.ask("when did you hear a volcano")
     assert not other.found and other.count == 0 and sounds[0].names[0] in other.text
-    assert [m.ask(f"did you hear {one}?").text[:3] for one in ("a volcano", sounds[0].names[0])] == ["No.", "Yes"]
+    assert [m.ask(f"did you hear {one}?").text[:3] for one in ("a volcano", sounds[0].names[0])] == ["No ", "Yes"]
     with pytest.raises(QueryError, match="There is no room 'kitchen'"):
         m.ask("what noises are in the kitchen?")
 

@@ -215,7 +215,7 @@ class Robot:
         return float(np.linalg.norm(near - far))
 
     def get_contour(self, target: Target) -> list[Place]:
-        """Return the outline on the ground of the best instance of an object, or inside a room, counter-clockwise."""
+        """Return the outline of an object's best instance, or inside a room, counter-clockwise."""
         thing = self.seeker.best(target)
         return [self._place(self._on_floor(corner, thing)) for corner in self.seeker.contour(thing).corners]
 
@@ -229,7 +229,7 @@ class Robot:
         self._go("move_to", thing, thing.place, face=thing.place if thing.solid else None)
 
     def move_to_object(self, name: Target, distance_m: float = 0.0) -> None:
-        """Drive to the nearest place, so far from its edge, that sees the object; where several fit it asks which."""
+        """Drive to where it sees the object, so far from its edge; where several fit it asks which."""
         thing = self.seeker.referent(name, self._here)
         metres = _distance("move_to_object", distance_m)
         stop = self._stop(thing, metres > 0.0, lambda _, edge_m: np.abs(edge_m - metres))

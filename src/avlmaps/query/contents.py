@@ -332,7 +332,7 @@ class Whereabouts:
 
     def __init__(self, avlmap: "AVLMap") -> None:
         self._map, has_rooms = avlmap, avlmap.has(Kind.VIEWS)
-        self.rooms = tuple(avlmap.rooms()) if has_rooms else ()
+        self.rooms: tuple[Room, ...] = tuple(avlmap.rooms()) if has_rooms else ()
         self.parts = parts_of(self.rooms)  # with the names that things in them have
         self.names = tuple(map(joined, own_names_of(self.rooms)))  # of the rooms, all different
         self.regions = avlmap.room_regions if has_rooms else None  # their floors; None without a floor plan

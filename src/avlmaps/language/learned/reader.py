@@ -132,7 +132,8 @@ class LearnedReader:
             for at, one in enumerate(beam):
                 may = grammar.read(one.symbols)
                 assert isinstance(may, linear.Open)
-                after += [(one.log + log, at, *each) for *each, log in _following(may, said[at], texts, one.last)]
+                follows = _following(may, said[at], texts, one)
+                after += [(one.log + log, at, symbol, goes_on) for symbol, goes_on, log in follows]
             after.sort(key=lambda each: (-each[0], each[1], str(each[2])))
             opened: list[_Open] = []
             for log, at, symbol, goes_on in after[: _BEAM * 2]:
@@ -151,12 +152,12 @@ class LearnedReader:
 
 
 def _following(
-    may: linear.Open, said: Float32[np.ndarray, " k"], texts: Sequence[str], last: linear.Symbol
+    may: linear.Open, said: Float32[np.ndarray, " k"], texts: Sequence[str], line: _Open
 ) -> list[tuple[linear.Symbol, linear.Symbol, float]]:
     """Return what may follow, likely enough to matter, each with what the line goes on from.
 
     A name's word may stand at any of its places. The line goes on from the place that training takes (`align.py`): the
-    first, of a further word the one closest behind the word before.
+    first that it has not pointed at, of a further word the one closest behind the word before.
     """
     found: list[tuple[linear.Symbol, linear.Symbol, float]] = [
         (symbol, symbol, float(said[linear.INDEX[symbol]])) for symbol in may.symbols
@@ -164,11 +165,14 @@ def _following(
     places: dict[str | int, list[int]] = {}
     for at in sorted(may.tokens):
         places.setdefault(texts[at] if may.names else at, []).append(at)
-    before = last if isinstance(last, int) else -len(texts)
     for alike in places.values():
         logs = said[[_number(at) for at in alike]]
-        goes_on = min(alike, key=lambda at: abs(at - before - 1))
-        found.append((alike[int(logs.argmax())], goes_on, float(np.logaddexp.reduce(logs))))
+        likeliest = alike[int(logs.argmax())]
+        if isinstance(last := line.last, int):
+            goes_on = min(alike, key=lambda at: abs(at - last - 1))
+        else:
+            goes_on = next((at for at in alike if at not in line.symbols), likeliest)
+        found.append((likeliest, goes_on, float(np.logaddexp.reduce(logs))))
     return [one for one in found if one[2] > _LEAST]
 
 

@@ -229,6 +229,8 @@ def _target(target: Any) -> Any:
     if isinstance(target, str):
         target = {"object": target}
     kind = next(name for name in ("object", "sound", "area", "image", "clip", "here") if name in target)
+    if kind == "object" and (placed := lexicon().in_room(target[kind])):
+        target = {**target, kind: placed[0], "near": [*target.get("near", ()), {"area": placed[1]}]}
     target = _storey_apart(target, kind)
     pick, number = target.get("pick", ""), target.get("number", 1)
     name = _name(kind, target[kind])
