@@ -6,12 +6,14 @@ Writers seldom write what is plain. A reader that has seen few plain lists of go
 import random
 import tomllib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from training.language.augment import Names
 from training.language.rows import Example
 
 from avlmaps.core.words import plural_of
+from avlmaps.language import intents as act
 from avlmaps.language.intents import (
     Ask,
     Beside,
@@ -100,6 +102,8 @@ class _Maker:
             return self._list(max(2, count))
         if self.draw.random() < 0.25:
             return self._condition()
+        if self.draw.random() < 0.2:
+            return self._told() if self.draw.random() < 0.7 else self._denied()
         said, meant = zip(*(self._order() for _ in range(count)), strict=True)
         joint = self.draw.choice(_THEN) if self.draw.random() < 0.5 else None
         text = said[0]
@@ -287,6 +291,47 @@ class _Maker:
         if self.draw.random() < 0.6:
             return self._behind_another(text + self.draw.choice(said["else"]) + other, If(thing, meant, instead))
         return self._behind_another(text + self.draw.choice(("", "", "", *said["nothing"])), If(thing, meant))
+
+    def _told(self) -> Example:
+        """Return an order about a thing whose place another clause tells; sometimes another thing's place is told."""
+        said, name, others = _SAID["told"], self._of(TargetKind.OBJECT)[1].name, []
+        for _ in range(self.draw.choice((1, 1, 1, 2))):
+            kind = self.draw.choice((TargetKind.OBJECT, TargetKind.OBJECT, TargetKind.AREA))
+            words, other = self._of(kind)
+            others.append((f"{'in' if kind is TargetKind.AREA else self.draw.choice(said['near'])} {words}", other))
+        where = self.draw.choice((" ", " and ")).join(words for words, _ in others)
+        thing = Target(TargetKind.OBJECT, name).with_near(*(other for _, other in others))
+        (do, meant), tells = self._with(thing, self.draw.choice(said["it"]).format(b=name)), "tells"
+        drawn, words = self.draw.random(), self.draw.choice(("", "", "", f"{self.draw.choice(_COLOURS)} ")) + name
+        if drawn < 0.2:  # of another thing
+            words = self._of(TargetKind.OBJECT)[1].name
+            do, meant = self._with(Target(TargetKind.OBJECT, name), f"the {name}")
+        elif drawn < 0.4:
+            do, meant = self._with(thing, f"the {name}")
+            tells = "tells_after"
+        elif words != name:
+            meant = act.on_targets(meant, lambda one: replace(one, name=words) if one.name == name else one)
+        article = "an" if words[0] in "aeiou" else "a"
+        told = self.draw.choice(said[tells]).format(
+            a=f"{article} {words}", b=words, where=where, places=where.split(" ", 1)[1]
+        )
+        after, does = self._order() if self.draw.random() < 0.3 else ("", None)
+        text = f"{do}{told}" if tells == "tells_after" else f"{told}{self.draw.choice(said['then'])}{do}"
+        text += f"{self.draw.choice(_THEN)}{after}" if does else ""
+        return self._example(text, (meant, does) if does else (meant,))
+
+    def _denied(self) -> Example:
+        """Return an order in which one thing is named and another one denied."""
+        (said, target), (wrong, other) = self._place(), self._place()
+        head = self._of(TargetKind.OBJECT)[1].name
+        if self.draw.random() < 0.3:
+            first, second = self.draw.sample(_COLOURS, 2)
+            pair = [(f"the {first} {head}", f"the {second} one"), (f"the {first} one", f"the {second} {head}")]
+            (said, wrong), target = self.draw.choice(pair), Target(TargetKind.OBJECT, f"{first} {head}")
+        elif other.kind is not target.kind or set(wrong.split()) & set(said.split()) - {"the", "a", "my"}:
+            return self._denied()
+        text = self.draw.choice(_SAID["told"]["denies"]).format(go=self.draw.choice(_GO), yes=said, no=wrong)
+        return self._example(text, (Go(target),))
 
     def _sought(self) -> tuple[Target, dict[str, str]]:
         """Return a thing or a room that a map may have, and its words: with an article, without, and several."""
