@@ -178,7 +178,9 @@ def said_each(text: str, joins: str = "and") -> tuple[str, ...]:
 
     "When did you hear the dog and the phone": what is asked comes first, in words that name nothing.
     """
-    first, *others = (one.split() for one in re.split(f",? {joins} |, ?", _plain(text)))
+    if f" {joins} " not in (whole := _plain(text)):
+        return ()
+    first, *others = (one.split() for one in re.split(f",? {joins} |, ?", whole))
     articles, asking = (frozenset(words_of(_TABLE)[name].split()) for name in ("articles", "asking"))
     begin = next((number for number, word in enumerate(first) if word not in asking), len(first))
     # "How many beds and how many sofas" asks again.

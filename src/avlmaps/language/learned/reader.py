@@ -168,8 +168,8 @@ def _following(
     for alike in places.values():
         logs = said[[_number(at) for at in alike]]
         likeliest = alike[int(logs.argmax())]
-        if isinstance(last := line.last, int):
-            goes_on = min(alike, key=lambda at: abs(at - last - 1))
+        if isinstance(line.last, int):
+            goes_on = min(alike, key=lambda at, behind=line.last + 1: abs(at - behind))
         else:
             goes_on = next((at for at in alike if at not in line.symbols), likeliest)
         found.append((likeliest, goes_on, float(np.logaddexp.reduce(logs))))
