@@ -81,3 +81,5 @@ def test_a_photo_of_one_of_two_rooms_that_look_alike_says_that_the_other_fits_as
         assert found.elsewhere is not None
         apart_m = found.elsewhere[:3, 3] - found.world_from_camera[:3, 3]
         assert np.abs(apart_m) == pytest.approx([8.0, 0.0, 0.0], abs=0.3)
+        asked = avlmap.ask(image=tmp_path / f"two{number}.png")
+        assert asked.alike == 2 and asked.goals[0].probability == asked.goals[1].probability == found.score

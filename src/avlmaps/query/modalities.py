@@ -212,18 +212,21 @@ def require_fitting(rgb: np.ndarray, intrinsics: object) -> None:
 
 
 def image_factor(space: Space, located: "Located", part: Part, heat: HeatSettings) -> NearAnchors:
-    """Return the heat of a picture: one anchor of score 1 at the camera, else at the best guess, if there is one."""
+    """Return the heat of a picture: an anchor of score 1 at the camera, and where it fits as well; else at a guess."""
     is_located = located.world_from_camera is not None
     pose = located.world_from_camera if is_located else located.guess
-    confidence = 1.0 if is_located else max(min(located.score, _MOST_OF_A_GUESS), _LEAST_CERTAINTY)
+    confidence = max(min(located.score, _MOST_OF_A_GUESS), _LEAST_CERTAINTY)
+    if is_located:
+        confidence = 1.0 if located.elsewhere is None else located.score
     found = pose is not None and confidence >= FOUND_AT
-    anchors = np.zeros((0, 3)) if pose is None else np.asarray(pose, np.float64)[None, :3, 3]
-    note = "" if is_located else f"the picture could not be located ({located.inliers} points agree)"
-    if not is_located and located.notes:
-        note += f"; {located.notes[0][:1].lower()}{located.notes[0][1:].rstrip('.')}"
+    anchors = np.array([each[:3, 3] for each in (pose, located.elsewhere) if each is not None]).reshape(-1, 3)
+    notes = [] if is_located else [f"the picture could not be located ({located.inliers} points agree)"]
+    if located.notes and (not is_located or located.elsewhere is not None):
+        notes.append(f"{located.notes[0][:1].lower()}{located.notes[0][1:].rstrip('.')}")
     if pose is not None and not is_located:
-        note += "; the heat is that of the best guess"
-    scores, instance = np.ones(len(anchors)), np.zeros(len(anchors), np.int64)
+        notes.append("the heat is that of the best guess")
+    note, instance = "; ".join(notes), np.arange(len(anchors))
+    scores = np.ones(len(anchors))
     return NearAnchors(
         space,
         part,
