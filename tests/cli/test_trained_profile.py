@@ -6,17 +6,13 @@ from importlib.resources import files
 from pathlib import Path
 
 import msgspec
-import numpy as np
 import pytest
 
-from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.camera import Pinhole
 from avlmaps.core.registry import forget_loaded
 from avlmaps.maps.store.folder import read
 from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, Notes, checksum_of
-from avlmaps.recordings.types import Frame
-from avlmaps.recordings.writer import RecordingWriter
-from helpers.raycast import render
-from helpers.room import Room
+from helpers.walked_room import write_walk
 
 CAMERA = Pinhole(80.0, 80.0, 60.0, 45.0, 120, 90)
 
@@ -24,12 +20,7 @@ CAMERA = Pinhole(80.0, 80.0, 60.0, 45.0, 120, 90)
 @pytest.fixture
 def walk(tmp_path: Path) -> Path:
     """Five frames in the analytic room."""
-    path, room, rig = tmp_path / "rec", Room(), Rig(CAMERA, CAMERA)
-    with RecordingWriter(path, rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
-        for index, pose in enumerate(room.walk()[100:105]):
-            view = render(room.scene, CAMERA, pose)
-            writer.add(Frame(index, f"{index:06d}", index / 4.0, view.rgb, view.depth_m, pose, rig))
-    return path
+    return write_walk(tmp_path / "rec", CAMERA, (100, 105, 1), beep_s=None)
 
 
 @pytest.fixture

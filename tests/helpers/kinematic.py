@@ -72,14 +72,10 @@ class KnownThings:
         }
         self.notes: list[str] = []
 
-    def best(self, target: Any) -> Destination:
+    def best(self, target: Any, here: object = None) -> Destination:
         return self.things[target]
 
-    def referent(self, target: Any, here: np.ndarray) -> Destination:
-        return self.things[target]
-
-    def nearest(self, target: Any, here: np.ndarray) -> Destination:
-        return self.things[target]
+    referent = nearest = best
 
     def pair(self, a: Any, b: Any, here: np.ndarray) -> tuple[Destination, Destination]:
         return self.things[a], self.things[b]

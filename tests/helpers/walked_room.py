@@ -27,10 +27,10 @@ def beeps(seconds: float = 2.0, pitch_hz: float = 2000.0) -> np.ndarray:
 
 
 @cache
-def _seen() -> list[tuple[np.ndarray, View]]:
-    """Return the poses of the walk, each with what is seen from it."""
+def _seen(camera: Pinhole, first: int, end: int, step: int) -> list[tuple[np.ndarray, View]]:
+    """Return poses of a walk through the room, each with what is seen from it."""
     room = Room()
-    return [(pose, render(room.scene, CAMERA, pose)) for pose in room.walk()[100:196:4]]
+    return [(pose, render(room.scene, camera, pose)) for pose in room.walk()[first:end:step]]
 
 
 def shared_walk(factory: "pytest.TempPathFactory") -> Path:
@@ -53,13 +53,22 @@ def walked_map(factory: "pytest.TempPathFactory") -> Path:
     return made_once(factory, "walked-room", build) / "room.avlmap"
 
 
-def write_walk(path: Path) -> Path:
-    """Write a recording of 24 frames (6 s) with a sound from 2 to 4 s."""
-    rig = Rig(CAMERA, CAMERA)
-    samples = 0.0005 * np.random.default_rng(0).standard_normal(6 * RATE_HZ).astype(np.float32)
-    samples[2 * RATE_HZ : 4 * RATE_HZ] += beeps()
+def write_walk(
+    path: Path,
+    camera: Pinhole = CAMERA,
+    poses: tuple[int, int, int] = (100, 196, 4),
+    per_s: float = 4.0,
+    beep_s: tuple[int, int, int] | None = (2, 4, 6),
+    pitch_hz: float = 2000.0,
+) -> Path:
+    """Write a recording of 24 frames (6 s) with a sound from 2 to 4 s, or of others."""
+    rig = Rig(camera, camera)
     with RecordingWriter(path, rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
-        for index, (pose, view) in enumerate(_seen()):
-            writer.add(Frame(index, f"{index:06d}", index / 4.0, view.rgb, view.depth_m, pose, rig))
-        writer.set_audio(Sound(samples, RATE_HZ))
+        for index, (pose, view) in enumerate(_seen(camera, *poses)):
+            writer.add(Frame(index, f"{index:06d}", index / per_s, view.rgb, view.depth_m, pose, rig))
+        if beep_s is not None:
+            begin, end, whole = (second * RATE_HZ for second in beep_s)
+            samples = 0.0005 * np.random.default_rng(0).standard_normal(whole).astype(np.float32)
+            samples[begin:end] += beeps((end - begin) / RATE_HZ, pitch_hz)
+            writer.set_audio(Sound(samples, RATE_HZ))
     return path

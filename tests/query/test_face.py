@@ -465,20 +465,13 @@ def test_frames_that_contradict_one_another_are_said_with_every_answer(kind: str
     assert set(live.doubts) <= set(live.save(tmp_path / "m").data.info.doubts)
 
 
-def test_stamps_in_milliseconds_are_doubted() -> None:
-    truth = example_truth(frames=6)
-    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders())
+def test_stamps_in_milliseconds_are_doubted_and_frames_that_agree_are_not() -> None:
+    truth, plain, slow = example_truth(frames=14), *(avlmaps.VoxelMap(0.1, avlmaps.Encoders()) for _ in range(2))
     for index, pose in enumerate(truth.world_from_camera):
-        live.add(truth.rgb[index], truth.depth_m[index], truth.rig.rgb, pose, 100.0 * index)
-    assert any("100 s apart, so their stamps look like milliseconds" in doubt for doubt in live.doubts), live.doubts
-
-
-def test_frames_that_agree_are_not_doubted() -> None:
-    truth = example_truth(frames=14)
-    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders(pixels=Hues()))
-    for index, pose in enumerate(truth.world_from_camera):
-        live.add(truth.rgb[index], truth.depth_m[index], truth.rig.rgb, pose)
-    assert live.doubts == ()
+        plain.add(truth.rgb[index], truth.depth_m[index], truth.rig.rgb, pose)
+        slow.add(truth.rgb[index], truth.depth_m[index], truth.rig.rgb, pose, 100.0 * index)
+    assert plain.doubts == ()
+    assert any("100 s apart, so their stamps look like milliseconds" in doubt for doubt in slow.doubts), slow.doubts
 
 
 def test_an_encoder_that_is_interrupted_costs_no_frame_that_waits() -> None:

@@ -84,12 +84,12 @@ def test_a_word_of_the_vocabulary_does_not_compete_with_itself() -> None:
     assert found.note == "understood only 'chair' of 'wooden chair'"
 
 
-def test_a_voxel_without_a_feature_is_nothing() -> None:
-    for other in (True, False):
-        encoder = FakePixels(("chair",), other=other)
-        found = asked_of(encoder, box((0, 0, 0), (3, 3, 3)), np.zeros((27, 2), np.float32), "chair")
-        assert not found.mask.any()
-        assert not found.found
+@pytest.mark.parametrize("other", [True, False])
+def test_a_voxel_without_a_feature_and_a_speck_are_nothing(other: bool) -> None:
+    encoder = FakePixels(("chair",), other=other)
+    for side, feature in ((3, np.zeros((27, 2), np.float32)), (1, encoder.encode_words(["chair"]))):
+        found = asked_of(encoder, box((0, 0, 0), (side,) * 3), feature, "chair")
+        assert not found.mask.any() and not found.found
         assert found.note == "nothing that the map shows is like 'chair'"
 
 
@@ -104,14 +104,6 @@ def test_without_other_a_voxel_must_score_half() -> None:
     for length, won in ((0.45, 0), (0.55, 27)):
         feature = np.tile(encoder.encode_words(["chair"]) * length, (27, 1))
         assert asked_of(encoder, box((0, 0, 0), (3, 3, 3)), feature, "chair").mask.sum() == won
-
-
-def test_a_speck_is_not_found() -> None:
-    encoder = FakePixels(("chair",))
-    found = asked_of(encoder, box((0, 0, 0), (1, 1, 1)), encoder.encode_words(["chair"]), "chair")
-    assert not found.found
-    assert not found.mask.any()
-    assert found.note == "nothing that the map shows is like 'chair'"
 
 
 def test_specks_give_no_heat_beside_a_thing() -> None:

@@ -8,38 +8,21 @@ import pytest
 import soundfile
 
 from avlmaps.cli import main
-from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.camera import Pinhole
 from avlmaps.core.registry import forget_loaded
 from avlmaps.maps.keyframes import select_keyframes
 from avlmaps.maps.store.folder import read
-from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.types import Frame
-from avlmaps.recordings.writer import RecordingWriter
 from helpers.light_files import write_light
-from helpers.raycast import render
-from helpers.room import Room
+from helpers.walked_room import RATE_HZ, beeps, write_walk
 
 CAMERA = Pinhole(80.0, 80.0, 60.0, 45.0, 120, 90)
-RATE_HZ = 16_000
-
-
-def beep() -> np.ndarray:
-    return (0.3 * np.sin(2 * np.pi * 900.0 * np.arange(RATE_HZ) / RATE_HZ)).astype(np.float32)
 
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ten frames in the analytic room, with one sound of a second."""
-    path, room, rig = tmp_path_factory.mktemp("walk") / "rec", Room(), Rig(CAMERA, CAMERA)
-    samples = 0.0005 * np.random.default_rng(0).standard_normal(3 * RATE_HZ).astype(np.float32)
-    samples[RATE_HZ : 2 * RATE_HZ] += beep()
-    with RecordingWriter(path, rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
-        for index, pose in enumerate(room.walk()[100:110]):
-            view = render(room.scene, CAMERA, pose)
-            writer.add(Frame(index, f"{index:06d}", index / 4.0, view.rgb, view.depth_m, pose, rig))
-        writer.set_audio(Sound(samples, RATE_HZ))
-    return path
+    return write_walk(tmp_path_factory.mktemp("walk") / "rec", CAMERA, (100, 110, 1), 4.0, (1, 2, 3), 900.0)
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +70,7 @@ def test_any_word_a_room_a_sound_and_a_clip_are_queried(built: Path, models: Pat
     assert 0.0 <= answer("query", built, "--area", "observatory", "--models", models)["parts"][0]["peak"] <= 1.0
     assert 0.0 <= answer("query", built, "--sound", "a tuba", "--models", models)["parts"][0]["peak"] <= 1.0
     clip = tmp_path / "beep.wav"
-    soundfile.write(clip, beep(), RATE_HZ)
+    soundfile.write(clip, beeps(1.0, 900.0), RATE_HZ)
     assert answer("query", built, "--sound-clip", clip, "--models", models)["parts"][0]["peak"] > 0.5
 
 

@@ -161,20 +161,15 @@ def test_nothing_is_fetched_and_the_command_is_told(models: Path, monkeypatch: p
         )
 
 
-def test_the_cache_of_torch_is_looked_through(name: str, models: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    cache = models.parent / "torch" / "hub" / "checkpoints"
-    cache.mkdir(parents=True)
-    file = {"disk": "depth-save.pth", "aliked": "aliked-n16.pth"}[name]
-    (models / file).rename(cache / file)
-    monkeypatch.setenv("TORCH_HOME", str(models.parent / "torch"))
-    assert load(Kind.LOCAL, name).card.id == f"{name}/{file}"
-
-
-def test_a_file_below_its_repositorys_name_is_found(name: str, models: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("place", ["torch/hub/checkpoints", "models/kornia/{}"])
+def test_the_cache_of_torch_and_a_folder_of_the_repositorys_name_are_looked_through(
+    name: str, place: str, models: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("TORCH_HOME", str(models.parent / "torch"))
     file = {"disk": "depth-save.pth", "aliked": "aliked-n16.pth"}[name]
-    (models / "kornia" / name).mkdir(parents=True)
-    (models / file).rename(models / "kornia" / name / file)
+    held = models.parent / place.format(name)
+    held.mkdir(parents=True)
+    (models / file).rename(held / file)
     assert load(Kind.LOCAL, name).card.id == f"{name}/{file}"
 
 

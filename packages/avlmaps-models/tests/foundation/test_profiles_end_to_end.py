@@ -33,20 +33,15 @@ from tiny.superpoint import write_superpoint
 from tiny.tipsv2 import write_tipsv2
 
 from avlmaps.cli import main
-from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import install_command
 from avlmaps.core.registry import Backend, Kind, backends, load
 from avlmaps.maps.store.folder import read
 from avlmaps.perception.models import availability
-from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.types import Frame
-from avlmaps.recordings.writer import RecordingWriter
-from helpers.raycast import render
-from helpers.room import Room
+from helpers.walked_room import RATE_HZ, beeps, write_walk
 
 CAMERA = Pinhole(80.0, 80.0, 60.0, 45.0, 120, 90)
-RATE_HZ = 16_000
 WRITERS: dict[str, tuple[Callable[[Path], None], ...]] = {
     "foundation": (write_tipsv2, write_siglip2, write_clap, write_disk, write_megaloc, write_lightglue),
     "paper": (write_lseg, write_clip, write_audioclip, write_superpoint, write_netvlad, write_superglue),
@@ -57,19 +52,7 @@ PROFILES = tuple(WRITERS)
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Six frames in the analytic room, with one sound of a second."""
-    path, room, rig = tmp_path_factory.mktemp("walk") / "rec", Room(), Rig(CAMERA, CAMERA)
-    samples = 0.0005 * np.random.default_rng(0).standard_normal(3 * RATE_HZ).astype(np.float32)
-    samples[RATE_HZ : 2 * RATE_HZ] += beep()
-    with RecordingWriter(path, rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
-        for index, pose in enumerate(room.walk()[100:148:8]):
-            view = render(room.scene, CAMERA, pose)
-            writer.add(Frame(index, f"{index:06d}", index / 2.0, view.rgb, view.depth_m, pose, rig))
-        writer.set_audio(Sound(samples, RATE_HZ))
-    return path
-
-
-def beep() -> np.ndarray:
-    return (0.3 * np.sin(2 * np.pi * 900.0 * np.arange(RATE_HZ) / RATE_HZ)).astype(np.float32)
+    return write_walk(tmp_path_factory.mktemp("walk") / "rec", CAMERA, (100, 148, 8), 2.0, (1, 2, 3), 900.0)
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +148,7 @@ def test_words_sounds_areas_and_photos_are_asked_of_it(
     name: str, maps: Maps, folders: dict[str, Path], walk: Path, answer, tmp_path: Path
 ) -> None:
     clip, photo = tmp_path / "beep.wav", sorted((walk / "rgb").iterdir())[2]
-    soundfile.write(clip, beep(), RATE_HZ)
+    soundfile.write(clip, beeps(1.0, 900.0), RATE_HZ)
     sentence = answer("query", maps[name], "the red cabinet near the sound of a dog barking", *here(folders[name]))
     assert [part["modality"] for part in sentence["parts"]] == ["object", "sound"]
     assert isinstance(sentence["found"], bool)
