@@ -9,7 +9,6 @@ carried along makes all who see it agree.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 
@@ -245,26 +244,20 @@ def find_other(
         fine, off_m = refine(points, others, first, rng)
         checks["surface_off_m"] = round(off_m, 4)
     known = known or Occupied.of(np.asarray(avlmap.data.voxels.index), grid)
-    checks |= _agreement(avlmap, other.path, apply(fine, others), known)
-    return fine, checks
-
-
-def _agreement(avlmap: AVLMap, other: Path, points: Float[np.ndarray, "n 3"], known: Occupied) -> dict[str, float]:
-    # How much of the other map's surface (``points``) lies on this one's, of what this one looked at.
-    grid = avlmap.data.grid
-    on_surface = known.near(points)
-    index = grid.index_of(points)
+    # How much of the other map's surface lies on this one's, of what this one looked at.
+    others = apply(fine, others)
+    on_surface, index = known.near(others), grid.index_of(others)
     free = np.sum([views.through(index, grid) for views in views_of(avlmap)], axis=0)
     through = (free >= THROUGH_VIEWS) & ~on_surface
     looked = int(on_surface.sum() + through.sum())
     share = float(on_surface.sum() / max(looked, 1))
     if looked < LEAST_LOOKED or share < LEAST_AGREEMENT:
         raise NotTheSamePlaceError(
-            f"This is not seen to be the same place: of {looked} voxels of {other} where {avlmap.path} looked, "
+            f"This is not seen to be the same place: of {looked} voxels of {other.path} where {avlmap.path} looked, "
             f"{share:.0%} lie on its surface and the others where it saw through; {LEAST_AGREEMENT:.0%} of at "
             f"least {LEAST_LOOKED} must. Merge maps of one building that saw some of the same rooms."
         )
-    return {"looked": looked, "agreement": round(share, 4)}
+    return fine, {**checks, "looked": looked, "agreement": round(share, 4)}
 
 
 def visits_of(avlmap: AVLMap) -> tuple[Visit, ...]:

@@ -26,7 +26,7 @@ from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.days import find
 from avlmaps.days import life as lives
-from avlmaps.days.evidence import THROUGH_VIEWS, Day, DayViews
+from avlmaps.days.evidence import THROUGH_VIEWS, Day
 from avlmaps.days.surfaces import Occupied, resampled
 from avlmaps.maps.build import build_map
 from avlmaps.maps.cluster import Pool, Reopen, cluster_workers
@@ -122,14 +122,30 @@ def merge_maps(
     things, index = list(listed(unedited(other))), np.asarray(avlmap.data.voxels.index)
     surface, through = now.has_surface(grid.centre_of(index)), now.views.through(index, grid) >= THROUGH_VIEWS
     if things_of is None:  # a list of names misses small things, whose surface changes nevertheless
-        life = _with_vanished(life, avlmap, known, surface, through, visits)
-        things += _unnamed_new(other, things, before, known, moved)
+        lost = lives.changed_things(avlmap, ~surface, through, [*_rows_there(life, known).values()])
+        stamps = np.array([float(np.max(np.asarray(avlmap.data.voxels.last_seen_s)[one.rows])) for one in lost])
+        seen_on = find.visit_of_stamps(visits[:-1], stamps).tolist()
+        begun = [lives.begun([_seen(one, avlmap, np.eye(4), 0.0)], on) for one, on in zip(lost, seen_on, strict=True)]
+        stays = [*life.stays, *(one.stays[0] for one in begun)]
+        life = Life.of(stays, [*map(life.voxels, range(len(life))), *(one.voxels(0) for one in begun)])
+        points = apply(moved, other.data.grid.centre_of(np.asarray(other.data.voxels.index)))
+        at = other.data.grid.index_of(points)
+        empty = np.sum([one.through(at, other.data.grid) for one in before], axis=0) >= THROUGH_VIEWS
+        things += lives.changed_things(other, ~known.near(points), empty, [thing.rows for thing in things])
     new = [_seen(one, other, moved, visit.shift_s) for one in things]
     at_s = [one.end_s for one in visits]
     looks = _looks(life, avlmap, known)
     life = lives.lived_on(life, new, now, before, known, number, at_s, grid, same_thing, looks)
-    kept = _still_there(known, life, surface, through, number)
-    voxels = joined_voxels(avlmap, kept, other, moved, visit.shift_s, life)
+    # A voxel goes where two views of the new day see through it and nothing is beside it; of what is gone every voxel
+    # goes where the new day has no surface; of what is there none goes; people's go.
+    goes = through & ~surface
+    for which, stay in enumerate(life.stays):
+        rows = _rows_of(which, life, known)
+        if stay.gone == number or stay.is_person:
+            goes[rows] = ~surface[rows] | stay.is_person
+        elif stay.is_there(number) and stay.first < number:
+            goes[rows] = False
+    voxels = joined_voxels(avlmap, ~goes, other, moved, visit.shift_s, life)
     keyframes = joined_keyframes(avlmap, other, moved, visit.shift_s)
     sounds = joined_sounds(avlmap, other, moved, visit.shift_s)
     sources, why_not = joined_sources(avlmap, other, moved, voxels, keyframes)
@@ -246,47 +262,6 @@ def same_thing(one: str, other: str) -> bool:
     return one == other or words.is_a(one, other, EntryKind.THING) or words.is_a(other, one, EntryKind.THING)
 
 
-def _with_vanished(
-    life: Life,
-    avlmap: AVLMap,
-    known: Occupied,
-    surface: Bool[np.ndarray, " n"],
-    through: Bool[np.ndarray, " n"],
-    visits: Sequence[Visit],
-) -> Life:
-    things = lives.changed_things(avlmap, ~surface, through, [*_rows_there(life, known).values()])
-    stamps = np.array([float(np.max(np.asarray(avlmap.data.voxels.last_seen_s)[one.rows])) for one in things])
-    seen_on = find.visit_of_stamps(visits[:-1], stamps).tolist()
-    begun = [lives.begun([_seen(one, avlmap, np.eye(4), 0.0)], on) for one, on in zip(things, seen_on, strict=True)]
-    stays = [*life.stays, *(one.stays[0] for one in begun)]
-    return Life.of(stays, [*(life.voxels(number) for number in range(len(life))), *(one.voxels(0) for one in begun)])
-
-
-def _unnamed_new(
-    other: AVLMap, things: Sequence[Thing], before: Sequence[DayViews], known: Occupied, moved: Float[np.ndarray, "4 4"]
-) -> list[Thing]:
-    grid = other.data.grid
-    points = apply(moved, grid.centre_of(np.asarray(other.data.voxels.index)))
-    index = grid.index_of(points)
-    through = np.sum([views.through(index, grid) for views in before], axis=0) >= THROUGH_VIEWS
-    return lives.changed_things(other, ~known.near(points), through, [thing.rows for thing in things])
-
-
-def _still_there(
-    known: Occupied, life: Life, surface: Bool[np.ndarray, " n"], through: Bool[np.ndarray, " n"], visit: int
-) -> Bool[np.ndarray, " n"]:
-    # A voxel goes where two views of the new day see through it and nothing is beside it; of what is gone every voxel
-    # goes where the new day has no surface; of what is there none goes; people's go.
-    goes = through & ~surface
-    for number, stay in enumerate(life.stays):
-        rows = _rows_of(number, life, known)
-        if stay.gone == visit or stay.is_person:
-            goes[rows] = ~surface[rows] | stay.is_person
-        elif stay.is_there(visit) and stay.first < visit:
-            goes[rows] = False
-    return ~goes
-
-
 def _manifest(
     avlmap: AVLMap, other: AVLMap, content: MapData, visits: tuple[Visit, ...], elapsed_s: float, notice: str
 ) -> MapInfo:
@@ -401,18 +376,12 @@ def joined_keyframes(avlmap: AVLMap, other: AVLMap, moved: Float[np.ndarray, "4 
         place=np.asarray(place, np.float32).reshape(len(new), -1),
         points_world=apply(moved, np.asarray(new.points_world, np.float64)).astype(np.float32),
     )
-    return _concatenated(take(old, np.array(kept, np.int64)), turned)
-
-
-def _concatenated(one: Keyframes, other: Keyframes) -> Keyframes:
-    shapes = {part.clear_mm.shape[1:] for part in (one, other) if len(part)}
+    parts = [part for part in (take(old, np.array(kept, np.int64)), turned) if len(part)]
+    shapes = {part.clear_mm.shape[1:] for part in parts}
     if len(shapes) > 1:  # another camera: pictures of the larger shape hold both, and blocks beyond are unknown
         rows, columns = (max(shape[axis] for shape in shapes) for axis in (0, 1))
-        one, other = (
-            replace(part, clear_mm=_padded(np.asarray(part.clear_mm), rows, columns)) for part in (one, other)
-        )
-    parts = [part for part in (one, other) if len(part)]
-    return concat(parts) if parts else one
+        parts = [replace(part, clear_mm=_padded(np.asarray(part.clear_mm), rows, columns)) for part in parts]
+    return concat(parts) if parts else old
 
 
 def _padded(clear_mm: np.ndarray, rows: int, columns: int) -> np.ndarray:

@@ -64,8 +64,19 @@ class TopDown:
         low, high = shown.min(axis=0) - _MARGIN_CELLS, shown.max(axis=0) + _MARGIN_CELLS + 1
         cell = (ground - low)[:, ::-1]
         shape = int(high[1] - low[1]), int(high[0] - low[0])
-        visible = level[:, 2] <= _ceiling_m(space, level)
-        rgb, seen = _highest_colours(space, cell, level[:, 2], visible, shape)
+        rows = np.flatnonzero(level[:, 2] <= ceiling_m(space, level))
+        column = cell[rows, 0] * shape[1] + cell[rows, 1]
+        order = np.lexsort((-level[rows, 2], column))
+        rows, column = rows[order], column[order]
+        first = np.r_[True, column[1:] != column[:-1]] if len(rows) else np.zeros(0, bool)
+        place = np.arange(len(rows)) - np.maximum.accumulate(np.where(first, np.arange(len(rows)), 0))
+        rows, column = rows[place < _SKIN], column[place < _SKIN]
+        grey = np.full((len(space), 3), 150, np.uint8)
+        colours = (grey if space.data is None else np.asarray(space.data.voxels.rgb))[rows]
+        count = np.bincount(column, minlength=shape[0] * shape[1])
+        total = [np.bincount(column, weights=colours[:, k], minlength=len(count)) for k in range(3)]
+        mean = np.stack(total, axis=-1) / np.maximum(count, 1)[:, None]
+        rgb, seen = mean.astype(np.uint8).reshape(*shape, 3), (count > 0).reshape(shape)
         left, bottom = low * cell_m
         right, top = high * cell_m
         return cls(rgb, seen, cell, (float(left), float(right), float(bottom), float(top)))
@@ -84,29 +95,10 @@ def camera_path(space: Space) -> Float[np.ndarray, "k 3"]:
     return space.level(np.asarray(space.data.keyframes.world_from_camera)[:, :3, 3])
 
 
-def _ceiling_m(space: Space, level: Float[np.ndarray, "n 3"]) -> float:
+def ceiling_m(space: Space, level: Float[np.ndarray, "n 3"]) -> float:
+    """Return up to which level height a map is shown from above: a little over the highest camera."""
     cameras = camera_path(space)
     return float(cameras[:, 2].max()) + _HEADROOM_M if len(cameras) else float(level[:, 2].max())
-
-
-def _highest_colours(
-    space: Space, cell: Int[np.ndarray, "n 2"], height_m: Float[np.ndarray, " n"], visible: Bool[np.ndarray, " n"],
-    shape: tuple[int, int],
-) -> tuple[UInt8[np.ndarray, "h w 3"], Bool[np.ndarray, "h w"]]:  # fmt: skip
-    rows = np.flatnonzero(visible)
-    column = cell[rows, 0] * shape[1] + cell[rows, 1]
-    order = np.lexsort((-height_m[rows], column))
-    rows, column = rows[order], column[order]
-    first = np.r_[True, column[1:] != column[:-1]] if len(rows) else np.zeros(0, bool)
-    place = np.arange(len(rows)) - np.maximum.accumulate(np.where(first, np.arange(len(rows)), 0))
-    skin = place < _SKIN
-    colours = (np.full((len(space), 3), 150, np.uint8) if space.data is None else np.asarray(space.data.voxels.rgb))[
-        rows[skin]
-    ]
-    count = np.bincount(column[skin], minlength=shape[0] * shape[1])
-    total = [np.bincount(column[skin], weights=colours[:, k], minlength=len(count)) for k in range(3)]
-    mean = np.stack(total, axis=-1) / np.maximum(count, 1)[:, None]
-    return mean.astype(np.uint8).reshape(*shape, 3), (count > 0).reshape(shape)
 
 
 # Matplotlib's stubs leave the keywords of every drawing method (**kwargs) without a type.

@@ -277,19 +277,16 @@ class GrowingTrack:
             self._append(_filling(channels, round(late_s * sound.rate_hz), sound.rate_hz))
             self.gaps, self.gap_s = self.gaps + 1, self.gap_s + late_s
         if late_s <= -GAP_S:
-            sound = self._rest_of(sound, -late_s, end_s)
+            known = round(-late_s * sound.rate_hz)
+            if known >= sound.samples.shape[1]:
+                begin_s = end_s + late_s
+                raise AudioError(
+                    f"A piece of sound from {begin_s:.3f} to {begin_s + sound.duration_s:.3f} s lies before the end of "
+                    f"the sound that came ({end_s:.3f} s): it is repeated or out of order, and was left out."
+                )
+            sound = ChannelSound(sound.samples[:, known:], sound.rate_hz)
             self.overlaps += 1
         self._append([sound])
-
-    def _rest_of(self, sound: ChannelSound, early_s: float, end_s: float) -> ChannelSound:
-        known = round(early_s * sound.rate_hz)
-        if known >= sound.samples.shape[1]:
-            begin_s = end_s - early_s
-            raise AudioError(
-                f"A piece of sound from {begin_s:.3f} to {begin_s + sound.duration_s:.3f} s lies before the end of the "
-                f"sound that came ({end_s:.3f} s): it is repeated or out of order, and was left out."
-            )
-        return ChannelSound(sound.samples[:, known:], sound.rate_hz)
 
     def _append(self, sounds: Iterable[ChannelSound]) -> None:
         count = 0

@@ -132,7 +132,12 @@ def check(
     recording = open_it()
     files = _listing(recording.path)
     hold(len(recording) == len(truth), f"{len(recording)} frames come out where {len(truth)} went in")
-    _check_clock(recording, truth, stamps)
+    names = [recording.name(i) for i in range(len(recording))]
+    hold(len(set(names)) == len(names), f"each frame needs a name of its own, not {names}")
+    rises = bool((np.diff(recording.stamps_s) > 0.0).all()) and recording.stamps_s.dtype == np.float64
+    hold(rises, f"stamps must be float64 that rise, not {recording.stamps_s.tolist()}")
+    own = recording.stamps_s - recording.stamps_s[0]
+    hold(not stamps or np.allclose(own, truth.stamps_s, atol=_STAMP_S), f"stamps are {own}, not {truth.stamps_s}")
     _check_camera(recording.rig.rgb, truth.rig.rgb, "colour")
     _check_camera(recording.rig.depth, truth.rig.depth, "depth")
     lies = np.allclose(recording.rig.rgb_from_depth, truth.rig.rgb_from_depth, atol=1e-6)
@@ -141,18 +146,12 @@ def check(
     for index in reversed(range(len(truth))):
         _check_frame(recording, index, truth, depth_error_m, least_measured, colour_error)
     _check_access(recording)
-    _check_identity(recording, open_it())
+    again, print_ = open_it(), recording.fingerprint
+    hold(len(print_) == 64 and set(print_) <= _HASH_DIGITS, f"the fingerprint must be a hex SHA-256, not {print_!r}")
+    hold(print_ == again.fingerprint, "the same recording must have the same fingerprint each time that it is opened")
+    hold(recording.change_stamp() == again.change_stamp(), "change_stamp() must not change while the files do not")
     hold(_listing(recording.path) == files, "a recording is opened in place: its files must not change, nor grow more")
     return recording
-
-
-def _check_clock(recording: Recording, truth: Truth, stamps: bool) -> None:
-    names = [recording.name(i) for i in range(len(recording))]
-    hold(len(set(names)) == len(names), f"each frame needs a name of its own, not {names}")
-    rises = bool((np.diff(recording.stamps_s) > 0.0).all()) and recording.stamps_s.dtype == np.float64
-    hold(rises, f"stamps must be float64 that rise, not {recording.stamps_s.tolist()}")
-    own = recording.stamps_s - recording.stamps_s[0]
-    hold(not stamps or np.allclose(own, truth.stamps_s, atol=_STAMP_S), f"stamps are {own}, not {truth.stamps_s}")
 
 
 def _check_camera(own: Pinhole, true: Pinhole, what: str) -> None:
@@ -218,13 +217,6 @@ def _check_access(recording: Recording) -> None:
     except IndexError:
         return
     hold(False, f"there is no frame {len(recording)}; frame() must raise IndexError")
-
-
-def _check_identity(recording: Recording, again: Recording) -> None:
-    print_ = recording.fingerprint
-    hold(len(print_) == 64 and set(print_) <= _HASH_DIGITS, f"the fingerprint must be a hex SHA-256, not {print_!r}")
-    hold(print_ == again.fingerprint, "the same recording must have the same fingerprint each time that it is opened")
-    hold(recording.change_stamp() == again.change_stamp(), "change_stamp() must not change while the files do not")
 
 
 def check_damage(path: Path, open_it: Callable[[Path], Recording], scratch: Path, most_files: int = 12) -> None:

@@ -407,7 +407,11 @@ class VideoFrames:
         self.width, self.height = stream.codec_context.width, stream.codec_context.height
         if self.width < 1 or self.height < 1 or self.width * self.height > MOST_PIXELS:
             raise RecordingError(f"{self.path} says that it is {self.width}x{self.height}, which no camera's video is.")
-        self._pts = self._read_stamps()
+        with self._told():
+            stamps = [packet.pts for packet in self._container.demux(stream) if packet.pts is not None]
+        if not stamps:
+            raise RecordingError(f"{self.path} has a video stream without a single frame.")
+        self._pts = np.unique(np.array(stamps, np.int64))
         base = float(stream.time_base or 0)
         if base <= 0.0:
             raise RecordingError(f"{self.path} does not say how fast its clock runs; convert it again.")
@@ -471,13 +475,6 @@ class VideoFrames:
 
     def _stream(self) -> Any:
         return self._container.streams.video[0]
-
-    def _read_stamps(self) -> np.ndarray:
-        with self._told():
-            stamps = [packet.pts for packet in self._container.demux(self._stream()) if packet.pts is not None]
-        if not stamps:
-            raise RecordingError(f"{self.path} has a video stream without a single frame.")
-        return np.unique(np.array(stamps, np.int64))
 
     def _find_turn(self) -> DisplayTurn:
         from av.error import FFmpegError

@@ -353,7 +353,14 @@ def validate(
         try:
             recording = uncorrected(open_recording([user_path(path), *more], format, **given))
             _check_audio(recording)
-            _check_pictures(recording, max_decoded)
+            count = len(recording)
+            some = count if max_decoded is None else min(max_decoded, count)
+            decoded = set(np.linspace(0, count - 1, some).round().astype(int).tolist())
+            for index in progress(range(count), "checking", total=count):
+                if index in decoded or not isinstance(recording, FileRecording):
+                    _check_frame(recording, index)
+                else:
+                    _check_files(recording, index)
         except AvlmapsError as error:
             report(str(error))
     first = {fault.sentence: fault for fault in reversed(faults)}
@@ -378,17 +385,6 @@ def _check_audio(recording: Recording) -> None:
                 report(sentence, recording.audio.path, fatal=False)
     except AvlmapsError as error:
         report(str(error), recording.audio.path, fatal=False)
-
-
-def _check_pictures(recording: Recording, max_decoded: int | None) -> None:
-    count = len(recording)
-    some = count if max_decoded is None else min(max_decoded, count)
-    decoded = set(np.linspace(0, count - 1, some).round().astype(int).tolist())
-    for index in progress(range(count), "checking", total=count):
-        if index in decoded or not isinstance(recording, FileRecording):
-            _check_frame(recording, index)
-        else:
-            _check_files(recording, index)
 
 
 def _check_files(recording: FileRecording, index: int) -> bool:

@@ -63,7 +63,12 @@ class RecordingWriter:
     _frames: TextIO | None = field(default=None, init=False)
 
     def __enter__(self) -> "RecordingWriter":
-        self._require_possible()
+        if not isinstance(self.rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise RecordingError(f"rig must be an avlmaps.Rig, not {type(self.rig).__name__}.")
+        if self.colour not in ("png", "jpg"):
+            raise RecordingError(f"colour is {self.colour!r}; it must be png or jpg.")
+        if fault := layout.impossible(self._described()):
+            raise RecordingError(f"{fault}.")
         self.path = lasting_path(self.path)
         _make_empty(self.path)
         # Who reads a recording that is being written finds its cameras here.
@@ -145,8 +150,11 @@ class RecordingWriter:
         self._microphones = None if placed is None else MicrophoneNumbers.of(placed)
         if isinstance(audio, AudioTrack) and audio.directions is not None:
             self.set_directions(audio.directions)
-        if isinstance(audio, AudioTrack) and audio.files:
-            self._take_channels(audio.files)
+        if isinstance(audio, AudioTrack) and audio.files and self._microphones is not None:
+            names = [f"audio.{number + 1}{path.suffix.lower()}" for number, path in enumerate(audio.files)]
+            for path, name in zip(audio.files, names, strict=True):
+                take_file(path, self.path / name, link=False)
+            self._microphones = msgspec.structs.replace(self._microphones, files=names)
             return
         if isinstance(audio, ChannelSound):
             write_channels(self.path / ("audio.flac" if len(audio.samples) <= _FLAC_CHANNELS else "audio.wav"), audio)
@@ -162,21 +170,6 @@ class RecordingWriter:
 
     def set_directions(self, directions: DirectionTrack) -> None:
         write_directions(self.path / DIRECTIONS, directions)
-
-    def _take_channels(self, files: tuple[Path, ...]) -> None:
-        assert self._microphones is not None
-        names = [f"audio.{number + 1}{path.suffix.lower()}" for number, path in enumerate(files)]
-        for path, name in zip(files, names, strict=True):
-            take_file(path, self.path / name, link=False)
-        self._microphones = msgspec.structs.replace(self._microphones, files=names)
-
-    def _require_possible(self) -> None:
-        if not isinstance(self.rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise RecordingError(f"rig must be an avlmaps.Rig, not {type(self.rig).__name__}.")
-        if self.colour not in ("png", "jpg"):
-            raise RecordingError(f"colour is {self.colour!r}; it must be png or jpg.")
-        if fault := layout.impossible(self._described()):
-            raise RecordingError(f"{fault}.")
 
     def _announce(self, name: str, stamp_s: float, world_from_camera: Float[np.ndarray, "4 4"]) -> None:
         if self._poses is None:

@@ -103,10 +103,13 @@ class Labels:
         sounds = _or_note(avlmap.sounds, notes)
         rooms = _or_note(avlmap.rooms, notes)
         sources = _or_note(lambda: drawn_sources(avlmap), notes)
-        names, thing = _thing_labels(len(avlmap.space), things)
+        names = tuple(sorted({thing.name for thing in things}))[:_MOST]
+        label = np.zeros(len(avlmap.space), np.uint8)
+        for thing in reversed(things):  # the most confident is drawn last
+            label[thing.rows] = 1 + names.index(thing.name) if thing.name in names else NONE
         room_names, room = _room_labels(avlmap, rooms, layout.order)
         voxel_names, best, confidence = _name_labels(avlmap, notes, layout.order)
-        voxels = np.stack([thing[layout.order], room, best, confidence], axis=1)
+        voxels = np.stack([label[layout.order], room, best, confidence], axis=1)
         return cls(
             tuple(things), tuple(sounds), tuple(rooms), tuple(sources), names, room_names, voxel_names, voxels,
             tuple(dict.fromkeys(notes)),
@@ -171,14 +174,6 @@ def _or_note(find: "Callable[[], Sequence[Any]]", notes: list[str]) -> "Sequence
     except AvlmapsError as fault:
         notes.append(str(fault))
         return ()
-
-
-def _thing_labels(count: int, things: "Sequence[Thing]") -> tuple[tuple[str, ...], UInt8[np.ndarray, " n"]]:
-    names = tuple(sorted({thing.name for thing in things}))[:_MOST]
-    label = np.zeros(count, np.uint8)
-    for thing in reversed(things):  # the most confident is drawn last
-        label[thing.rows] = 1 + names.index(thing.name) if thing.name in names else NONE
-    return names, label
 
 
 def _room_labels(

@@ -14,7 +14,7 @@ from jaxtyping import Float, Float32, Int
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import FRAME, from_rotation
 from avlmaps.maps.grid import index_ends
-from avlmaps.query.plots import camera_path
+from avlmaps.query.plots import camera_path, ceiling_m
 
 if TYPE_CHECKING:
     from avlmaps.maps.storeys import Storeys
@@ -27,7 +27,6 @@ _MOST_CELLS = 65535
 _NEAR_SHARE = 0.25  # of the map's extent: voxels up to this far out of the bulk of it count as the whole map
 _CEILING_M, _BELOW_M = 0.3, 0.1  # a storey is shown from below its floor to this far under its upper end
 _MEASURED = 300_000  # voxels from which the first view of a page is computed: an even picture of the map
-_HEADROOM_M = 0.3  # the page opens with what is higher over the highest camera cut away
 
 
 class Layout:
@@ -88,7 +87,6 @@ class Layout:
         reach = _NEAR_SHARE * (high - low) + space.grid.voxel_size_m
         least, most = np.maximum(level.min(axis=0), low - reach), np.minimum(level.max(axis=0), high + reach)
         cameras = camera_path(space)
-        ceiling = float(cameras[:, 2].max()) + _HEADROOM_M if len(cameras) else float(level[:, 2].max())
         camera = avlmap.data.rig.rgb
         storeys = {} if avlmap.storeys is None else {"storeys": _storeys(avlmap.storeys, low[2], high[2])}
         return {
@@ -106,7 +104,7 @@ class Layout:
             "least": (least - 0.5 * space.grid.voxel_size_m).tolist(),
             "most": (most + 0.5 * space.grid.voxel_size_m).tolist(),
             "floor_m": _floor_m(level, cameras),
-            "ceiling_m": ceiling,
+            "ceiling_m": ceiling_m(space, level),
             "duration_s": self.duration_s,
             "frame": FRAME,
             "profile": avlmap.data.info.profile,

@@ -126,22 +126,16 @@ def find_noise_floor(
         return NoiseFloor(np.full((1, 1), lowest, np.float32), loudest)
     bias = 10.0 ** (_BIAS_DB / 10.0 / np.sqrt(band_lines(rate_hz)))
     reach = max(1, round(window_s / 2.0 / (HOP_S * _BLOCK_FRAMES)))
-    low, higher = _quantiles(np.log(np.maximum(medians * bias, lowest)), reach)
-    restless = (higher - low).mean(axis=1, keepdims=True)
-    background = np.exp(low + np.minimum(restless, _MOST_RESTLESS_DB * np.log(10.0) / 10.0))
-    return NoiseFloor(background.astype(np.float32), loudest)
-
-
-def _quantiles(
-    levels: Float32[np.ndarray, "blocks bands"], reach: int
-) -> tuple[Float32[np.ndarray, "blocks bands"], Float32[np.ndarray, "blocks bands"]]:
+    levels = np.log(np.maximum(medians * bias, lowest))
     length = min(2 * reach + 1, len(levels))
     windows = np.lib.stride_tricks.sliding_window_view
     # One band at a time: a day's windows need not be in memory at once.
     bands = [np.quantile(windows(band, length), _QUANTILES, axis=1, method="lower") for band in levels.T]
     found = np.stack(bands, axis=-1)
-    nearest = np.clip(np.arange(len(levels)) - (length - 1) // 2, 0, found.shape[1] - 1)
-    return found[0][nearest], found[1][nearest]
+    low, higher = found[:, np.clip(np.arange(len(levels)) - (length - 1) // 2, 0, found.shape[1] - 1)]
+    restless = (higher - low).mean(axis=1, keepdims=True)
+    background = np.exp(low + np.minimum(restless, _MOST_RESTLESS_DB * np.log(10.0) / 10.0))
+    return NoiseFloor(background.astype(np.float32), loudest)
 
 
 _SPECTRUM_S = 0.032

@@ -15,7 +15,7 @@ from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.audio.background import denoise, is_swell, noise_profile
 from avlmaps.maps.audio.segmentation import Segment, frames_of_track, segment, split_at_changes
-from avlmaps.maps.settings import HearingSettings, SoundChangeSettings
+from avlmaps.maps.settings import HearingSettings
 from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.protocols import UNIT_WITHIN, FrameSoundEncoder, SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
@@ -32,7 +32,13 @@ def detect_events(
     Each is written as FLAC, as it was heard, into ``clips_folder``, named by its onset.
     """
     heard = SoundFinder(encoder, settings, clips_folder).find(track, walk)
-    _tell_outside(walk, [one.segment for one in heard])
+    first_s, last_s = float(walk.stamps_s[0]), float(walk.stamps_s[-1])
+    outside = [one for one in heard if one.segment.offset_s < first_s or one.segment.onset_s > last_s]
+    if outside:
+        say(
+            f"note: {len(outside)} of {len(heard)} sounds lie outside the frames, {first_s:.2f} to {last_s:.2f} s, "
+            f"the first at {outside[0].segment.onset_s:.2f} s; they are put where the nearest frame was taken."
+        )
     return collect(heard, encoder.card.dim)
 
 
@@ -53,7 +59,12 @@ class SoundFinder:
     def find(self, track: AudioTrack, walk: Trajectory, until_s: float = np.inf) -> "list[StoredSound]":
         """Return the sounds that end until a moment, in the order of time."""
         if self._by_changes:
-            found, features = _cut_by_changes(track, cast("FrameSoundEncoder", self._encoder), self._settings.changes)
+            encoder = cast("FrameSoundEncoder", self._encoder)
+            of_steps = frames_of_track(track, encoder)
+            edges = split_at_changes(of_steps, encoder.hop_s, self._settings.changes)
+            edges_s = np.minimum(track.start_s + edges * encoder.hop_s, track.end_s)
+            found = [Segment(*pair) for pair in pairwise(edges_s.tolist())]
+            features = np.split(of_steps, edges[1:-1])
         else:
             found, features = segment(track, self._settings.segmentation), None
         heard: list[StoredSound] = []
@@ -72,15 +83,6 @@ class SoundFinder:
                 write_flac(clip, sound)
             heard.append(StoredSound(one, track_of(walk, one), self._known[clip], clip))
         return heard
-
-
-def _cut_by_changes(
-    track: AudioTrack, encoder: FrameSoundEncoder, settings: SoundChangeSettings
-) -> tuple[list[Segment], list[Float32[np.ndarray, "steps d"]]]:
-    features = frames_of_track(track, encoder)
-    edges = split_at_changes(features, encoder.hop_s, settings)
-    edges_s = np.minimum(track.start_s + edges * encoder.hop_s, track.end_s)
-    return [Segment(*pair) for pair in pairwise(edges_s.tolist())], np.split(features, edges[1:-1])
 
 
 def cuts_by_changes(encoder: SoundEncoder, settings: HearingSettings) -> bool:
@@ -165,13 +167,3 @@ def collect(heard: Sequence[StoredSound], dim: int) -> HeardSounds:
         feature=np.concatenate([np.zeros((0, dim), np.float32), *features]),
         clips=tuple(one.clip for one in heard),
     )
-
-
-def _tell_outside(walk: Trajectory, found: Sequence[Segment]) -> None:
-    first_s, last_s = float(walk.stamps_s[0]), float(walk.stamps_s[-1])
-    outside = [one for one in found if one.offset_s < first_s or one.onset_s > last_s]
-    if outside:
-        say(
-            f"note: {len(outside)} of {len(found)} sounds lie outside the frames, {first_s:.2f} to {last_s:.2f} s, "
-            f"the first at {outside[0].onset_s:.2f} s; they are put where the nearest frame was taken."
-        )

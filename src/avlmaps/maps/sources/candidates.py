@@ -62,7 +62,9 @@ def candidates_of(voxel_m: Float[np.ndarray, "n 3"], ear_m: Float[np.ndarray, "k
         one = len(_AIR_HEIGHTS_M) / (len(_QUARTERS) * len(_NEAR_HEIGHTS_M))  # a column has the same prior in all
         weight = np.append(np.ones(len(wide)), np.full(len(fine), one))
     share = _AIR_SHARE if len(air) else 0.0
-    own = _flattened(surface)
+    column = _keys(np.floor(surface[:, :2] / CELL_M).astype(np.int64))
+    _, which, count = np.unique(column, return_inverse=True, return_counts=True)
+    own = count[which] ** -0.5
     prior = np.concatenate([(1.0 - share) * own / own.sum(), share * weight / max(float(weight.sum()), 1e-12)])
     place = np.concatenate([surface, air]).astype(np.float32)
     return Candidates(place, prior, np.arange(len(place)) >= len(surface))
@@ -81,12 +83,6 @@ def _column_of(
 def _free(air: Float[np.ndarray, "n 3"], here: Float[np.ndarray, "k 3"], cell_m: float) -> Float[np.ndarray, "m 3"]:
     key = _keys(np.floor(np.concatenate([here, air]) / cell_m).astype(np.int64))
     return air[~np.isin(key[len(here) :], key[: len(here)])]
-
-
-def _flattened(surface: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, " c"]:
-    column = _keys(np.floor(surface[:, :2] / CELL_M).astype(np.int64))
-    _, which, count = np.unique(column, return_inverse=True, return_counts=True)
-    return count[which] ** -0.5
 
 
 def _keys(cell: Int[np.ndarray, "n k"]) -> Int[np.ndarray, " n"]:

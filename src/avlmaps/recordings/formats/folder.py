@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from avlmaps.core import timeline
 from avlmaps.core.camera import Pinhole, Rig
@@ -49,7 +49,10 @@ def open_folder(path: Path) -> Recording:
     up = description.up_in_world
     heard = _open_audio(path, audio_start_s, video, first_s, description.microphones or None)
     audio = _with_directions(path, heard, start_s)
-    _note_turn(video)
+    if video is not None and video.turn:
+        how = "the intrinsics are of the frames as stored"
+        how = "the frames are read so, as players do, and depth must fit that" if video.shown else how
+        note(f"{video.path.name} is to be shown {video.turn.words} (its display matrix); {how}.")
     recording = FileRecording(
         path=path,
         format="folder",
@@ -121,13 +124,6 @@ def _open_audio(
         with suppress(NoAudioStreamError):
             return AudioTrack.open(video.path, start_s=start_s or first_s - video.start_s)
     return track
-
-
-def _note_turn(video: VideoFrames | None) -> None:
-    if video is not None and video.turn:
-        how = "the intrinsics are of the frames as stored"
-        how = "the frames are read so, as players do, and depth must fit that" if video.shown else how
-        note(f"{video.path.name} is to be shown {video.turn.words} (its display matrix); {how}.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,26 +236,19 @@ def _pose_pictures(found: _Pictures, known: PoseTable) -> tuple[Shots, float, ti
     own_row = len(stamps_s) == len(known.stamps_s) and np.array_equal(stamps_s, known.stamps_s, equal_nan=True)
     covered, world_from_camera, known_at = np.ones(len(stamps_s), bool), known.pose, None
     if not own_row:
-        covered, world_from_camera, known_at = _interpolated(stamps_s, known)
+        known_at = known.trajectory(layout.POSES)
+        assert known_at is not None  # read_poses refuses a table without a usable pose
+        covered, world_from_camera = known_at.covers(stamps_s), np.full((len(stamps_s), 4, 4), np.nan)
+        world_from_camera[covered] = known_at.at(stamps_s[covered])
+        span = "{:.2f} to {:.2f} s".format(*known_at.stamps_s[[0, -1]])
+        if not covered.any():
+            raise RecordingError(
+                f"No frame lies within {layout.POSES} ({span}): the frames go from {np.fmin.reduce(stamps_s):.2f} to "
+                f"{np.fmax.reduce(stamps_s):.2f} s; check that both use one clock."
+            )
+        if lost := int((~covered).sum()):
+            note(f"{lost} of {len(stamps_s)} frame(s) lie outside {layout.POSES} ({span}) or in a gap of it; left out.")
     shots = Shots(found.names, found.colour, found.depth, stamps_s - start_s, world_from_camera, found.video_frames)
     if known_at is not None:
         known_at = timeline.Trajectory(known_at.stamps_s - start_s, known_at.world_from_body)
     return shots.take(np.flatnonzero(covered)), start_s, known_at
-
-
-def _interpolated(
-    stamps_s: Float[np.ndarray, " n"], known: PoseTable
-) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], timeline.Trajectory]:
-    trajectory = known.trajectory(layout.POSES)
-    assert trajectory is not None  # read_poses refuses a table without a usable pose
-    covered, world_from_camera = trajectory.covers(stamps_s), np.full((len(stamps_s), 4, 4), np.nan)
-    world_from_camera[covered] = trajectory.at(stamps_s[covered])
-    span = "{:.2f} to {:.2f} s".format(*trajectory.stamps_s[[0, -1]])
-    if not covered.any():
-        raise RecordingError(
-            f"No frame lies within {layout.POSES} ({span}): the frames go from {np.fmin.reduce(stamps_s):.2f} to "
-            f"{np.fmax.reduce(stamps_s):.2f} s; check that both use one clock."
-        )
-    if lost := int((~covered).sum()):
-        note(f"{lost} of {len(stamps_s)} frame(s) lie outside {layout.POSES} ({span}) or in a gap of it; left out.")
-    return covered, world_from_camera, trajectory

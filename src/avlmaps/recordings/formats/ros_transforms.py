@@ -209,7 +209,9 @@ def read_tf(bag: Bag, image_topic: str, named: str = "") -> tuple[TransformTree,
         moving, static = [named], [t for t in topics if t.endswith(_STATIC) and named.startswith(_namespace(t))]
     tree = TransformTree()
     for topic in (*static, *moving):
-        _add_tf(bag, topic, tree, static=topic in static)
+        for transform in (one for _, message in bag.messages(topic) for one in message.transforms):
+            frame, child = transform.header.frame_id, transform.child_frame_id
+            tree.add(frame, child, pose_of(transform), stamp_of(transform), static=topic in static)
     return tree, max(moving, key=len, default="")
 
 
@@ -247,21 +249,6 @@ def base_height(tree: TransformTree, camera_frame: str, stamp_s: float) -> BaseH
     return None
 
 
-def _add_tf(bag: Bag, topic: str, tree: TransformTree, static: bool) -> None:
-    for _, message in bag.messages(topic):
-        for transform in message.transforms:
-            pose, at_s = pose_of(transform), stamp_of(transform)
-            tree.add(transform.header.frame_id, transform.child_frame_id, pose, at_s, static)
-
-
-def _check_pose_topic(bag: Bag, topic: str) -> None:
-    found = sorted({connection.msgtype for connection in bag.connections(topic)})
-    if not set(found) & {*_POSE_TYPES, *_TF_TYPES, _TRANSFORM_TYPE}:
-        known = ", ".join(kind.rsplit("/", 1)[1] for kind in (*_POSE_TYPES, _TRANSFORM_TYPE, _TF_TYPES[0]))
-        what = f"is of the type {found[0]}, which holds no poses" if found else "is not there"
-        raise RecordingError(f"The topic {topic!r} of {bag.path} {what}; name one of {known} (pose=TOPIC).")
-
-
 @dataclass(frozen=True, slots=True)
 class CameraMotion:
     """What moves the camera: frames and topic, what was assumed, and whether the world is one of ROS, with z up."""
@@ -279,7 +266,11 @@ def find_motion(
     if named and Path(named).is_file():
         return CameraMotion(_tree_of_file(Path(named), camera_frame), named, z_is_up=False)
     if named:
-        _check_pose_topic(bag, named)
+        found = sorted({connection.msgtype for connection in bag.connections(named)})
+        if not set(found) & {*_POSE_TYPES, *_TF_TYPES, _TRANSFORM_TYPE}:
+            known = ", ".join(kind.rsplit("/", 1)[1] for kind in (*_POSE_TYPES, _TRANSFORM_TYPE, _TF_TYPES[0]))
+            what = f"is of the type {found[0]}, which holds no poses" if found else "is not there"
+            raise RecordingError(f"The topic {named!r} of {bag.path} {what}; name one of {known} (pose=TOPIC).")
     if (not named or named == tf_topic) and transforms.moves(camera_frame):
         return CameraMotion(transforms, tf_topic)
     candidates = [named] if named and named != tf_topic else []

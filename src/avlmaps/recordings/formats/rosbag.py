@@ -117,8 +117,15 @@ def _opened(bag: Bag, topics: ros.RosTopics) -> StoredRecording:
     poses, known = tree.root_from(camera_frame, stamps_s)
     camera_from_cloud = None
     if of_points:
-        camera_from_cloud, seen = _clouds_in_cameras(bag, depth_topic, camera_frame, tree, depth_s[depth], poses)
-        known &= seen
+        first = bag.first(depth_topic)
+        frame = first.header.frame_id if first else ""
+        if tree.root(frame) != tree.root(camera_frame):
+            raise RecordingError(
+                f"{bag.path} does not link the LiDAR {frame!r} to the camera {camera_frame!r}; record /tf_static with "
+                "both."
+            )
+        world_from_cloud, seen = tree.root_from(frame, depth_s[depth])
+        camera_from_cloud, known = inverse(poses) @ world_from_cloud, known & seen
     if not known.any():
         raise RecordingError(no_pose(bag.path, camera_frame, stamps_s, tree))
     if not known.all():
@@ -281,16 +288,3 @@ def _stamps(bag: Bag, topic: str) -> tuple[np.ndarray, np.ndarray]:
     if fault := repeat_fault(stamps_s, f"messages of {topic}"):
         raise RecordingError(f"{bag.path}: {fault}")
     return stamps_s, received_ns
-
-
-def _clouds_in_cameras(
-    bag: Bag, topic: str, camera_frame: str, tree: TransformTree, stamps_s: np.ndarray, world_from_camera: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    first = bag.first(topic)
-    frame = first.header.frame_id if first else ""
-    if tree.root(frame) != tree.root(camera_frame):
-        raise RecordingError(
-            f"{bag.path} does not link the LiDAR {frame!r} to the camera {camera_frame!r}; record /tf_static with both."
-        )
-    world_from_cloud, known = tree.root_from(frame, stamps_s)
-    return inverse(world_from_camera) @ world_from_cloud, known

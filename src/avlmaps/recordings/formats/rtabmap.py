@@ -116,7 +116,15 @@ def _unpacked_depth(place: Path, content: bytes) -> Float32[np.ndarray, "h w"]:
 def open_rtabmap(path: Path) -> StoredRecording:
     """Open a database in place."""
     database = _Database(path)
-    version = _version(database)
+    tables = {name for (name,) in database.rows("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    columns = {row[1] for row in database.rows("PRAGMA table_info(Data)")}
+    if missing := ({"Node", "Data", "Admin"} - tables) or ({"image", "depth", "calibration"} - columns):
+        raise RecordingError(
+            f"{database.path} is a SQLite database without RTAB-Map's {sorted(missing)[0]}; give one that RTAB-Map "
+            "recorded, and open one of a version before 0.10 in today's, which converts it."
+        )
+    said = database.rows("SELECT version FROM Admin")
+    version = tuple(int(word) for word in str(said[0][0] if said else "").split(".") if word.isdigit())
     optimised = _optimised(database)
     rows = database.rows(
         "SELECT Node.id, Node.stamp, Node.pose, Data.calibration, length(Data.image), length(Data.depth) FROM Node "
@@ -162,18 +170,6 @@ def open_rtabmap(path: Path) -> StoredRecording:
         path=path, format="rtabmap", rig=rig, shots=shots, pictures=_Pictures(database),
         up_in_world=np.array([0.0, 0.0, 1.0]), stored_depth_unit_m=unit_m, begins_s=start_s,
     )  # fmt: skip
-
-
-def _version(database: _Database) -> tuple[int, ...]:
-    tables = {name for (name,) in database.rows("SELECT name FROM sqlite_master WHERE type = 'table'")}
-    columns = {row[1] for row in database.rows("PRAGMA table_info(Data)")}
-    if missing := ({"Node", "Data", "Admin"} - tables) or ({"image", "depth", "calibration"} - columns):
-        raise RecordingError(
-            f"{database.path} is a SQLite database without RTAB-Map's {sorted(missing)[0]}; give one that RTAB-Map "
-            "recorded, and open one of a version before 0.10 in today's, which converts it."
-        )
-    said = database.rows("SELECT version FROM Admin")
-    return tuple(int(word) for word in str(said[0][0] if said else "").split(".") if word.isdigit())
 
 
 def _optimised(database: _Database) -> dict[int, np.ndarray]:

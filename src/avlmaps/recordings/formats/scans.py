@@ -123,7 +123,11 @@ def open_nerfstudio(path: Path) -> FileRecording:
     given, plain = tables.read_json(file, _Transforms)
     known = {name for kind in (_Transforms, _Camera) for name in kind.__struct_fields__}
     tables.note_unread(file, plain, (*known, *_IDLE))
-    _note_frames(file, given, plain)
+    present = {key: None for frame in plain["frames"] for key in frame if not key.endswith("_path")}
+    tables.note_unread(file, present, (*_Frame.__struct_fields__, *_IDLE_OF_FRAME))
+    note(_NO_CLOCK)
+    if given.applied_scale != 1.0:
+        note(f"The positions were scaled by {given.applied_scale:g}; they are scaled back to metres.")
     frames = [frame for frame in given.frames if frame.depth_file_path]
     if not frames:
         raise RecordingError(
@@ -143,14 +147,6 @@ def open_nerfstudio(path: Path) -> FileRecording:
     )
     rig = _rig(file, given, frames, shots)
     return FileRecording.settled(path, "nerfstudio", rig, shots, lambda _: file, depth_units=units)
-
-
-def _note_frames(file: Path, given: _Transforms, plain: dict[str, Any]) -> None:
-    present = {key: None for frame in plain["frames"] for key in frame if not key.endswith("_path")}
-    tables.note_unread(file, present, (*_Frame.__struct_fields__, *_IDLE_OF_FRAME))
-    note(_NO_CLOCK)
-    if given.applied_scale != 1.0:
-        note(f"The positions were scaled by {given.applied_scale:g}; they are scaled back to metres.")
 
 
 def _units_per_m(file: Path, given: _Transforms) -> float:
