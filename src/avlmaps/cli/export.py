@@ -80,7 +80,10 @@ class Export(MapVerb):
             listed = shown_in(avlmap.contents(self.least).to_json(""), frame, avlmap)
             write_table(self.out, listed["things"], listed["sounds"], frame)
         elif kind in _LAYERED:
-            _write_layers(self, avlmap, kind, frame)
+            from avlmaps.query.export_viewers import layers_of, write_foxglove, write_rerun
+
+            write = write_rerun if kind == ".rrd" else write_foxglove
+            write(self.out, layers_of(avlmap, frame, self.heat, self.least))
         elif kind == ".openlex3d":
             from avlmaps.query.export import write_openlex3d
 
@@ -154,10 +157,3 @@ def _write_voxels(verb: Export, opened: "AVLMap", kind: str, frame: "FrameName")
         write_ply(verb.out, opened.space, colors, columns, frame)
     else:
         write_glb(verb.out, opened.space, colors, frame)
-
-
-def _write_layers(verb: Export, opened: "AVLMap", kind: str, frame: "FrameName") -> None:
-    from avlmaps.query.export_viewers import layers_of, write_foxglove, write_rerun
-
-    layers = layers_of(opened, frame, verb.heat, verb.least)
-    (write_rerun if kind == ".rrd" else write_foxglove)(verb.out, layers)

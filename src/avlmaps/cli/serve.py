@@ -2,7 +2,7 @@
 
 import logging
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -14,7 +14,7 @@ from avlmaps.cli.verb import PORT, Asking, ModelVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
-    from avlmaps.serve.service import Service
+    pass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +86,12 @@ def serve(verb: "Serve") -> None:
     )  # fmt: skip
     maps = named_maps([verb.map, *verb.more])
     if verb.stdio:
-        _serve_stdio(Service.open(maps, settings, say))
+        import asyncio
+
+        from avlmaps.serve.agents import agent_server, serve_stdio
+
+        with closing(Service.open(maps, settings, say)) as service:
+            asyncio.run(serve_stdio(agent_server(service, reads_files=True), service.settings.limits.answer_s))
         return
     from avlmaps.serve.app import create_app
     from avlmaps.serve.drive.app import PATH, open_driving
@@ -123,14 +128,3 @@ def serve(verb: "Serve") -> None:
             "driving; use its own stop.",
             UNCONFIRMED_STATUS,
         )
-
-
-def _serve_stdio(service: "Service") -> None:
-    import asyncio
-
-    from avlmaps.serve.agents import agent_server, serve_stdio
-
-    try:
-        asyncio.run(serve_stdio(agent_server(service, reads_files=True), service.settings.limits.answer_s))
-    finally:
-        service.close()

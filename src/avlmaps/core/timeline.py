@@ -97,13 +97,14 @@ def associate(
     if len(a_s) == 0 or len(b_s) == 0:
         none = np.zeros(0, np.int64)
         return none, none
-    b_of_a, a_of_b = _nearest(a_s, b_s), _nearest(b_s, a_s)
+    b_of_a, a_of_b = nearest(a_s, b_s), nearest(b_s, a_s)
     a = np.arange(len(a_s))
     paired = (a_of_b[b_of_a] == a) & (np.abs(a_s - b_s[b_of_a]) <= tolerance_s)
     return a[paired], b_of_a[paired]
 
 
-def _nearest(asked_s: Float[np.ndarray, " n"], stamps_s: Float[np.ndarray, " m"]) -> Int[np.ndarray, " n"]:
+def nearest(asked_s: Float[np.ndarray, " n"], stamps_s: Float[np.ndarray, " m"]) -> Int[np.ndarray, " n"]:
+    """Return the row of the nearest of some rising stamps, one at least, for each that is asked for."""
     right = np.clip(np.searchsorted(stamps_s, asked_s), 0, len(stamps_s) - 1)
     left = np.maximum(right - 1, 0)
     return np.where(asked_s - stamps_s[left] <= stamps_s[right] - asked_s, left, right)

@@ -543,7 +543,9 @@ class LiveMap:
                 if absorb:
                     next_s = max(begin_s + self.settings.snapshot_s, end_s + min(end_s - begin_s, _REST_S))
                 if self._shown_s is not None and end_s >= save_s:
-                    self._save()
+                    assert self._snapshot is not None
+                    write(self.path, self._snapshot[0].data)
+                    self._saved_s, self._shown_s = self._snapshot[1], None
                     save_s = max(end_s + self.settings.save_s, time.perf_counter() + _REST_S)
             except AvlmapsError as fault:
                 self._doubt(str(fault))
@@ -564,11 +566,6 @@ class LiveMap:
         with self._door:
             self._shown_s = now_s if self._shown_s is None else self._shown_s
         self._show(made, now_s if absorb or self._snapshot is None else self._snapshot[1])
-
-    def _save(self) -> None:
-        assert self._snapshot is not None
-        write(self.path, self._snapshot[0].data)
-        self._saved_s, self._shown_s = self._snapshot[1], None
 
     def _show(self, data: MapData, came_s: float) -> None:
         made = AVLMap(data, self._mapper.encoders, path=IN_MEMORY, settings=self._query)

@@ -37,9 +37,8 @@ def join_source(kind: str, topics: Mapping[str, str]) -> LiveSource:
         RecordingError: a topic is for nothing that is known.
         BackendError: the package that brings it, or what that needs, is not installed.
     """
-    for entry in entry_points(ENTRY_POINT_GROUP):
-        if entry.name == kind:
-            return brought(entry, "the source")(topics)
+    for entry in entry_points(ENTRY_POINT_GROUP).select(name=kind):
+        return brought(entry, "the source")(topics)
     raise BackendError(f"The source {kind} needs a package of its own; get it with: {how_to_get('sources', kind)}")
 
 

@@ -486,13 +486,9 @@ def stood_over(camera_m: Float[np.ndarray, "k 3"], level: Voxelised) -> Float[np
         drop_m = height_m - level.height_m[close]
         there = level.height_m[close][(drop_m > HIGHEST_M) & (drop_m < DEEPEST_M)]
         if len(there) >= _FEWEST_UNDER:
-            under[index] = _commonest(there)
+            near: Sequence[int] = (np.abs(there[:, None] - there[None]) < 0.06).sum(axis=1).tolist()
+            under[index] = max(zip(near, there.tolist(), strict=True))[1]
     return under
-
-
-def _commonest(heights: Float[np.ndarray, " n"]) -> float:
-    near: Sequence[int] = (np.abs(heights[:, None] - heights[None]) < 0.06).sum(axis=1).tolist()
-    return float(max(zip(near, heights.tolist(), strict=True))[1])
 
 
 _BAND_M = 0.12  # cameras of one group differ in height by no more than this

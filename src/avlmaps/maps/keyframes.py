@@ -113,7 +113,12 @@ def describe_keyframe(
             (found,) = encoders.views.encode([frame.copy()])
             card = encoders.card(Kind.VIEWS)
             view = as_row(found, card.dim, f"The view encoder {card.id}", frame)
-    thumbnail = _thumbnail(frame.rgb, settings.thumbnail_width_px)
+    rgb, width_px = frame.rgb, settings.thumbnail_width_px
+    if rgb.shape[1] > width_px:
+        size = (width_px, max(1, round(rgb.shape[0] * width_px / rgb.shape[1])))
+        rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
+    _, encoded = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 80])
+    thumbnail = encoded.reshape(-1)
     return replace(
         NO_KEYFRAMES,
         stamp_s=np.array([frame.stamp_s]),
@@ -170,14 +175,6 @@ def moved_keyframes(keyframes: Keyframes, motion: Float[np.ndarray, "k 4 4"]) ->
 def _applied(motion: Float[np.ndarray, "n 4 4"], points: Float32[np.ndarray, "n 3"]) -> Float32[np.ndarray, "n 3"]:
     turned = np.einsum("nij,nj->ni", motion[:, :3, :3], np.asarray(points, np.float64))
     return (turned + motion[:, :3, 3]).astype(np.float32)
-
-
-def _thumbnail(rgb: UInt8[np.ndarray, "h w 3"], width_px: int) -> UInt8[np.ndarray, " bytes"]:
-    if rgb.shape[1] > width_px:
-        size = (width_px, max(1, round(rgb.shape[0] * width_px / rgb.shape[1])))
-        rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
-    _, encoded = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 80])
-    return encoded.reshape(-1)
 
 
 PATCH_PX = 5

@@ -12,7 +12,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse, mean_rotation, orthonormalize_all, rotation_angle_rad
-from avlmaps.core.timeline import Trajectory
+from avlmaps.core.timeline import Trajectory, nearest
 from avlmaps.recordings.types import Frame
 
 AWAY_S = 0.5
@@ -41,7 +41,14 @@ class PoseCorrection:
         near = (stamps > known_s[0] - AWAY_S) & (stamps < known_s[-1] + AWAY_S)
         if 2 * near.sum() > len(stamps):  # a tracker that began before the frames, or ran on after them
             stamps, given = stamps[near], given[near]
-        _require_stamps(stamps, known_s)
+        away_s = np.abs(stamps - known_s[nearest(stamps, known_s)])
+        far = away_s > AWAY_S
+        if far.any():
+            raise MapError(
+                f"{int(far.sum())} of {len(stamps)} corrected poses are of no frame: the first at {stamps[far][0]:.3f} "
+                f"s, where the nearest frame is {away_s[far][0]:.3g} s away (frames are from {known_s[0]:.3f} to "
+                f"{known_s[-1]:.3f} s). Give poses on the clock of the frames, of this recording alone."
+            )
         before = there.at(np.clip(stamps, known_s[0], known_s[-1]))
         _require_walk(stamps, given, before)
         same = np.abs(given - before).max(axis=(1, 2)) < 1e-12
@@ -90,20 +97,6 @@ def _checked(stamps_s: Any, poses: Any) -> tuple[Float[np.ndarray, " k"], Float[
             f"The stamps of corrected poses must rise; {stamps[at + 1]:.3f} s is after {stamps[at]:.3f} s; sort them."
         )
     return stamps, orthonormalize_all(given, [f"{stamp:.3f} s" for stamp in stamps])
-
-
-def _require_stamps(stamps: Float[np.ndarray, " k"], known_s: Float[np.ndarray, " f"]) -> None:
-    after = np.clip(np.searchsorted(known_s, stamps), 1, len(known_s) - 1) if len(known_s) > 1 else np.zeros(1, int)
-    away_s = np.abs(stamps - known_s[after])
-    if len(known_s) > 1:
-        away_s = np.minimum(away_s, np.abs(stamps - known_s[after - 1]))
-    far = away_s > AWAY_S
-    if far.any():
-        raise MapError(
-            f"{int(far.sum())} of {len(stamps)} corrected poses are of no frame: the first at {stamps[far][0]:.3f} s, "
-            f"where the nearest frame is {away_s[far][0]:.3g} s away (frames are from {known_s[0]:.3f} to "
-            f"{known_s[-1]:.3f} s). Give poses on the clock of the frames, of this recording alone."
-        )
 
 
 def _require_walk(

@@ -265,8 +265,17 @@ def _stairs(columns: _Columns, surface: Int[np.ndarray, " m"], storeys: Sequence
     out: list[Stairs] = []
     for number in foot[np.isin(foot, top)].tolist():
         mine = slope[one] == number
-        path = _shortest(one[mine], other[mine], cost[mine], kind)
-        out.append(Stairs(below, columns.middles(nodes[path])))
+        start, end, length = one[mine], other[mine], cost[mine]
+        at_foot = np.flatnonzero(kind[end] == _FOOT)
+        pairs = np.concatenate([start, end[at_foot]]), np.concatenate([end, start[at_foot]])
+        graph = csr_array((np.concatenate([length, length[at_foot]]), pairs), shape)
+        feet, tops = (np.unique(end[kind[end] == which]) for which in (_FOOT, _TOP))
+        shortest: Any = csgraph.dijkstra  # its types know no min_only with predecessors
+        total, before, _ = shortest(graph, indices=feet, return_predecessors=True, min_only=True)
+        path = [int(tops[np.argmin(total[tops])])]
+        while before[path[-1]] >= 0:
+            path.append(int(before[path[-1]]))
+        out.append(Stairs(below, columns.middles(nodes[path[::-1]])))
     return out
 
 
@@ -286,20 +295,3 @@ def _strides(
     around = np.bincount(one, minlength=len(nodes)) / len(pairs)
     cost = np.hypot(np.hypot(apart_m[:, 0], apart_m[:, 1]), z_m[one] - z_m[other])
     return one, other, cost * (3.0 - 2.0 * around[one])  # the middle of a flight is cheaper than its edge
-
-
-def _shortest(
-    one: Int[np.ndarray, " e"], other: Int[np.ndarray, " e"], cost: Float[np.ndarray, " e"], kind: Int[np.ndarray, " n"]
-) -> list[int]:
-    from scipy.sparse import csgraph, csr_array
-
-    foot = np.flatnonzero(kind[other] == _FOOT)
-    pairs = np.concatenate([one, other[foot]]), np.concatenate([other, one[foot]])
-    graph = csr_array((np.concatenate([cost, cost[foot]]), pairs), (len(kind), len(kind)))
-    feet, tops = (np.unique(other[kind[other] == end]) for end in (_FOOT, _TOP))
-    shortest: Any = csgraph.dijkstra  # its types know no min_only with predecessors
-    total, before, _ = shortest(graph, indices=feet, return_predecessors=True, min_only=True)
-    path = [int(tops[np.argmin(total[tops])])]
-    while before[path[-1]] >= 0:
-        path.append(int(before[path[-1]]))
-    return path[::-1]

@@ -62,9 +62,8 @@ def find_robot(kind: str, address: str, file: Path | None) -> RealRobot:
         NavigationError: the file cannot be read.
         BackendError: the package that drives such robots is not installed.
     """
-    for entry in entry_points(ROBOTS_GROUP):
-        if entry.name == kind:
-            return brought(entry, "the robot")(address, file)
+    for entry in entry_points(ROBOTS_GROUP).select(name=kind):
+        return brought(entry, "the robot")(address, file)
     raise BackendError(f"Robots of {kind} need a package of their own; get it with: {how_to_get('robots', kind)}")
 
 

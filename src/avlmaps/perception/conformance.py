@@ -25,11 +25,7 @@ def check(kind: Kind, backend: Any) -> None:
     """Hold a backend to its protocol; ``NonConformanceError`` names the promise that it breaks."""
     lacking = [name for name in protocols.members_of(PROTOCOLS[kind]) if not hasattr(backend, name)]
     hold(not lacking, f"{type(backend).__qualname__} lacks {', '.join(lacking)} of {PROTOCOLS[kind].__name__}")
-    _check_card(backend.card)
-    _CHECKS[kind](backend)
-
-
-def _check_card(card: protocols.ModelCard) -> None:
+    card: protocols.ModelCard = backend.card
     hold(card.id and card.licence, f"the card {card} must name a model and its licence")
     hold(card.dim >= 1, f"the card's dim is {card.dim}")
     hold(
@@ -37,6 +33,7 @@ def _check_card(card: protocols.ModelCard) -> None:
         f"the card's checksum must be a hex SHA-256, not {card.checksum!r}",
     )
     hold(card.prompts and all("{}" in prompt for prompt in card.prompts), "each prompt must hold {} for the word")
+    _CHECKS[kind](backend)
 
 
 def _check_rows(rows: np.ndarray, count: int, dim: int, what: str, zero_allowed: bool = False) -> None:
@@ -176,7 +173,11 @@ def _check_matcher(matcher: protocols.Matcher) -> None:
     b = _taken(a, order)
     pairs = matcher.match(a, b)
     for found, count in ((pairs, len(b.xy)), (matcher.match(a, other), len(other.xy))):
-        _check_pairs(found, len(a.xy), count)
+        hold(found.ndim == 2 and found.shape[1] == 2, f"matches must have shape (m, 2), not {found.shape}")
+        hold(np.issubdtype(found.dtype, np.integer), f"matches must be whole numbers, not {found.dtype}")
+        for column, most in zip(found.T, (len(a.xy), count), strict=True):
+            hold(((column >= 0) & (column < most)).all(), f"matches must be numbers of keypoints below {most}")
+            hold(len(np.unique(column)) == len(column), "a keypoint may be matched at most once")
     hold(np.array_equal(pairs, matcher.match(a, b)), "the same keypoints must give the same matches")
     as_before = {(i, order[j]) for i, j in pairs.tolist()} ^ {(i, j) for i, j in matcher.match(a, a).tolist()}
     hold(len(as_before) <= 0.1 * len(pairs) + 1, "the order of a picture's keypoints must not matter")
@@ -190,14 +191,6 @@ def _check_matcher(matcher: protocols.Matcher) -> None:
 
 def _taken(local: protocols.LocalFeatures, rows: np.ndarray) -> protocols.LocalFeatures:
     return replace(local, xy=local.xy[rows], descriptors=local.descriptors[rows], score=local.score[rows])
-
-
-def _check_pairs(pairs: np.ndarray, first: int, second: int) -> None:
-    hold(pairs.ndim == 2 and pairs.shape[1] == 2, f"matches must have shape (m, 2), not {pairs.shape}")
-    hold(np.issubdtype(pairs.dtype, np.integer), f"matches must be whole numbers, not {pairs.dtype}")
-    for column, count in zip(pairs.T, (first, second), strict=True):
-        hold(((column >= 0) & (column < count)).all(), f"matches must be numbers of keypoints below {count}")
-        hold(len(np.unique(column)) == len(column), "a keypoint may be matched at most once")
 
 
 _CHECKS: dict[Kind, Callable[[Any], None]] = {

@@ -52,7 +52,14 @@ def completed(kind: Kind, encoder: object) -> Any:
     if not hasattr(encoder, "card"):
         missing["card"] = made_card(kind, encoder)
     if kind is Kind.PIXELS and "vocabulary" in missing:
-        missing["vocabulary"] = _known_of(encoder, missing["vocabulary"])
+        rows = np.asarray(_words_of(Kind.PIXELS, encoder, missing["vocabulary"]))
+        known = tuple(name for name, row in zip(missing["vocabulary"], rows, strict=False) if np.any(row))
+        if not known:
+            raise BackendError(
+                f"The pixels encoder {type(encoder).__qualname__} has no vocabulary, the names that compete for a "
+                "voxel, and knows none of the lexicon's things; give it one, such as vocabulary = ('red', 'green')."
+            )
+        missing["vocabulary"] = known
     if not missing:
         return encoder
     return with_members(encoder, (name for name in dir(encoder) if not name.startswith("_")), missing)
@@ -124,17 +131,6 @@ def made_card(kind: Kind, encoder: Any) -> ModelCard:
         digest.update(hashlib.sha256(piece).digest())
     note = "its card was made from its code and what it holds; it had none"
     return ModelCard(type(encoder).__qualname__.rpartition(".")[2], dim, "unknown", digest.hexdigest(), note=note)
-
-
-def _known_of(encoder: Any, names: Sequence[str]) -> tuple[str, ...]:
-    rows = np.asarray(_words_of(Kind.PIXELS, encoder, names))
-    known = tuple(name for name, row in zip(names, rows, strict=False) if np.any(row))
-    if not known:
-        raise BackendError(
-            f"The pixels encoder {type(encoder).__qualname__} has no vocabulary, the names that compete for a voxel, "
-            "and knows none of the lexicon's things; give it one, such as vocabulary = ('red', 'green')."
-        )
-    return known
 
 
 def _words_of(kind: Kind, encoder: Any, words: Sequence[str] = ("chair",)) -> Any:

@@ -259,7 +259,12 @@ def _score(
         return replace(
             found, confidence=margin_confidence(found.margin, found.instance, space.grid.voxel_size_m, fitted)
         )
-    confidence = _named_confidence(encoder, word, found, space.grid.voxel_size_m)
+    # As the encoder was calibrated. A phrase that means several names has the confidence that the most meant name would
+    # have with all their probability.
+    mean, area_m2 = found.mean_probability, found.voxel_count * space.grid.voxel_size_m**2
+    sure = [encoder.instance_probability(name, mean, area_m2) for name in word.clear_names(encoder)]
+    nothing = np.zeros(len(found))  # of a word that names none of the encoder's names
+    confidence = np.max([nothing, *sure], axis=0).astype(np.float32)
     longest_m = _longest_of(voxels, word)
     if math.isfinite(longest_m):
         length_m = _lengths_m(space, found) if length_m is None else length_m
@@ -341,17 +346,6 @@ def margin_confidence(
     clear = mean_margin / (mean_margin + settings.margin_yes)
     large = 1.0 - np.exp(-count * voxel_size_m**2 / settings.area_yes_m2)
     return (clear * large).astype(np.float32)
-
-
-def _named_confidence(
-    encoder: NamedPixelEncoder, word: EncodedWord, found: Instances, voxel_size_m: float
-) -> Float32[np.ndarray, " i"]:
-    # As the encoder was calibrated. A phrase that means several names has the confidence that the most meant name would
-    # have with all their probability.
-    mean, area_m2 = found.mean_probability, found.voxel_count * voxel_size_m**2
-    sure = [encoder.instance_probability(name, mean, area_m2) for name in word.clear_names(encoder)]
-    nothing = np.zeros(len(found))  # of a word that names none of the encoder's names
-    return np.max([nothing, *sure], axis=0).astype(np.float32)
 
 
 def _longest_of(voxels: FeatureVoxels, word: EncodedWord) -> float:
@@ -443,7 +437,15 @@ def object_factor(
     by_colour = voxels.rgb is not None and isinstance(encoder, NamedPixelEncoder) and not compound
     colour = colour_in(part.query) if by_colour else None
     if colour is not None and voxels.rgb is not None and not colour.thing:
-        return _colour_factor(voxels, voxels.rgb, colour, part, heat)
+        space, settings = voxels.space, voxels.settings
+        fit = _colour_margin(np.asarray(voxels.rgb), colour)
+        rows = np.flatnonzero(fit > 0.0)
+        found = _link(space, Scored(rows, fit[rows], np.ones(len(rows), np.float32)), settings.link_m)
+        confidence = margin_confidence(found.margin, found.instance, space.grid.voxel_size_m, settings)
+        found = replace(found, confidence=confidence).only(confidence >= settings.least_confidence)
+        note = "" if found.best >= FOUND_AT else f"nothing of some size is {colour.text}"
+        falloff, mask, is_found = heat.falloff_per_m(part.role), _mask(len(space), found), found.best >= FOUND_AT
+        return NearThings(space, part, falloff, mask, found.instance, found.confidence, is_found, colour.text, note)
     word = EncodedWord.of(encoder, colour.thing if colour else part.query)
     if len(word.rows):
         return _Search(voxels, part, heat, word, colour, searched if colour is None else None).factor()
@@ -521,20 +523,6 @@ class _Search:
             space, part, falloff, mask, found.instance, found.confidence, is_found, said, note, with_uncertain,
             is_named, plain,
         )  # fmt: skip
-
-
-def _colour_factor(
-    voxels: FeatureVoxels, rgb: UInt8[np.ndarray, "n 3"], colour: ColourPhrase, part: Part, heat: HeatSettings
-) -> NearThings:
-    space, settings = voxels.space, voxels.settings
-    fit = _colour_margin(np.asarray(rgb), colour)
-    rows = np.flatnonzero(fit > 0.0)
-    found = _link(space, Scored(rows, fit[rows], np.ones(len(rows), np.float32)), settings.link_m)
-    confidence = margin_confidence(found.margin, found.instance, space.grid.voxel_size_m, settings)
-    found = replace(found, confidence=confidence).only(confidence >= settings.least_confidence)
-    note = "" if found.best >= FOUND_AT else f"nothing of some size is {colour.text}"
-    falloff, mask, is_found = heat.falloff_per_m(part.role), _mask(len(space), found), found.best >= FOUND_AT
-    return NearThings(space, part, falloff, mask, found.instance, found.confidence, is_found, colour.text, note)
 
 
 def _mask(count: int, found: Instances) -> np.ndarray:

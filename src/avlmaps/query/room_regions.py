@@ -110,15 +110,6 @@ def _closed_doorways(wall: Cells, free: Cells, cell_m: float) -> Cells:
     return out
 
 
-def _recesses(wall: Cells, free: Cells, cell_m: float) -> Cells:
-    # Openings between two ends of a wall that end behind it, such as those of windows. The sill is low and the pane
-    # stands outside of the wall, or lets depth out: a room ends at its wall nevertheless.
-    post = _posts(wall, cell_m)
-    rows = _recesses_of_rows(_gaps(wall, post, free, cell_m, _WIDEST_WINDOW_M), free, cell_m)
-    columns = _recesses_of_rows(_gaps(wall.T, post.T, free.T, cell_m, _WIDEST_WINDOW_M), free.T, cell_m)
-    return (rows | columns.T) & ~wall
-
-
 def _recesses_of_rows(gaps: _Gaps, free: Cells, cell_m: float) -> Cells:
     seen, out = _sums(free), np.zeros(free.shape, bool)
     gaps = gaps.where(gaps.between)
@@ -208,7 +199,12 @@ def rooms_of_storey(grid: StoreyGrid) -> StoreyRooms:
     cell_m = grid.cell_m
     wall = _without_leaves(grid.wall, grid.free, cell_m)
     free = _whole(grid.free & ~wall, wall, cell_m)
-    shut = _recesses(wall, free, cell_m)
+    # Openings between two ends of a wall that end behind it, such as those of windows. The sill is low and the pane
+    # stands outside of the wall, or lets depth out: a room ends at its wall nevertheless.
+    post = _posts(wall, cell_m)
+    rows = _recesses_of_rows(_gaps(wall, post, free, cell_m, _WIDEST_WINDOW_M), free, cell_m)
+    columns = _recesses_of_rows(_gaps(wall.T, post.T, free.T, cell_m, _WIDEST_WINDOW_M), free.T, cell_m)
+    shut = (rows | columns.T) & ~wall
     wall, free = wall | shut, free & ~shut
     doorway = _closed_doorways(wall, free, cell_m)
     inside = free & ~doorway

@@ -102,7 +102,11 @@ class AccessGuard:
                 "The Host header names no host of this server; connect by its own name or address, or start it with "
                 f"{flag('allow-host', 'NAME')}.", 421, "host",
             )  # fmt: skip
-        self._check_site(request, host)
+        other = urlsplit(_header(request, "origin")).netloc.lower() != host.lower()
+        site, mode = _header(request, "sec-fetch-site"), request.headers.get("sec-fetch-mode", "navigate")
+        by_page = site in ("cross-site", "same-site") and mode != "navigate"
+        if by_page or (other and "origin" in request.headers):
+            raise RequestError("Pages of other sites may not use this server.", 403, "origin")
         if self._token is None or path in _OPEN_PATHS:
             return None
         given = request.query_params.get(_IN_ADDRESS)
@@ -127,13 +131,6 @@ class AccessGuard:
             return bool(ip_address(name))
         except ValueError:
             return False
-
-    def _check_site(self, request: Request, host: str) -> None:
-        other = urlsplit(_header(request, "origin")).netloc.lower() != host.lower()
-        site, mode = _header(request, "sec-fetch-site"), request.headers.get("sec-fetch-mode", "navigate")
-        by_page = site in ("cross-site", "same-site") and mode != "navigate"
-        if by_page or (other and "origin" in request.headers):
-            raise RequestError("Pages of other sites may not use this server.", 403, "origin")
 
     def _is_token(self, given: str) -> bool:
         return hmac.compare_digest(token_digest(given), self._token or b"")

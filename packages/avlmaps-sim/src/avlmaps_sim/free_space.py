@@ -211,15 +211,12 @@ def _one_floor(scene: Scene, floor_m: float, radius_m: float, height_m: float, c
     apart = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     # Anything in a cell may lie in its nearest corner, and the robot's middle in its own.
     clearance = np.maximum(apart - np.sqrt(2.0), 0.0) * cell_m
-    free = _without_pockets(ground & (clearance >= radius_m), cell_m)
-    return FreeSpace(free, clearance, origin, cell_m, floor_m)
-
-
-def _without_pockets(free: Bool[np.ndarray, "nx ny"], cell_m: float) -> Bool[np.ndarray, "nx ny"]:
+    free = ground & (clearance >= radius_m)
     label, count = _labelled(free)
     size = np.bincount(label.ravel(), minlength=count + 1)
     size[0] = 0
-    return ((size * cell_m**2 >= _POCKET_M2) | (size == size.max(initial=0)))[label] & free
+    free &= ((size * cell_m**2 >= _POCKET_M2) | (size == size.max(initial=0)))[label]
+    return FreeSpace(free, clearance, origin, cell_m, floor_m)
 
 
 def _graph(number: np.ndarray, clearance_m: np.ndarray | None, cell_m: float) -> sparse.csr_matrix:

@@ -83,7 +83,11 @@ def picture_maps(
     material = mesh.material[order]
     uv = mesh.uv[order].astype(np.float64) * atlas.per_unit[material][:, None, :]
     edge, uv_edge = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
-    dual = _dual(edge)
+    a, b = edge[:, 0], edge[:, 1]
+    aa, bb, ab = (np.einsum("ti,ti->t", p, q)[:, None] for p, q in ((a, a), (b, b), (a, b)))
+    area = aa * bb - ab * ab
+    safe = np.where(area > 1e-18, area, np.inf)
+    dual = np.stack([(bb * a - ab * b) / safe, (aa * b - ab * a) / safe], axis=1)
     linear = np.einsum("tji,tjk->tki", dual, uv_edge)
     place = np.concatenate([linear, (uv[:, 0] - np.einsum("tki,ti->tk", linear, corners[:, 0]))[..., None]], axis=2)
     fraction = np.concatenate([dual, -np.einsum("tki,ti->tk", dual, corners[:, 0])[..., None]], axis=2)
@@ -91,14 +95,6 @@ def picture_maps(
     texels_a_metre = (np.linalg.norm(linear, axis=2) * size).max(axis=1)
     return (place.reshape(-1, 8).astype(np.float32), fraction.reshape(-1, 8).astype(np.float32),
             texels_a_metre.astype(np.float32))  # fmt: skip
-
-
-def _dual(edge: Float[np.ndarray, "t 2 3"]) -> Float[np.ndarray, "t 2 3"]:
-    a, b = edge[:, 0], edge[:, 1]
-    aa, bb, ab = (np.einsum("ti,ti->t", p, q)[:, None] for p, q in ((a, a), (b, b), (a, b)))
-    area = aa * bb - ab * ab
-    safe = np.where(area > 1e-18, area, np.inf)
-    return np.stack([(bb * a - ab * b) / safe, (aa * b - ab * a) / safe], axis=1)
 
 
 _FEWEST_PIXELS = 24  # mirrors that show fewer pixels are not worth another view

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32, UInt8, UInt16
+from jaxtyping import Bool, Float32, Float64, Int32, UInt16
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.columns import take
@@ -117,31 +117,20 @@ def count_through(
     frames = sum(map(len, parts))
     for part, some in progress(batches, "carving", total=frames, size=lambda one: len(one[0].clear_pose[one[1]])):
         clear, pose = np.array(part.clear_mm[some]), np.array(part.clear_pose[some], np.float64)
-        visible = _visible(middle_m, reach_m, camera, clear, pose)
+        visible = np.empty((len(pose), len(middle_m)), np.uint8)
+        for number, (view, clear_mm) in enumerate(zip(pose, clear, strict=True)):
+            across, down, ahead = view[:3, :3].T @ (middle_m - view[:3, 3]).T
+            inside = (ahead > -reach_m) & (ahead < clear_mm.max(initial=0) / 1000.0 + reach_m)
+            for off, focal, centre, length in (
+                (across, camera.fx, camera.cx, camera.width), (down, camera.fy, camera.cy, camera.height)
+            ):  # fmt: skip
+                for edge, side in ((centre, 1.0), (length - centre, -1.0)):
+                    inside &= side * focal * off + edge * ahead > -reach_m * np.hypot(focal, edge)
+            visible[number] = inside
         count_frames(grouped, starts, visible, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through)
     counts = np.empty_like(through)
     counts[order] = through
     return counts
-
-
-def _visible(
-    middle_m: Float64[np.ndarray, "c 3"],
-    reach_m: float,
-    camera: Pinhole,
-    clear_mm: UInt16[np.ndarray, "k rows columns"],
-    pose: Float64[np.ndarray, "k 4 4"],
-) -> UInt8[np.ndarray, "k c"]:
-    visible = np.empty((len(pose), len(middle_m)), np.uint8)
-    for number, (view, clear) in enumerate(zip(pose, clear_mm, strict=True)):
-        across, down, ahead = view[:3, :3].T @ (middle_m - view[:3, 3]).T
-        inside = (ahead > -reach_m) & (ahead < clear.max(initial=0) / 1000.0 + reach_m)
-        for off, focal, centre, length in (
-            (across, camera.fx, camera.cx, camera.width), (down, camera.fy, camera.cy, camera.height)
-        ):  # fmt: skip
-            for edge, side in ((centre, 1.0), (length - centre, -1.0)):
-                inside &= side * focal * off + edge * ahead > -reach_m * np.hypot(focal, edge)
-        visible[number] = inside
-    return visible
 
 
 def count_where_it_matters(

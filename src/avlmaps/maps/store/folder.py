@@ -201,15 +201,11 @@ def write(path: Path, data: MapData) -> MapInfo:
             name = f"{CLIPS}/{number:06d}-{file.sha256[:16]}{clip.suffix}"
             _copy_clip(clip, path / name, file.bytes)
             files[name] = file
-        return _commit(path, data.info, files)
-
-
-def _commit(path: Path, info: MapInfo, files: dict[str, FileInfo]) -> MapInfo:
-    size = sum(file.bytes for file in files.values())
-    info = msgspec.structs.replace(info, schema_version=SCHEMA_VERSION, files=files, bytes=size)
-    write_bytes_atomically(path / MANIFEST, msgspec.json.format(msgspec.json.encode(info), indent=2) + b"\n")
-    sweep(path, info)
-    return info
+        size = sum(file.bytes for file in files.values())
+        info = msgspec.structs.replace(data.info, schema_version=SCHEMA_VERSION, files=files, bytes=size)
+        write_bytes_atomically(path / MANIFEST, msgspec.json.format(msgspec.json.encode(info), indent=2) + b"\n")
+        sweep(path, info)
+        return info
 
 
 def sweep(path: Path, info: MapInfo) -> None:

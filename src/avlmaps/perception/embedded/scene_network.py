@@ -53,18 +53,7 @@ def channels(
     np.log(z * np.float32(math.exp(4.6) / (0.5 * (camera.fx + camera.fy))), out=out[0], where=known)
     np.multiply(z, np.float32(0.25), out=out[1])
     np.clip(z * rise + np.float32(camera_height_m), -1.0, 4.0, out=out[2], where=known)
-    normal = _normals(z, x, y, camera)
-    for channel, along in zip((3, 4, 5), (up, *level_axes(up)), strict=True):
-        out[channel] = sum(part * np.float32(share) for part, share in zip(normal, along, strict=True))
-    out[6] = known
-    out[7] = rise / np.sqrt(x * x + y * y + 1.0)
-    return out
-
-
-def _normals(
-    z: Float32[np.ndarray, "h w"], x: Float32[np.ndarray, "1 w"], y: Float32[np.ndarray, "h 1"], camera: Pinhole
-) -> tuple[Float32[np.ndarray, "h w"], ...]:
-    # Towards the camera; zero where the neighbours are of other surfaces.
+    # The normal, towards the camera; zero where the neighbours are of other surfaces.
     (left, far_left), (right, far_right) = (_neighbour(z, 1, sign) for sign in (-1, 1))
     (above, far_above), (below, far_below) = (_neighbour(z, 0, sign) for sign in (-1, 1))
     across, down = right - left, below - above
@@ -73,10 +62,15 @@ def _normals(
     ay, bx = y * across, x * down
     nx, ny, nz = by * across - down * ay, down * ax - bx * across, bx * ay - by * ax
     squared = nx * nx + ny * ny + nz * nz
-    seen = (z > 0.0) & (far_left + far_right > 0) & (far_above + far_below > 0) & (squared > 0.0)
+    seen = known & (far_left + far_right > 0) & (far_above + far_below > 0) & (squared > 0.0)
     scale = np.zeros_like(z)
     np.divide(np.where(nx * x + ny * y + nz > 0.0, -1.0, 1.0), np.sqrt(squared), out=scale, where=seen)
-    return nx * scale, ny * scale, nz * scale
+    normal = nx * scale, ny * scale, nz * scale
+    for channel, along in zip((3, 4, 5), (up, *level_axes(up)), strict=True):
+        out[channel] = sum(part * np.float32(share) for part, share in zip(normal, along, strict=True))
+    out[6] = known
+    out[7] = rise / np.sqrt(x * x + y * y + 1.0)
+    return out
 
 
 def _neighbour(

@@ -314,7 +314,11 @@ class Dispatcher:
         with self._refusing(who), self._preparing:
             order = self._begun(token)
             try:
-                self._require_ready(order)
+                self._ready(order.now)
+                here, start = self.machine.driver.pose, order.plan.start
+                turned_rad = abs(wrap_angle(here.heading_rad - start.heading_rad))
+                if here.distance_m(start) > _MOVED_M or turned_rad > _MOVED_RAD:
+                    raise _refused("moved", here.distance_m(start), degrees(turned_rad))
                 self.log.write("confirmed", {"who": asdict(who), **msgspec.to_builtins(order.plan)})
                 if order.brake.pulled:
                     raise _refused("stopped")
@@ -349,13 +353,6 @@ class Dispatcher:
                 raise _refused("ending")
             if self._running is not None:
                 raise _refused("busy", self._running.plan.order)
-
-    def _require_ready(self, order: RunningOrder) -> None:
-        self._ready(order.now)
-        here, start = self.machine.driver.pose, order.plan.start
-        turned_rad = abs(wrap_angle(here.heading_rad - start.heading_rad))
-        if here.distance_m(start) > _MOVED_M or turned_rad > _MOVED_RAD:
-            raise _refused("moved", here.distance_m(start), degrees(turned_rad))
 
     def _run(self, order: RunningOrder, who: Who) -> None:
         plan, brake, faulted = order.plan, order.brake, False

@@ -23,6 +23,7 @@ from avlmaps_sim.demo.questions import CLIP, FURNITURE, MAP, PAGE, PHOTO, Ask, P
 from avlmaps_sim.demo.report import DemoReport, Step
 from avlmaps_sim.free_space import STRUCTURE
 from avlmaps_sim.hearing.sound_library import KINDS, Synthesised
+from avlmaps_sim.homes.plan import area_m2
 from avlmaps_sim.render import Renderer
 from avlmaps_sim.scene import NOTHING, Scene
 from avlmaps_sim.scenes import open_scene
@@ -65,7 +66,7 @@ def fits(scene: Scene) -> bool:
     """Return whether a home is of one floor, neither small nor large, and holds what the questions need."""
     if len({area.floor_m for area in scene.areas}) != 1 or not _ROOMS[0] <= len(scene.areas) <= _ROOMS[1]:
         return False
-    if sum(_area_m2(area.polygon) for area in scene.areas) > _LARGEST_M2:
+    if sum(abs(area_m2(area.polygon)) for area in scene.areas) > _LARGEST_M2:
         return False
     every = np.ones(len(scene.objects), bool)
     evidence = Evidence(scene.objects, every, scene.areas, (), np.zeros(0), np.zeros((0, 3)))
@@ -94,11 +95,6 @@ def sounds_of(scene: Scene) -> tuple[str, ...]:
     made = set(Synthesised().categories)
     here = {kind.names[0] for kind in KINDS if kind.indoors and categories & set(kind.objects)}
     return tuple(sorted(here & made))
-
-
-def _area_m2(polygon: Float[np.ndarray, "k 2"]) -> float:
-    x, y = polygon.T
-    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
 
 
 _TRIED = 150
@@ -194,7 +190,10 @@ def run_demo(
         driven = drive(asks, avlmap, scene, out, say)
     report = DemoReport(out, scene.name, steps, describe(avlmap.path, data), located, seconds, driven)
     with _stage("page", seconds, "The map becomes a page to walk through."):
-        _write_page(avlmap, [step.ask for step in steps], out)
+        from avlmaps.view.page import write_page
+
+        plain = [step.ask for step in steps if not any(part.is_file for part in step.ask.question.parts)]
+        write_page(out / PAGE, [avlmap], [(ask.title, ask.question) for ask in plain])
     with _stage("report", seconds, "A page with pictures is written."):
         write_report(
             report, scene, recording, avlmap, evidence, photo, [answer for _, answer in answered], settings.moments
@@ -283,13 +282,6 @@ def _answer(avlmap: "AVLMap", ask: Ask, number: int, out: Path) -> "tuple[Step, 
     if answer.heat is not None:
         answer.heat.plot(out / picture)
     return Step(ask, answer.to_dict(), picture), answer
-
-
-def _write_page(avlmap: "AVLMap", asks: "list[Ask]", out: Path) -> None:
-    from avlmaps.view.page import write_page
-
-    words = [(ask.title, ask.question) for ask in asks if not any(part.is_file for part in ask.question.parts)]
-    write_page(out / PAGE, [avlmap], words)
 
 
 def _located(avlmap: "AVLMap", photo: "PhotoView", out: Path) -> tuple[float, float] | None:

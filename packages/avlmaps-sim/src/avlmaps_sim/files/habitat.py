@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 from avlmaps.core.errors import SceneError
 from avlmaps_sim.files.gltf import read_json, read_parts
 from avlmaps_sim.files.labels import plain, with_areas
+from avlmaps_sim.homes.plan import area_m2
 from avlmaps_sim.mesh import Mesh, joined
 from avlmaps_sim.scene import Area, Scene, SceneBuilder
 
@@ -220,16 +221,11 @@ def _areas(root: Path, name: str) -> list[Area]:
             title = str(region.get("name", ""))
             kind = plain(str(region.get("label") or title.split("|")[0]))
             polygon = np.stack([outline[:, 0], -outline[:, 2]], axis=1)
-            areas.append(Area(kind, _anticlockwise(polygon), floor, floor + float(region["extrusion_height"]), title))
+            polygon = polygon if area_m2(polygon) > 0 else polygon[::-1]
+            areas.append(Area(kind, polygon, floor, floor + float(region["extrusion_height"]), title))
         except (KeyError, TypeError, ValueError, IndexError) as error:
             raise SceneError(f"a region of {files[0]} has no outline and heights ({error!r})") from error
     return areas
-
-
-def _anticlockwise(polygon: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "k 2"]:
-    ahead = np.roll(polygon, -1, axis=0)
-    signed = float(np.sum(polygon[:, 0] * ahead[:, 1] - polygon[:, 1] * ahead[:, 0]))
-    return polygon if signed > 0 else polygon[::-1]
 
 
 def read_urdf(path: Path) -> list[tuple[Path, Float[np.ndarray, "4 4"]]]:

@@ -15,6 +15,7 @@ from avlmaps.core.errors import SceneError
 from avlmaps_sim.files.gltf import read_parts
 from avlmaps_sim.files.labels import NO_LABEL, Label, coloured, labelled_scene, passed_on
 from avlmaps_sim.files.ply import PlyMesh, read_ply
+from avlmaps_sim.homes.plan import area_m2
 from avlmaps_sim.mesh import Mesh, joined
 from avlmaps_sim.scene import Area, Scene
 
@@ -166,13 +167,8 @@ def _outline(house: House, region: int, low: np.ndarray, high: np.ndarray) -> Fl
                 and len(house.outline.get(s, ())) > 2]  # fmt: skip
     if not outlines:
         return np.array([low[:2], [high[0], low[1]], high[:2], [low[0], high[1]]])
-
-    def signed_m2(polygon: np.ndarray) -> float:
-        ahead = np.roll(polygon, -1, axis=0)
-        return 0.5 * float(np.sum(polygon[:, 0] * ahead[:, 1] - polygon[:, 1] * ahead[:, 0]))
-
-    best = max(outlines, key=lambda polygon: abs(signed_m2(polygon)))
-    return best if signed_m2(best) > 0 else best[::-1]
+    best = max(outlines, key=lambda polygon: abs(area_m2(polygon)))
+    return best if area_m2(best) > 0 else best[::-1]
 
 
 def _meanings(house: House, area_of_region: dict[int, int]) -> dict[int, Label]:

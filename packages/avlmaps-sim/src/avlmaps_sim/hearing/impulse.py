@@ -19,6 +19,7 @@ from jaxtyping import Bool, Float
 
 from avlmaps_sim.hearing.rooms import BANDS_HZ, SPEED_M_S, WALL_DB, Rooms
 from avlmaps_sim.hearing.sound_paths import Air, Way
+from avlmaps_sim.homes.plan import area_m2
 from avlmaps_sim.scene import Area, Scene
 
 TAPS = 128
@@ -190,7 +191,8 @@ class Acoustics:
 
         absorbing = pra.Material(rooms.mean_absorption(own))
         order = _ORDER_OF_FEW_WALLS if len(area.polygon) <= 8 else _ORDER
-        box = pra.Room.from_corners(_counter_clockwise(area).T, fs=self.rate_hz, max_order=order, materials=absorbing)
+        corners = np.asarray(area.polygon if area_m2(area.polygon) > 0 else area.polygon[::-1], np.float64)
+        box = pra.Room.from_corners(corners.T, fs=self.rate_hz, max_order=order, materials=absorbing)
         box.extrude(area.ceiling_m - area.floor_m, materials=absorbing)
         down = np.array([0.0, 0.0, area.floor_m])
         box.add_source(source - down)
@@ -248,9 +250,3 @@ def _areas(scene: Scene) -> tuple[Area, ...]:
 
 def _inside(area: Area, places: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
     return area.contains(places[:, :2]) & (places[:, 2] > area.floor_m) & (places[:, 2] < area.ceiling_m)
-
-
-def _counter_clockwise(area: Area) -> Float[np.ndarray, "k 2"]:
-    here, there = area.polygon, np.roll(area.polygon, -1, axis=0)
-    signed = float((here[:, 0] * there[:, 1] - there[:, 0] * here[:, 1]).sum())
-    return np.asarray(area.polygon if signed > 0 else area.polygon[::-1], np.float64)

@@ -36,6 +36,7 @@ from avlmaps_sim.bench.harness.settings import SceneSettings
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps_sim.bench.objects import FEWEST_VOXELS, STRUCTURE
+from avlmaps_sim.homes.plan import area_m2
 from avlmaps_sim.mesh import Triple
 from avlmaps_sim.rearranged import Change
 from avlmaps_sim.scene import NOTHING, Scene, SceneObject
@@ -222,7 +223,7 @@ def _lived(
     way: str,
     noticeable_on: Callable[[int, tuple[Happened, ...]], list[Happened]],
 ) -> HomeResult:
-    result = HomeResult(scene, area_m2=_floor_m2(places[0]))
+    result = HomeResult(scene, area_m2=sum(abs(area_m2(area.polygon)) for area in places[0].truth.areas))
     merged = places[0].avlmap
     names_before, hidden = set(seen[0]), list[Happened]()
     for day, place in enumerate(places[1:], 1):
@@ -324,14 +325,6 @@ def _misplaced(rows: Sequence[Sequence[float]], place: Workplace) -> tuple[float
     off_m = np.linalg.norm(apply(found, at) - apply(inverse(turn), at), axis=1)
     turned = rotation_angle_rad(found, inverse(turn))
     return float(np.median(off_m)), float(np.rad2deg(turned))
-
-
-def _floor_m2(place: Workplace) -> float:
-    total = 0.0
-    for area in place.truth.areas:
-        x, y = area.polygon.T
-        total += 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
-    return total
 
 
 def tables_of(results: dict[str, list[HomeResult]]) -> dict[str, Table]:
