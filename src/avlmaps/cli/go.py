@@ -231,7 +231,6 @@ def robot_settings(verb: "Go", translation: "Translation") -> "RobotSettings":
 
 
 def _choice(verb: "Go", asked: "Outcome") -> int:
-    """Return the number that a person types at a terminal, 0 for anything else."""
     if verb.json or not sys.stdin.isatty():
         return 0
     say(asked.error or "")

@@ -104,7 +104,6 @@ def _run(verb: "Verb") -> int:
 
 
 def _require_map_first(verb: "Verb") -> None:
-    """Refuse words of a query or a command that stand in the place of its map."""
     place, words = getattr(verb, "map", None), getattr(verb, "sentence", None)
     if place is not None and words and not place.exists() and Path(words, "map.json").is_file():
         name = type(verb).__name__.lower()
@@ -120,7 +119,6 @@ def _fail(verb: "Verb", error: BaseException, message: str, status: int) -> int:
 
 
 def _emit_error(kind: str, message: str) -> None:
-    """Print an error as JSON, unless standard output is what failed: the sentence and the status report it too."""
     try:
         output.emit({"error": output.error_answer(kind, message)}, (), as_json=True)
         sys.stdout.flush()

@@ -234,7 +234,6 @@ class ShellSession:
 
 
 def _driven(answer: dict[str, Any]) -> Reply:
-    """Why it failed goes to standard error as well."""
     failed = going.failure(answer)
     if failed is not None:
         sys.stderr.write(f"avlmaps: {printable(failed['message'])}\n")

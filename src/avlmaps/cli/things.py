@@ -73,7 +73,6 @@ class Things(InFrame, MapVerb):
         return answer
 
     def _near(self, avlmap: "AVLMap") -> "str | list[float] | None":
-        """Return what things are to be near to; a place in space in the recording's frame."""
         from avlmaps.query.places import is_place, place_of
 
         if self.near is None or not is_place(self.near):
@@ -207,5 +206,4 @@ def room_lines(rooms: "Sequence[RoomAnswer]", frame: str = "recording") -> list[
 
 
 def _storeys(rows: Sequence[Mapping[str, Any]]) -> dict[str, Column]:
-    """Return the column of the storeys, counted from 0, the lowest; none in a map of one storey."""
     return {"storey": "storey"} if all(row.get("storey") is not None for row in rows) else {}

@@ -113,7 +113,6 @@ def _read(text: str, given: Attachments) -> Command:
 
 
 def _picked(intents: Sequence[act.Intent], said: str) -> tuple[act.Intent, ...]:
-    """Return intents with the nearest picked where any thing of a name will do: "a chair", "the nearest chair"."""
 
     def nearest(target: act.Target) -> act.Target:
         if target.pick is not act.Pick.ANY or target.kind not in (act.TargetKind.OBJECT, act.TargetKind.AREA):

@@ -192,7 +192,6 @@ def _form(text: str) -> frozenset[str]:
 
 @cache
 def _forms() -> tuple[Sequence[frozenset[str]], Mapping[str, float]]:
-    """Return the words and pairs of words of each example, and how much each of these tells."""
     forms = [_form(command) for command, _ in examples()]
     counts = Counter(part for form in forms for part in form)
     return forms, {part: math.log(len(forms) / count) for part, count in counts.items()}
@@ -310,7 +309,6 @@ def both(read: Command, proposed: Weighed | None) -> Command:
 
 
 def _used(intents: Sequence[Intent], tokens: Sequence[Token]) -> frozenset[int]:
-    """Return the tokens that some intents are made of: words of names, and where the amounts begin."""
     named = {word for one in intents for to in targets_of(one) for part in (to, *to.near) for word in part.name.split()}
     values = (value for one in act.every(intents) for value in act.values_of(one).values())
     numbers = {abs(value) for value in values if isinstance(value, float | int)}

@@ -353,7 +353,6 @@ class MapDriver:
         return self.planner.costmap.known_ahead_m(self._xy, self.pose.heading_rad, distance_m, ESCAPE_M)
 
     def _turned(self, angle_rad: float, trip: _Trip) -> float:
-        """Turn, and return by how much it is still off."""
         start, left_rad, heading_rad = self.pose, angle_rad, self.pose.heading_rad
         planned = turns_for(angle_rad)
         for _ in range(len(planned) + _EXTRA_TURNS):

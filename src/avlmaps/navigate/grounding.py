@@ -261,7 +261,6 @@ class Seeker:
     def _named(
         self, kind: str, name: str, primary: bool, heat_of: Callable[[str], Heatmap], at: HeardAt | None = None
     ) -> Heatmap:
-        """Return the heat of a name; where it names a storey ("bed upstairs"), with the goals on that one alone."""
         said = said_storeys(name)
         if len(said) != 1 or not said[0].said or not said[0].rest:
             return self._known((kind, name, primary, at), lambda: heat_of(name))
@@ -300,7 +299,6 @@ class Seeker:
         return self._chosen(nearest(among, here), len(things))
 
     def _of_equal(self, things: list[Destination]) -> Destination:
-        """Return the likeliest thing; of several that fit equally the one that was chosen."""
         equal = fit_equally(things)
         name = equal[0].name
         if len(equal) > 1 and name not in self._meant and self.numbers:
@@ -358,7 +356,6 @@ class Seeker:
         return self._chosen(x, len(first)), self._chosen(y, len(second))
 
     def _candidates(self, target: Target) -> tuple[list[Destination], bool]:
-        """Return the things that a target may mean, best first, and whether it says itself which one."""
         if isinstance(target, Place):
             level = self.avlmap.space.level(np.array([target.x, target.y, target.z]))
             known = self._handed_out.get(target, Destination("", Outline.at(level[:2]), level))
@@ -377,14 +374,12 @@ class Seeker:
         return things, len(heat.factors) > 1 or not isinstance(heat.lead, NearThings)
 
     def _rooms(self, heat: Heatmap) -> list[Destination]:
-        """Return all rooms of the map where a heatmap asks for rooms of any kind; else none."""
         if [(one.part.modality, one.part.query.removesuffix("s")) for one in heat.factors] != [(Modality.AREA, "room")]:
             return []
         places = [(room.name, self.avlmap.space.level(np.array(room.position))) for room in self.avlmap.where.rooms]
         return [Destination(name, Outline.at(place[:2]), place) for name, place in places]
 
     def _near_first(self, things: list[Destination], found_at: float) -> list[Destination]:
-        """Return the things on the robot's own storey where one of them is found, else all of them."""
         storeys = self.avlmap.storeys
         if storeys is None:
             return things

@@ -322,7 +322,6 @@ class Robot:
         return np.array([pose.x_m, pose.y_m])
 
     def _on_floor(self, xy: Float[np.ndarray, "2"], *things: Destination) -> Float[np.ndarray, "3"]:
-        """Return a place on the floor: that of things, where they are on another storey than the robot."""
         storeys, floors = self.avlmap.storeys, [self.floor_m]
         if storeys is not None and things:
             numbers = storeys.of(np.array([thing.place[2] for thing in things]))
@@ -349,7 +348,6 @@ class Robot:
         self._go(skill, thing, goal, to=None if stop is None else np.append(stop, goal[2]))
 
     def _stop(self, thing: Destination, exactly: bool, off_m: Offs) -> Float[np.ndarray, "2"] | None:
-        """Return where to stop beside a thing; None where the driver does not know."""
         if not isinstance(self.driver, Planning):
             return None
         stop = self.driver.stop_beside(thing.outline, self.avlmap.space.world(thing.place), off_m)
@@ -360,13 +358,9 @@ class Robot:
         return None if stop is None else stop.xy
 
     def _go(
-        self,
-        skill: str,
-        thing: Destination,
-        goal: Float[np.ndarray, "3"],
-        face: Float[np.ndarray, "3"] | None = None,
-        to: Float[np.ndarray, "3"] | None = None,
-    ) -> None:
+        self, skill: str, thing: Destination, goal: Float[np.ndarray, "3"],
+        face: Float[np.ndarray, "3"] | None = None, to: Float[np.ndarray, "3"] | None = None,
+    ) -> None:  # fmt: skip
         world = self.avlmap.space.world
         looked_at = None if face is None else world(face)
         self._done(skill, thing.name, goal, [self.driver.go_to(world(goal if to is None else to), face=looked_at)])

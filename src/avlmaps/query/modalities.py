@@ -226,16 +226,7 @@ def image_factor(space: Space, located: "Located", part: Part, heat: HeatSetting
     if pose is not None and not is_located:
         notes.append("the heat is that of the best guess")
     note, instance = "; ".join(notes), np.arange(len(anchors))
-    scores = np.ones(len(anchors))
     return NearAnchors(
-        space,
-        part,
-        heat.falloff_per_m(part.role),
-        anchors,
-        scores,
-        instance,
-        found,
-        part.query,
-        note,
+        space, part, heat.falloff_per_m(part.role), anchors, np.ones(len(anchors)), instance, found, part.query, note,
         float(confidence),
-    )
+    )  # fmt: skip

@@ -494,7 +494,6 @@ _SEEN = 0.2
 
 
 def _beside(room: RoomField, seen: RoomField) -> RoomField:
-    """Return the kinds of rooms with a share of what is seen at each place; rooms that people named stay certain."""
     known = len(seen.kinds)
     is_named = room.share.max(axis=1, keepdims=True, initial=0.0) >= 1.0
     mixed = (1.0 - _SEEN) * room.share[:, :known] + _SEEN * seen.share

@@ -298,7 +298,6 @@ async def _content(
 
 
 def _drawn(task: WorkInput, one: Operation, query: Any, answer: Mapping[str, Any]) -> bytes:
-    """Return a small picture with the places of an answer, and its heat where it has some."""
     if one.tool == "ask":
         return picture(task, PictureQuery(**msgspec.structs.asdict(query), size="small")).content
     if (pose := answer.get("world_from_camera")) is not None:

@@ -363,7 +363,6 @@ def _paged(task: WorkInput, key: str, rows: list[dict[str, Any]], top: int, page
 
 
 def _kinds(names: Iterable[str]) -> dict[str, int]:
-    """Return how often each name occurs, the most common first; ``other names`` counts the rest."""
     ordered = Counter(names).most_common()
     rest = sum(count for _, count in ordered[_MOST_KINDS:])
     return dict(ordered[:_MOST_KINDS]) | ({"other names": rest} if rest else {})

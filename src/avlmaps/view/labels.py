@@ -58,7 +58,6 @@ def drawn_sources(avlmap: "AVLMap") -> list[dict[str, Any]]:
 
 
 def _outlines(cells: Bool[np.ndarray, "nx ny"], plan: "CandidateGrid") -> Iterator[Float[np.ndarray, "k 2"]]:
-    """Yield the corners of each piece of a region, level frame, the largest first."""
     from scipy.ndimage import label
 
     from avlmaps.query.floor_plan import outline

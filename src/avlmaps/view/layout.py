@@ -134,7 +134,6 @@ class Layout:
 
 
 def _storeys(storeys: "Storeys", low_m: float, high_m: float) -> list[dict[str, Any]]:
-    """Return the storeys, lowest first, each with the heights between which it is shown without its ceiling."""
     told: list[dict[str, Any]] = []
     for storey in storeys.all:
         top_m, bottom_m = min(storey.high_m, high_m) - _CEILING_M, max(storey.low_m, low_m - _BELOW_M)

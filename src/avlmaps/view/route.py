@@ -102,7 +102,6 @@ class Guide:
         return obstacles_for(self._avlmap, self._shape) if self._robot is None else self._robot.obstacles
 
     def _start(self) -> GroundPose:
-        """Return where the walk began; from there the robot gets out to the floor that it may stand on."""
         cameras = np.asarray(self._avlmap.data.keyframes.world_from_camera)
         if not len(cameras):
             raise NavigationError("The map has no keyframe that says where its walk began; give a start.")
@@ -110,6 +109,5 @@ class Guide:
         return GroundPose(float(level[0, 3]), float(level[1, 3]), float(np.arctan2(level[1, 2], level[0, 2])))
 
     def _told(self, outcome: Outcome) -> dict[str, Any]:
-        """Return an outcome as ``avlmaps go --json`` prints it, with its ``places``: level frame, on the floor."""
         places = np.column_stack([outcome.path, np.full(len(outcome.path), self._obstacles.floor_m)])
         return outcome.to_json() | {"places": places.round(4).tolist()}

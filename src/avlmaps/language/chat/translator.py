@@ -208,7 +208,6 @@ def _opening(command: str) -> tuple[Message, ...]:
 
 
 def _parsed(program: str, answer: ModelReply) -> Program:
-    """Return the parsed program; where the model wrote no code at all, say that rather than what is wrong with it."""
     try:
         return parse_program(program)
     except ProgramError as fault:

@@ -144,11 +144,13 @@ class LearnedReader:
                     done.append(Line(symbols, log))
                 else:
                     opened.append(_Open(symbols, log, goes_on, first[0, at], second[0, at]))
-            best = max((line.log for line in done), default=-np.inf)
-            beam = [one for one in opened if one.log > best - 4.0]
-            if not beam or len(done) >= 2 * _BEAM:
+            done = sorted(done, key=lambda line: -line.log)[:_BEAM]
+            best = done[0].log if done else -np.inf
+            least = done[-1].log if len(done) == _BEAM else -np.inf  # a line only gets less likely
+            beam = [one for one in opened if one.log > max(best - 4.0, least)]
+            if not beam:
                 break
-        return sorted(done, key=lambda line: -line.log)[:_BEAM]
+        return done
 
 
 def _following(

@@ -83,7 +83,6 @@ def parse_program(text: str) -> Program:
 
 
 def _check_text(text: str) -> None:
-    """Refuse what Python's parser must not see, or a person would not see."""
     unsafe = next((found for found in UNSAFE.finditer(text) if found.group() not in "\n\t"), None)
     if unsafe:
         raise _at(text, unsafe, f"the character U+{ord(unsafe.group()):04X} has no place in a program; remove it")

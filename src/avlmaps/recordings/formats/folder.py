@@ -161,7 +161,6 @@ def _find_video(folder: Path, description: Description) -> VideoFrames | None:
 
 
 def _find_pictures(folder: Path, description: Description, known: PoseTable, video: VideoFrames | None) -> _Pictures:
-    """Find the pictures and their stamps: by frames.csv, else row by row with poses.csv, else by the rate."""
     found, depth_of = _by_stem(folder / "depth", DEPTH_SUFFIXES)
     where, there = "depth", depth_of
     if video is None:

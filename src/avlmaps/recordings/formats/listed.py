@@ -196,7 +196,6 @@ def _orb_camera(file: Path, size: tuple[int, int]) -> tuple[Pinhole, float] | No
 
 
 def _associations(file: Path) -> list[tuple[float, str, str]]:
-    """Return (stamp or number, colour file, depth file) of each line, which may name either first."""
     found = tables.read_list(file, ("stamp_s", "name", "stamp_s", "name"))
     return [(row[2], row[3], row[1]) if "depth" in row[1] else (row[0], row[1], row[3]) for row in found]
 
