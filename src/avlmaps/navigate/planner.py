@@ -262,13 +262,13 @@ class Planner:
     ) -> Stop | None:
         """Return where a body that comes from a start stops beside a thing, None where it comes nowhere near it.
 
-        From there it sees the thing's ``place`` through nothing but the thing. Of such places it is that which is least
-        off from where it is wanted (``beside_m``), unless another saves much of the way; ``off_m`` says of places and
-        their distances from the thing's edge how far off they are.
+        None too inside its outline, as that of walls. From there it sees the thing's ``place`` through nothing but the
+        thing. Of such places it is that which is least off from where it is wanted (``beside_m``), unless another saves
+        much of the way; ``off_m`` says of places and their distances from the thing's edge how far off they are.
         """
         costmap = self.costmap
         out = self.entry(start)
-        if out is None or not costmap.holds(place):
+        if out is None or not costmap.holds(place) or thing.distance_m(start) == 0.0:
             return None
         cells = np.argwhere(self._part == self._part[tuple(costmap.cell_of(out))])
         edge_m = thing.distances_m(costmap.middle_of(cells))
