@@ -1,5 +1,7 @@
 """Real robots are of another package: without it, one sentence says how to get it."""
 
+from importlib.metadata import EntryPoints
+
 import pytest
 
 from avlmaps.core.errors import BackendError
@@ -17,6 +19,6 @@ from avlmaps.navigate import robots
 )
 def test_what_is_not_installed_is_named(monkeypatch, wanted):
     for module in (robots, sources):
-        monkeypatch.setattr(module, "entry_points", lambda _: ())
+        monkeypatch.setattr(module, "entry_points", lambda _: EntryPoints())
     with pytest.raises(BackendError, match="avlmaps-ros"):
         wanted()

@@ -113,7 +113,7 @@ def test_each_thing_is_drawn_by_its_own_confidence_and_a_product_by_that_of_what
 def test_a_photo_that_is_only_guessed_is_no_certainty() -> None:
     part = Part(Modality.IMAGE, "photo.jpg", Role.PRIMARY, is_file=True)
     space = furnished_map().object("chair").space
-    located = SimpleNamespace(world_from_camera=None, guess=np.eye(4), inliers=9, score=0.3, notes=())
+    located = SimpleNamespace(world_from_camera=None, guess=np.eye(4), inliers=9, score=0.3, notes=(), elsewhere=None)
     factor = image_factor(space, located, part, HeatSettings())  # pyright: ignore[reportArgumentType]
     assert not factor.found
     assert Heatmap.of(factor).goals(1)[0].score == pytest.approx(0.3, abs=1e-3)
