@@ -119,6 +119,7 @@ def _fail(verb: "Verb", error: BaseException, message: str, status: int) -> int:
 
 
 def _emit_error(kind: str, message: str) -> None:
+    """Print an error as JSON, unless standard output is what failed: the sentence and the status report it too."""
     try:
         output.emit({"error": output.error_answer(kind, message)}, (), as_json=True)
         sys.stdout.flush()

@@ -5,16 +5,13 @@ import sys
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 from tyro.conf import Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import AnsweredError, UsageError, emit
 from avlmaps.cli.verb import PORT, Asking, ModelVerb
 from avlmaps.core.progress import say
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -136,7 +136,7 @@ def _listed(of: Listed, said: dict[str, str]) -> ListQuestion | None:
         return None
     change = next((one for one in ("new", "gone", "moved") if pattern(_TABLE, one).fullmatch(said["change"])), "")
     thing = _several(thing) if of is Listed.ROOMS_WITH else thing
-    name, since, how = room or thing or said["seen"], said["visit"] + said["date"], "rooms" if said["names"] else how
+    name, since = room or thing or said["seen"], said["visit"] + said["date"]
     return ListQuestion(of, name, counts=bool(said["counts"]), since=since, change=change, how=how, other=said["other"])
 
 

@@ -266,6 +266,7 @@ def _is_name(token: Token, said: set[str]) -> bool:
 
 
 def _is_number(tokens: Sequence[Token], at: int) -> bool:
+    """Return whether a number is said at a token that numbers no list: "1. go to the sofa"."""
     token = tokens[at]
     if token.kind != "number":
         return token.kind == "word" and token.text not in claimed_words("small") and bool(number_at(list(tokens), at))

@@ -159,7 +159,7 @@ def _following(
     """Return what may follow, likely enough to matter, each with what the line goes on from.
 
     A name's word may stand at any of its places. The line goes on from the place that training takes (`align.py`): the
-    first that it has not pointed at, of a further word the one closest behind the word before.
+    first, unless the line has pointed at it; of a further word the one closest behind the word before.
     """
     found: list[tuple[linear.Symbol, linear.Symbol, float]] = [
         (symbol, symbol, float(said[linear.INDEX[symbol]])) for symbol in may.symbols
